@@ -27,15 +27,15 @@ import numpy as np
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.batch.bases import InParts
-from lightpaint.batch.cluster import Cluster
-from lightpaint.batch.engine import Engine, InProcess
-from lightpaint.batch.errands import Film
-from lightpaint.batch.held import Held
-from lightpaint.batch.how import How
-from lightpaint.batch.plan import plan
+from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.task import Task
+from lightpaint.batch.run_options import How
+from lightpaint.batch.work.basis_parts import InParts
+from lightpaint.batch.work.engine import Engine, InProcess
+from lightpaint.batch.work.task import Task
+from lightpaint.batch.work.work_items import Film
+from lightpaint.batch.work.worker_cache import Held
 from lightpaint.images.exr import write_rgb
 from lightpaint.progress import silent
 from lightpaint.scene.threads import limit_threads

@@ -49,8 +49,8 @@ from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.live import Live
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.paint.launch import at_hand
-from lightpaint.paint.server import Server
-from lightpaint.paint.store import Store
+from lightpaint.paint.server.server import Server
+from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.settings import Settings

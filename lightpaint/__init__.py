@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from lightpaint.lighting.problem import Problem as Problem
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
-    from lightpaint.paint.widget import Painter as Painter
+    from lightpaint.paint.notebook.widget import Painter as Painter
     from lightpaint.pipeline import run as run
     from lightpaint.placement.suggest import suggest_lights as suggest_lights
     from lightpaint.placement.suggestion import Suggestion as Suggestion
@@ -150,7 +150,7 @@ _HOMES = {
 }
 
 #: The same of what needs an extra, and is not part of `import *`.
-_EXTRAS = {"Painter": "paint.widget"}
+_EXTRAS = {"Painter": "paint.notebook.widget"}
 
 __all__ = ["__version__", *_HOMES]
 

@@ -78,9 +78,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def run_all(manifest: str, folder: str, workers: int = 1) -> None:
     """Do what is left of a batch, as a process of its own may."""
-    from lightpaint.batch.how import How
-    from lightpaint.batch.plan import plan
+    from lightpaint.batch.plan.planner import plan
     from lightpaint.batch.run import run_batch
+    from lightpaint.batch.run_options import How
 
     run_batch(plan(manifest, folder), How(workers))
 
@@ -88,7 +88,9 @@ def run_all(manifest: str, folder: str, workers: int = 1) -> None:
 def processes() -> Any:
     """Processes that begin with all modules loaded, and none of this one's threads."""
     made = multiprocessing.get_context("forkserver")
-    made.set_forkserver_preload(["lightpaint.batch.plan", "lightpaint.batch.run", "batches"])
+    made.set_forkserver_preload(
+        ["lightpaint.batch.plan.planner", "lightpaint.batch.run", "batches"]
+    )
     return made
 
 

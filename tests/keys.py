@@ -3,7 +3,7 @@
 import urllib.request
 from urllib.parse import urldefrag
 
-from lightpaint.paint.guard import KEY_PROTOCOL, PROTOCOL
+from lightpaint.paint.server.guard import KEY_PROTOCOL, PROTOCOL
 
 
 def bearer(key: str) -> dict[str, str]:

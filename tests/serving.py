@@ -17,8 +17,8 @@ from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 
 from lightpaint.paint.frames import Message, of_frame, to_frame
-from lightpaint.paint.guard import PROTOCOL
-from lightpaint.paint.server import Server
+from lightpaint.paint.server.guard import PROTOCOL
+from lightpaint.paint.server.server import Server
 
 #: More than the system takes for somebody who does not read.
 LARGE = np.zeros((2048, 2048, 4), np.float32)

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.paint.pixels import Pixels
-from lightpaint.paint.steps import Identity, KeptLook, Patch, SeenFrom, Step
-from lightpaint.paint.store import Store
+from lightpaint.paint.store.pixels import Pixels
+from lightpaint.paint.store.steps import Identity, KeptLook, Patch, SeenFrom, Step
+from lightpaint.paint.store.store import Store
 
 SIZE = (12, 10)
 IDENTITY = Identity("room.xml", "0f0f", ("panel", "bulb"), (SeenFrom("camera", SIZE),))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.render import parts
-from lightpaint.batch import work
+from lightpaint.batch.work import work
 
 #: Of a lesson, here and in the tests: what is learned does not matter to them.
 LESSON = 2**12

@@ -14,14 +14,14 @@ from command import refused
 from serving import in_a_loop
 
 import lightpaint as lp
-from lightpaint.batch.manifest import read_manifest
+from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.errors import BatchError, ConstraintError, LightingError, PaintError, SceneError
 from lightpaint.expected import MAX_LISTED, MAX_NAME, MAX_PRIMARIES
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import MAX_BYTES, read_lighting
 from lightpaint.paint.frames import Message, said_of
-from lightpaint.paint.line import Line
+from lightpaint.paint.server.session_clients import Line
 from lightpaint.progress import wanted, while_wanted
 from lightpaint.records import strict_toml
 from lightpaint.scene.choice import choose_lights

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 import lightpaint as lp
-from lightpaint.batch.cluster import LEAST_S, PATIENCE
+from lightpaint.batch.cluster.cluster import LEAST_S, PATIENCE
 from lightpaint.cli.commands import template_lines
 from lightpaint.cli.parser import command_parser
 from lightpaint.lighting.constraints.whites import WHITES
 from lightpaint.lighting.fit import HOLD
-from lightpaint.paint.address import PORT
+from lightpaint.paint.server.address import PORT
 from lightpaint.scene.alike import FEW
 from lightpaint.scene.quality import PRESETS
 from lightpaint.scene.scene import load_scene

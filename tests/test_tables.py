@@ -10,7 +10,7 @@ import pytest
 from batches import small_basis
 
 import lightpaint as lp
-from lightpaint.batch.summary import LightRow, Row, summary_csv
+from lightpaint.batch.gallery.summary import LightRow, Row, summary_csv
 from lightpaint.colour.color import luminance
 
 

@@ -27,11 +27,11 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
 from lightpaint.paint.frames import Message
-from lightpaint.paint.keeping import identity_of
 from lightpaint.paint.launch import subjects_of
 from lightpaint.paint.protocol import Ask, Export, Paint
-from lightpaint.paint.steps import SeenFrom
-from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.session_file import identity_of
+from lightpaint.paint.store.steps import SeenFrom
+from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.scene.scene import load_scene
 from lightpaint.settings import Settings

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from lightpaint.batch.plan import plan
+from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 
 HERE = Path(__file__).resolve().parent

@@ -11,23 +11,23 @@ from pathlib import Path
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
-from lightpaint.batch.alone import alone
-from lightpaint.batch.bases import InParts
-from lightpaint.batch.cluster import Cluster
-from lightpaint.batch.engine import Engine, InProcess
-from lightpaint.batch.errands import Done, Film
-from lightpaint.batch.estimate import look_s
-from lightpaint.batch.gallery import write_gallery
-from lightpaint.batch.how import How, Outcome
-from lightpaint.batch.journal import Journal, Line
-from lightpaint.batch.names import THUMBNAILS
-from lightpaint.batch.planes import keep_all_planes
-from lightpaint.batch.planned import Plan, PlannedLook, Step, by_bases, waves
-from lightpaint.batch.processes import Processes
-from lightpaint.batch.spread import rendered_by
-from lightpaint.batch.sums import solved_by_sums
-from lightpaint.batch.task import Task
-from lightpaint.batch.work import attempted, fields_of, final_render, is_full
+from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.folder_lock import alone
+from lightpaint.batch.gallery.gallery import write_gallery
+from lightpaint.batch.gallery.small_planes import keep_all_planes
+from lightpaint.batch.manifest.folder_names import THUMBNAILS
+from lightpaint.batch.plan.cost_estimate import look_s
+from lightpaint.batch.plan.journal import Journal, Line
+from lightpaint.batch.plan.plan import Plan, PlannedLook, Step, by_bases, waves
+from lightpaint.batch.run_options import How, Outcome
+from lightpaint.batch.work.basis_parts import InParts
+from lightpaint.batch.work.distributed_render import rendered_by
+from lightpaint.batch.work.distributed_sums import solved_by_sums
+from lightpaint.batch.work.engine import Engine, InProcess
+from lightpaint.batch.work.processes import Processes
+from lightpaint.batch.work.task import Task
+from lightpaint.batch.work.work import attempted, fields_of, final_render, is_full
+from lightpaint.batch.work.work_items import Done, Film
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
 from lightpaint.pipeline import obtain

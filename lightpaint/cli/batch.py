@@ -6,18 +6,18 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.errands import Done
-from lightpaint.batch.estimate import estimate
-from lightpaint.batch.first import write_first
-from lightpaint.batch.gallery import spoken_counts
-from lightpaint.batch.how import How
-from lightpaint.batch.how import Outcome as BatchOutcome
-from lightpaint.batch.names import FILES
-from lightpaint.batch.openjd import LOOK, write_openjd
-from lightpaint.batch.plan import plan
-from lightpaint.batch.planned import Plan, PlannedLook
+from lightpaint.batch.gallery.gallery import spoken_counts
+from lightpaint.batch.gallery.summary import Row, summary_document
+from lightpaint.batch.manifest.folder_names import FILES
+from lightpaint.batch.manifest.starter_manifest import write_first
+from lightpaint.batch.plan.cost_estimate import estimate
+from lightpaint.batch.plan.openjd import LOOK, write_openjd
+from lightpaint.batch.plan.plan import Plan, PlannedLook
+from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.summary import Row, summary_document
+from lightpaint.batch.run_options import How
+from lightpaint.batch.run_options import Outcome as BatchOutcome
+from lightpaint.batch.work.work_items import Done
 from lightpaint.cli import documents, terminal
 from lightpaint.cli.manner import Outcome
 from lightpaint.errors import BatchError, OutputError

@@ -26,7 +26,7 @@ from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
 
 if TYPE_CHECKING:
-    from lightpaint.batch.how import How
+    from lightpaint.batch.run_options import How
     from lightpaint.job import Job
 
 #: Where what options ask of lights stands, as errors say it.
@@ -208,7 +208,7 @@ def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
         return {"jobs": jobs_of(options, settings), **how}
 
     # Galleries, which one look has no need of.
-    from lightpaint.batch.variations import words_of
+    from lightpaint.batch.manifest.variations import words_of
     from lightpaint.cli.several import several_of
 
     failed: dict[str, str] = {}
@@ -249,7 +249,7 @@ def _to_do(options: Namespace) -> dict[str, Any]:
 
 def _how(options: Namespace) -> "How":
     """How a batch is done. Raises BatchError for what does not go together."""
-    from lightpaint.batch.how import How
+    from lightpaint.batch.run_options import How
 
     if options.cluster is None and (options.shared_fs or options.task_limit_s is not None):
         idle = "--shared-fs" if options.shared_fs else "--task-limit"

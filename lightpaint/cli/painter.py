@@ -13,13 +13,13 @@ from lightpaint.cli.manner import Outcome, manner
 from lightpaint.colour.transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.paint.address import Reach
+from lightpaint.paint.server.address import Reach
 from lightpaint.settings import Settings
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
-    from lightpaint.paint.server import Server
-    from lightpaint.paint.wishes import Wishes
+    from lightpaint.paint.server.server import Server
+    from lightpaint.paint.store.requests import Wishes
 
 #: What it means that others can.
 RISK = (
@@ -51,7 +51,7 @@ def paint(
     """`lightpaint paint SCENE|BASIS|LIGHTS`, of one view or of several."""
     # The server and the session file bring much that no other command needs.
     from lightpaint.paint.launch import paint_in_browser, subjects_of
-    from lightpaint.paint.server import check_installed
+    from lightpaint.paint.server.server import check_installed
 
     check_installed()
     from lightpaint.cli.spelling import solve_command

@@ -6,12 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.batch.entries import Entry
-from lightpaint.batch.gallery import check_gallery, spoken_counts
-from lightpaint.batch.made import leave_shifted, shifted_folders, sibling_folder, siblings
-from lightpaint.batch.names import FILES, is_reserved
-from lightpaint.batch.solved import entry_of, write_gallery_of
-from lightpaint.batch.work import is_full
+from lightpaint.batch.gallery.gallery import check_gallery, spoken_counts
+from lightpaint.batch.gallery.solve_gallery import entry_of, write_gallery_of
+from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.folder_names import FILES, is_reserved
+from lightpaint.batch.work.derived_looks import (
+    leave_shifted,
+    shifted_folders,
+    sibling_folder,
+    siblings,
+)
+from lightpaint.batch.work.work import is_full
 from lightpaint.cli import terminal
 from lightpaint.cli.documents import files_document
 from lightpaint.errors import ALONE, OutputError

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import Any
 
-from lightpaint.paint.wishes import Wishes
+from lightpaint.paint.store.requests import Wishes
 
 
 def solve_command(

@@ -17,15 +17,15 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.views import check_same_lights
-from lightpaint.paint.address import Listening, listen
-from lightpaint.paint.database import set_aside
-from lightpaint.paint.keeping import Keeping, check_together, identity_of
-from lightpaint.paint.opening import Opening
-from lightpaint.paint.server import Server, check_installed
-from lightpaint.paint.store import Store
+from lightpaint.paint.lazy_scene import Opening
+from lightpaint.paint.server.address import Listening, listen
+from lightpaint.paint.server.server import Server, check_installed
+from lightpaint.paint.session_file import Keeping, check_together, identity_of
+from lightpaint.paint.store.database import set_aside
+from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.paint.wishes import Wishes
 from lightpaint.scene.scene import Scene
 from lightpaint.settings import Settings
 from lightpaint.signals import interruptible_between_pieces

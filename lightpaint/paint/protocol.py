@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from lightpaint.paint.pixels import Region
+from lightpaint.paint.store.pixels import Region
 
 #: Of this protocol; a page of another one is told to load itself anew.
 VERSION = 2

@@ -18,22 +18,31 @@ from lightpaint.basis.clean import CleanPlanes
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.paint import pictures, protocol
-from lightpaint.paint.beside import Settling, StoppedError, Threads, Tone, Writing, give_way, told
-from lightpaint.paint.cleaning import Cleaning
-from lightpaint.paint.errands import Errands
+from lightpaint.paint import protocol
+from lightpaint.paint.background_jobs import Errands
+from lightpaint.paint.background_threads import (
+    Settling,
+    StoppedError,
+    Threads,
+    Tone,
+    Writing,
+    give_way,
+    told,
+)
 from lightpaint.paint.frames import Message
-from lightpaint.paint.looks import Looks
-from lightpaint.paint.moment import Moment
-from lightpaint.paint.offered import fields_of_views, offer_transforms, offer_view
-from lightpaint.paint.pictures import Picture, Pictures
-from lightpaint.paint.pixels import Pixels
-from lightpaint.paint.session import Session
-from lightpaint.paint.steps import Identity
-from lightpaint.paint.store import Store
+from lightpaint.paint.plane_denoiser import Cleaning
+from lightpaint.paint.session import picture_table as pictures
+from lightpaint.paint.session.answer_messages import analysis_fields, answer_fields
+from lightpaint.paint.session.look_library import Looks
+from lightpaint.paint.session.picture_table import Picture, Pictures
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.snapshot import Moment
+from lightpaint.paint.session.view_pictures import fields_of_views, offer_transforms, offer_view
+from lightpaint.paint.store.pixels import Pixels
+from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject, bases_of, transform_of
-from lightpaint.paint.told import analysis_fields, answer_fields
-from lightpaint.paint.wishes import Wishes
 from lightpaint.progress import while_wanted
 from lightpaint.scene.turns import MITSUBA
 

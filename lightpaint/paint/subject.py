@@ -13,8 +13,8 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.transform import TransformChoice, ViewTransform
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.paint.opening import Opening
-from lightpaint.paint.wishes import Wishes
+from lightpaint.paint.lazy_scene import Opening
+from lightpaint.paint.store.requests import Wishes
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality import samples
 from lightpaint.scene.scene import Scene

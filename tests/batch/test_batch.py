@@ -17,18 +17,18 @@ import pytest
 from batches import LOOKS, NAMES, contents, killed, run_all, small_basis, write_batch
 from command import run, succeed
 
-from lightpaint.batch import engine as engines
 from lightpaint.batch import run as run_module
-from lightpaint.batch import work
-from lightpaint.batch.errands import Done
-from lightpaint.batch.gallery import contact_sheet, gallery_page
-from lightpaint.batch.how import How
-from lightpaint.batch.names import FILES, is_reserved
-from lightpaint.batch.plan import plan
-from lightpaint.batch.processes import Processes
+from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
+from lightpaint.batch.gallery.summary import LightRow, Row
+from lightpaint.batch.manifest.folder_names import FILES, is_reserved
+from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.summary import LightRow, Row
-from lightpaint.batch.task import Task
+from lightpaint.batch.run_options import How
+from lightpaint.batch.work import engine as engines
+from lightpaint.batch.work import work
+from lightpaint.batch.work.processes import Processes
+from lightpaint.batch.work.task import Task
+from lightpaint.batch.work.work_items import Done
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.images.exr import write_rgb
 from lightpaint.lighting.file import read_lighting

@@ -22,10 +22,10 @@ from command import run
 from renderer import write_room
 
 from lightpaint.basis.render import parts as parts_module
-from lightpaint.batch.cluster import Cluster
-from lightpaint.batch.how import How, Outcome
-from lightpaint.batch.plan import plan
+from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
+from lightpaint.batch.run_options import How, Outcome
 from lightpaint.images.exr import write_rgb
 from lightpaint.scene import render as render_module
 from lightpaint.scene.threads import limit_threads
@@ -359,12 +359,12 @@ def test_without_dask_the_line_is_said_that_installs_it(
 def test_workers_of_another_version_are_left_out(
     workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from lightpaint.batch import cluster_worker
+    from lightpaint.batch.cluster import worker as cluster_worker
 
     workers.await_two()
     mine = {**cluster_worker.versions(), "lightpaint": "other"}
     # Workers find the function by its name, and theirs is not changed.
-    monkeypatch.setattr("lightpaint.batch.cluster_workers.own_versions", lambda: mine)
+    monkeypatch.setattr("lightpaint.batch.cluster.workers.own_versions", lambda: mine)
     hears = Hears()
     with Cluster(workers.address, hears):  # type: ignore[arg-type]
         assert sum("is left out: it has lightpaint" in text for text in hears.said) == 2

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from lightpaint.batch.cluster_workers import ClusterWorkers
+from lightpaint.batch.cluster.workers import ClusterWorkers
 from lightpaint.errors import BatchError
 
 dask = pytest.importorskip("dask", reason="Dask")

@@ -13,10 +13,10 @@ from batches import NAMES, run_all, small_basis, write_batch
 from command import succeed
 from PIL import Image
 
-from lightpaint.batch import summary
-from lightpaint.batch.gallery import gallery_page
-from lightpaint.batch.planes import keep_planes, planes_name, read_planes
-from lightpaint.batch.summary import NARROW, WIDE, LightRow, Row
+from lightpaint.batch.gallery import summary
+from lightpaint.batch.gallery.gallery import gallery_page
+from lightpaint.batch.gallery.small_planes import keep_planes, planes_name, read_planes
+from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, Row
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.estimate import Estimate, write_estimate

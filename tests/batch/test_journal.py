@@ -6,8 +6,8 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.batch.journal import Journal, Line
-from lightpaint.batch.names import JOURNAL
+from lightpaint.batch.manifest.folder_names import JOURNAL
+from lightpaint.batch.plan.journal import Journal, Line
 
 LINES = [
     Line("evening", "answer", "done", "a" * 64),

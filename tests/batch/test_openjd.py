@@ -59,9 +59,9 @@ def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(here: Path) ->
 
 
 def test_those_that_share_a_folder_keep_others_out(here: Path) -> None:
-    from lightpaint.batch.how import How
-    from lightpaint.batch.plan import plan
+    from lightpaint.batch.plan.planner import plan
     from lightpaint.batch.run import run_batch
+    from lightpaint.batch.run_options import How
     from lightpaint.errors import OutputError
 
     planned, told = plan(here / "looks.toml", here / "out"), []

@@ -8,13 +8,13 @@ import pytest
 from batches import contents, write_batch
 from light_groups import interleaved, pictures
 
-from lightpaint.batch.errands import Done, Errand
-from lightpaint.batch.held import Held
-from lightpaint.batch.parcels import Contents, Parcel, Store, packed, pieces, unpack
-from lightpaint.batch.plan import plan
+from lightpaint.batch.cluster.parcels import Contents, Parcel, Store, packed, pieces, unpack
+from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.task import Task
-from lightpaint.batch.work import do
+from lightpaint.batch.work.task import Task
+from lightpaint.batch.work.work import do
+from lightpaint.batch.work.work_items import Done, Errand
+from lightpaint.batch.work.worker_cache import Held
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.progress import silent
 

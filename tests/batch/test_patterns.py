@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from lightpaint.batch import entries
-from lightpaint.batch.manifest import read_manifest
-from lightpaint.batch.patterns import files_matching
-from lightpaint.batch.plan import plan
+from lightpaint.batch.manifest import entries
+from lightpaint.batch.manifest.file_patterns import files_matching
+from lightpaint.batch.manifest.manifest import read_manifest
+from lightpaint.batch.plan.planner import plan
 from lightpaint.errors import BatchError
 
 

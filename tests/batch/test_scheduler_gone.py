@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from lightpaint.batch import cluster_workers
-from lightpaint.batch.cluster import Cluster
-from lightpaint.batch.cluster_workers import ClusterWorkers
-from lightpaint.batch.errands import Done
-from lightpaint.batch.parcels import unpack
+from lightpaint.batch.cluster import workers as cluster_workers
+from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.cluster.parcels import unpack
+from lightpaint.batch.cluster.workers import ClusterWorkers
+from lightpaint.batch.work.work_items import Done
 from lightpaint.errors import BatchError, OutputError
 
 distributed = pytest.importorskip("distributed", reason="Dask's distributed")

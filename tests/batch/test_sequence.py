@@ -8,8 +8,8 @@ from batches import small_basis
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from lightpaint.batch.sequence import DARK, at_frame, between
-from lightpaint.batch.variations import SHIFTED, SOLVED, VARIATIONS, shifted, varied
+from lightpaint.batch.manifest.sequence import DARK, at_frame, between
+from lightpaint.batch.manifest.variations import SHIFTED, SOLVED, VARIATIONS, shifted, varied
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.errors import LightingError
 from lightpaint.lighting.constraints.constraints import Constraints

@@ -12,7 +12,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render import parts as parts_module
-from lightpaint.batch.plan import plan
+from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.errors import BatchError, TargetError
 from lightpaint.images.exr import write_rgb

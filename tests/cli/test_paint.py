@@ -28,13 +28,13 @@ from lightpaint.basis.file import write_basis
 from lightpaint.cli.options import painted_of, settings_of, values_of
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.spelling import solve_command
-from lightpaint.paint.beside import Threads
+from lightpaint.paint.background_threads import Threads
 from lightpaint.paint.frames import Message, of_frame, to_frame
 from lightpaint.paint.launch import subject_of, subjects_of
 from lightpaint.paint.protocol import VERSION
-from lightpaint.paint.steps import Identity, Step
-from lightpaint.paint.store import Store
-from lightpaint.paint.wishes import Wishes
+from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.steps import Identity, Step
+from lightpaint.paint.store.store import Store
 from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import lightpaint
-from lightpaint.batch.how import How
+from lightpaint.batch.run_options import How
 from lightpaint.cli.options import LOADING
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.words import _SAID, OPTIONS, SPELLINGS, spoken

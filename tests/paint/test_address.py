@@ -10,9 +10,9 @@ import pytest
 from fake_session import FakeSession
 
 from lightpaint.errors import PaintError
-from lightpaint.paint import address
-from lightpaint.paint.address import Reach, listen
-from lightpaint.paint.server import Server
+from lightpaint.paint.server import address
+from lightpaint.paint.server.address import Reach, listen
+from lightpaint.paint.server.server import Server
 
 
 def has_ipv6() -> bool:

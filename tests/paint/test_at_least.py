@@ -13,12 +13,13 @@ import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.images.exr import Part, write_parts
-from lightpaint.paint import cells, protocol
-from lightpaint.paint.looks import Looks
-from lightpaint.paint.pictures import Pictures
-from lightpaint.paint.session import Session
-from lightpaint.paint.steps import Identity
-from lightpaint.paint.store import MemoryStore, Store
+from lightpaint.paint import protocol
+from lightpaint.paint.notebook import widget_arguments as cells
+from lightpaint.paint.session.look_library import Looks
+from lightpaint.paint.session.picture_table import Pictures
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.settings import Settings
 from lightpaint.target.own import write_painting
 

@@ -10,8 +10,8 @@ import pytest
 from keys import bearer
 from serving import Page, Serving, until
 
-from lightpaint.paint import connections
 from lightpaint.paint.protocol import VERSION
+from lightpaint.paint.server import http_connections as connections
 
 HALF = b"GET / HTTP/1.1\r\nHost: 127.0"
 

@@ -11,8 +11,8 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.images.denoise import denoised
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.paint.exports import picture, verified
 from lightpaint.paint.launch import subject_of
+from lightpaint.paint.session_exports import picture, verified
 from lightpaint.settings import Settings
 from lightpaint.sources import SceneFile
 

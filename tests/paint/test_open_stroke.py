@@ -7,9 +7,9 @@ import numpy.typing as npt
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.paint import open_stroke
-from lightpaint.paint.open_stroke import OpenStroke
-from lightpaint.paint.pixels import Pixels, Region, slices
+from lightpaint.paint.session import open_stroke
+from lightpaint.paint.session.open_stroke import OpenStroke
+from lightpaint.paint.store.pixels import Pixels, Region, slices
 
 HEIGHT, WIDTH = 21, 34
 

@@ -18,11 +18,11 @@ from lightpaint.basis.render.render import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoise import Features
 from lightpaint.images.objects import Objects
-from lightpaint.paint.keeping import identity_of
 from lightpaint.paint.launch import subject_of
-from lightpaint.paint.opening import Opening
-from lightpaint.paint.steps import Identity
-from lightpaint.paint.store import Store
+from lightpaint.paint.lazy_scene import Opening
+from lightpaint.paint.session_file import identity_of
+from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject
 from lightpaint.settings import Settings
 from lightpaint.sources import SceneFile

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.paint.pictures import THUMBNAIL, small_picture
+from lightpaint.paint.session.picture_table import THUMBNAIL, small_picture
 
 
 @pytest.mark.parametrize(

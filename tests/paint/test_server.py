@@ -21,14 +21,14 @@ from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketT
 from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
-from lightpaint.paint import client, server
-from lightpaint.paint.address import Address, Reach
 from lightpaint.paint.frames import Message, of_frame, to_frame
-from lightpaint.paint.guard import Guard
-from lightpaint.paint.line import Line
-from lightpaint.paint.page_files import page_files
 from lightpaint.paint.protocol import VERSION, Paint
-from lightpaint.paint.server import page_app
+from lightpaint.paint.server import client, server
+from lightpaint.paint.server.address import Address, Reach
+from lightpaint.paint.server.guard import Guard
+from lightpaint.paint.server.page_files import page_files
+from lightpaint.paint.server.server import page_app
+from lightpaint.paint.server.session_clients import Line
 
 PORT = 8421
 HOST = f"127.0.0.1:{PORT}"

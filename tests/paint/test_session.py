@@ -19,11 +19,11 @@ from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint import protocol
-from lightpaint.paint.pixels import Pixels
-from lightpaint.paint.session import Session
-from lightpaint.paint.steps import Identity
-from lightpaint.paint.store import MemoryStore
-from lightpaint.paint.wishes import OF_ALL, OF_FIT, TITLES, Wishes
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.pixels import Pixels
+from lightpaint.paint.store.requests import OF_ALL, OF_FIT, TITLES, Wishes
+from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.store import MemoryStore
 from lightpaint.settings import Settings
 
 SIZE = (18, 32)

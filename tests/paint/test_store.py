@@ -22,15 +22,15 @@ from sessions import IDENTITY, SIZE, Plain, big, content, look, patch, step, tol
 
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import OutputError, PaintError
-from lightpaint.paint import database
-from lightpaint.paint.database import set_aside
-from lightpaint.paint.looks import Looks
-from lightpaint.paint.packed import packed, unpacked
-from lightpaint.paint.pictures import Pictures
-from lightpaint.paint.pixels import Pixels
-from lightpaint.paint.session import Session
-from lightpaint.paint.steps import Identity, KeptLook, Patch, SeenFrom, Step, painted_by
-from lightpaint.paint.store import MemoryStore, Store
+from lightpaint.paint.session.look_library import Looks
+from lightpaint.paint.session.picture_table import Pictures
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store import database
+from lightpaint.paint.store.compression import packed, unpacked
+from lightpaint.paint.store.database import set_aside
+from lightpaint.paint.store.pixels import Pixels
+from lightpaint.paint.store.steps import Identity, KeptLook, Patch, SeenFrom, Step, painted_by
+from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.settings import Settings
 
 ACTIONS = st.lists(
@@ -143,7 +143,7 @@ WRITER = """
 import sys
 from pathlib import Path
 from sessions import IDENTITY, look, step
-from lightpaint.paint.store import Store
+from lightpaint.paint.store.store import Store
 store = Store.open(Path(sys.argv[1]), IDENTITY)
 print("open", len(store.steps), flush=True)
 for number in range(len(store.steps), 10**6):
@@ -277,7 +277,7 @@ LIMITED = """
 import resource, sys
 from pathlib import Path
 from sessions import IDENTITY, big, content
-from lightpaint.paint.store import Store
+from lightpaint.paint.store.store import Store
 store, number = Store.open(Path(sys.argv[1]), IDENTITY), 0
 before = resource.getrlimit(resource.RLIMIT_FSIZE)
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, before[1]))

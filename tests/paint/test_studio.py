@@ -19,11 +19,15 @@ import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.spelling import solve_command
 from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.paint import cleaning, exports, pictures, protocol, store, studio, subject
+from lightpaint.paint import plane_denoiser as cleaning
+from lightpaint.paint import protocol, studio, subject
+from lightpaint.paint import session_exports as exports
 from lightpaint.paint.frames import Message
-from lightpaint.paint.moment import Moment
-from lightpaint.paint.session import Session
-from lightpaint.paint.store import Store
+from lightpaint.paint.session import picture_table as pictures
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.snapshot import Moment
+from lightpaint.paint.store import store
+from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 

@@ -11,7 +11,7 @@ from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.analysis.elsewhere import Elsewhere
 from lightpaint.lighting.analysis.held_back import Loosening, Reason
 from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.paint.told import (
+from lightpaint.paint.session.answer_messages import (
     HELP,
     foreseen_fields,
     help_fields,

@@ -25,10 +25,14 @@ from renderer import REPOSITORY
 import lightpaint as lp
 from lightpaint.browser import BundleError, bundled, source
 from lightpaint.errors import OutputError, PaintError
-from lightpaint.paint import beside, bundle, cells, protocol, store, studio
-from lightpaint.paint.pixels import Pixels
-from lightpaint.paint.steps import Identity
-from lightpaint.paint.store import Store
+from lightpaint.paint import background_threads as beside
+from lightpaint.paint import protocol, studio
+from lightpaint.paint.notebook import widget_arguments as cells
+from lightpaint.paint.notebook import widget_files as bundle
+from lightpaint.paint.store import store
+from lightpaint.paint.store.pixels import Pixels
+from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.settings import Settings, SettingsByName
@@ -63,7 +67,7 @@ class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
 @pytest.fixture(autouse=True)
 def line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Widgets have such a line, where no kernel runs; nor any loop, as Playwright leaves one."""
-    monkeypatch.setattr("lightpaint.paint.widget._running_loop", lambda: None)
+    monkeypatch.setattr("lightpaint.paint.notebook.widget._running_loop", lambda: None)
     noted = type("Line", (Noted,), {"messages": [], "synced": {}})
     monkeypatch.setattr(comm, "create_comm", lambda *_, **how: noted(**how))
 
@@ -648,7 +652,7 @@ def test_callbacks_come_in_the_thread_of_the_kernel(
 
     async def cell() -> None:
         loop = asyncio.get_running_loop()
-        monkeypatch.setattr("lightpaint.paint.widget._running_loop", lambda: loop)
+        monkeypatch.setattr("lightpaint.paint.notebook.widget._running_loop", lambda: loop)
         painter = open_()
         page = Page(painter)
         page.say("hello", version=protocol.VERSION)
@@ -785,8 +789,8 @@ def test_a_cell_that_is_put_right_finds_its_file(
 
 
 def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    importlib.import_module("lightpaint.paint.widget")
-    monkeypatch.delitem(sys.modules, "lightpaint.paint.widget")
+    importlib.import_module("lightpaint.paint.notebook.widget")
+    monkeypatch.delitem(sys.modules, "lightpaint.paint.notebook.widget")
     monkeypatch.delitem(vars(lp), "Painter", raising=False)
     monkeypatch.setitem(sys.modules, "anywidget", None)
     with pytest.raises(lp.LightpaintError) as raised:

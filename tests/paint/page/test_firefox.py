@@ -22,8 +22,8 @@ from websockets.sync.client import ClientConnection, connect
 
 import lightpaint as lp
 from lightpaint.colour.display import to_8_bit
-from lightpaint.paint.server import Server
-from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.server.server import Server
+from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 

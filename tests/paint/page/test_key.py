@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from neighbour import Neighbour
 
-from lightpaint.paint.server import Server
-from lightpaint.paint.store import MemoryStore
+from lightpaint.paint.server.server import Server
+from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 

@@ -24,9 +24,9 @@ from lightpaint.colour.display import to_8_bit
 from lightpaint.images.objects import Objects
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.paint.launch import subject_of
-from lightpaint.paint.server import Server
-from lightpaint.paint.steps import of_view
-from lightpaint.paint.store import Store
+from lightpaint.paint.server.server import Server
+from lightpaint.paint.store.steps import of_view
+from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.sources import BasisFile

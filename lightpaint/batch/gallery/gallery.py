@@ -1,0 +1,168 @@
+"""index.html, one self-contained page of all looks, and contact.png, a sheet of them."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from html import escape
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from lightpaint.batch.gallery.gallery_mixers import in_script, mixers_html, transforms_of
+from lightpaint.batch.gallery.small_planes import drop_planes, planes_name
+from lightpaint.batch.gallery.summary import (
+    Row,
+    drop_pictures,
+    is_summary,
+    rows_of,
+    summary_csv,
+    summary_json,
+    view_folders,
+)
+from lightpaint.batch.manifest.folder_names import FILES
+from lightpaint.batch.plan.journal import Line
+from lightpaint.batch.plan.plan import Plan
+from lightpaint.batch.work.task import Kind
+from lightpaint.browser import bundled, styles
+from lightpaint.errors import OutputError
+from lightpaint.files import write_bytes, write_text
+from lightpaint.images.png import png_bytes
+from lightpaint.report.comparison import fitted
+from lightpaint.screen import visible
+from lightpaint.version import __version__
+
+#: Pictures of the sheet, at most, and in a row; width of each, gap, and height of the words.
+MOST, COLUMNS, WIDTH, GAP, BELOW = 120, 6, 240, 14, 22
+
+#: A dark ground, and what is written on it.
+GROUND, TEXT, FAINT, WARNING = (24, 24, 26), (226, 226, 226), (142, 142, 146), (255, 140, 120)
+
+
+def check_gallery(folder: Path, *, force: bool = False) -> None:
+    """Raise OutputError where a gallery would take the place of somebody else's files."""
+    there = [folder / name for name in FILES if (folder / name).exists()]
+    if there and not force and not is_summary(folder / "summary.json"):
+        raise OutputError(
+            f"{there[0]} is there, and of no batch: name another folder (folder=...), or replace "
+            "it (force=True)"
+        )
+
+
+def write_gallery(folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
+    """Write index.html, contact.png, summary.csv and summary.json of what there is by now.
+
+    Returns the rows, failures first.
+    """
+    rows = rows_of(plan, lines)
+    rows.sort(key=lambda row: ("failed", "waiting", "done").index(row.state))
+    drop_pictures(folder, rows)
+    bases = bases_of_rows(folder, plan)
+    drop_planes(folder, set(bases.values()))
+    write_text(folder / "summary.json", summary_json(rows))
+    write_text(folder / "summary.csv", summary_csv(rows))
+    write_text(folder / "index.html", gallery_page(folder, plan.manifest.name, rows, bases))
+    write_bytes(folder / "contact.png", png_bytes(contact_sheet(folder, rows)))
+    return rows
+
+
+def bases_of_rows(folder: Path, plan: Plan) -> dict[str, str]:
+    """By the folder of each picture, which planes its mixer has."""
+    return {
+        place.relative_to(plan.folder).as_posix(): planes_name(folder, key)
+        for look in plan.looks
+        for place, key in zip(view_folders(look), look.steps[0].task.bases, strict=False)
+    }
+
+
+def gallery_page(
+    folder: Path, title: str, rows: Sequence[Row], bases: Mapping[str, str] | None = None
+) -> str:
+    """The page as HTML text.
+
+    folder: where the small pictures and planes are. bases: planes of each row, by its folder.
+    """
+    shown = [row for row in rows if row.state == "done"]
+    mixers = mixers_html(folder, shown, bases or {})
+    told = []
+    for row in rows:
+        its = {k: v for k, v in asdict(row).items() if v not in (None, "", ())}
+        its["links"] = [[Path(x).name, quote(x)] for x in row.files]
+        its.pop("files", None)
+        if row.picture:
+            data = base64.b64encode((folder / row.picture).read_bytes()).decode("ascii")
+            its["picture"] = f"data:image/jpeg;base64,{data}"
+        if (bases or {}).get(row.folder) in mixers:
+            its["basis"] = (bases or {})[row.folder]
+        told.append(its)
+    template = resources.files("lightpaint.batch.gallery").joinpath("gallery.html.in")
+    return Template(template.read_text(encoding="utf-8")).substitute(
+        title=escape(visible(title)),
+        about=escape(spoken_counts(rows)),
+        failed=" failed" if any(row.state == "failed" for row in rows) else "",
+        looks=in_script(told),
+        transforms=in_script(transforms_of(shown) if mixers else {}),
+        mixers="\n".join(mixers.values()),
+        style=styles("gallery.css", "mixer.css"),
+        script=bundled("gallery.js"),
+        version=escape(__version__),
+    )
+
+
+def spoken_counts(rows: Sequence[Row]) -> str:
+    """`12 looks: 1 failed, 2 not done yet`."""
+    counts = {state: sum(row.state == state for row in rows) for state in ("failed", "waiting")}
+    told = [f"{counts['failed']} failed"] * bool(counts["failed"])
+    told += [f"{counts['waiting']} not done yet"] * bool(counts["waiting"])
+    looks = f"{len(rows)} look{'s' * (len(rows) != 1)}"
+    return f"{looks}: {', '.join(told) or 'all done'}"
+
+
+def contact_sheet(folder: Path, rows: list[Row]) -> Any:
+    """Small pictures side by side with their names, (H, W, 3) uint8; of very many the first."""
+    shown = rows[:MOST]
+    columns = max(1, min(COLUMNS, len(shown)))
+    height = max([round(WIDTH * row.size[1] / row.size[0]) for row in shown], default=WIDTH)
+    height = min(height, 2 * WIDTH)
+    count = -(-len(shown) // columns)
+    size = (columns * (WIDTH + GAP) + GAP, count * (height + BELOW + GAP) + 2 * GAP + BELOW)
+    sheet = Image.new("RGB", size, GROUND)
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(14)
+    told = spoken_counts(rows)
+    if len(rows) > MOST:
+        told += f"; the first {MOST} are shown"
+    draw.text((GAP, GAP), fitted(told, font, size[0] - 2 * GAP), FAINT, font)
+    for k, row in enumerate(shown):
+        x = GAP + k % columns * (WIDTH + GAP)
+        y = 2 * GAP + BELOW + k // columns * (height + BELOW + GAP)
+        _draw(sheet, folder, row, (x, y, WIDTH, height), font)
+    return np.asarray(sheet)
+
+
+def _draw(
+    sheet: Image.Image, folder: Path, row: Row, box: tuple[int, int, int, int], font: Any
+) -> None:
+    """One look in its box (x, y, width, height), with its name below and what it misses."""
+    (x, y, width, height), draw = box, ImageDraw.Draw(sheet)
+    if row.picture:
+        with Image.open(folder / row.picture) as opened:
+            scale = min(width / opened.width, height / opened.height)
+            size = max(1, round(scale * opened.width)), max(1, round(scale * opened.height))
+            how = Image.Resampling.NEAREST if scale > 2 else Image.Resampling.LANCZOS
+            small = opened.resize(size, how)
+        sheet.paste(small, (x + (width - size[0]) // 2, y + (height - size[1]) // 2))
+    else:
+        draw.rectangle((x, y, x + width - 1, y + height - 1), outline=FAINT)
+        said = {"failed": "failed", "waiting": "not done yet"}.get(row.state, "no picture")
+        color = WARNING if row.state == "failed" else FAINT
+        draw.text((x + width // 2, y + height // 2), said, color, font, anchor="mm")
+    said = "" if row.delta_e is None else f"dE {row.delta_e:.1f}"
+    baseline = y + height + round(0.75 * BELOW)
+    draw.text((x + width, baseline), said, FAINT, font, anchor="rs")
+    room = width - round(font.getlength(said)) - 8
+    name = row.look if row.folder == row.look else f"{row.look} {row.sensor}"
+    draw.text((x, baseline), fitted(visible(name), font, room), TEXT, font, anchor="ls")

@@ -1,0 +1,63 @@
+"""The gallery of looks that were solved by name, without a manifest."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from lightpaint.basis.basis import Basis
+from lightpaint.batch.gallery.gallery import write_gallery
+from lightpaint.batch.gallery.small_planes import keep_planes
+from lightpaint.batch.gallery.summary import Row
+from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.plan.journal import Line
+from lightpaint.batch.plan.plan import Plan, PlannedLook, Step
+from lightpaint.batch.work.task import Kind, Task
+from lightpaint.job import Job
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile
+
+
+def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> Entry:
+    """What a gallery says of a look.
+
+    It was solved by `job` or, where there is a `folder`, made of its answer. variation: its word.
+    """
+    scenes = tuple(scene for scene in job.scenes if isinstance(scene, SceneFile))
+    basis = job.basis if isinstance(job.basis, BasisFile | GroupsFile) else None
+    return Entry(
+        (folder or job.folder).name,
+        "",
+        scenes,
+        basis,
+        by_sensor=job.by_sensor,
+        variation=variation,
+        of=() if folder is None else (job.folder.name,),
+    )
+
+
+def write_gallery_of(
+    folder: Path, entries: Sequence[Entry], failed: Mapping[str, str], bases: Sequence[Basis]
+) -> list[Row]:
+    """Write the gallery of the looks in `folder`, by the names of their folders there.
+
+    failed: why, by name, of those that came to nothing. bases: of their views, which all share.
+    """
+    looks, lines = [], {}
+    keys = tuple(json.dumps({"view": k}) for k in range(len(bases)))
+    for key, basis in zip(keys, bases, strict=True):
+        keep_planes(folder, key, basis)
+    for entry in entries:
+        name = entry.name
+        made_of = "" if name in failed else _content(folder / name / "lighting.json")
+        step = Step(Task(name, "answer", "", bases=keys), made_of, True)
+        looks.append(PlannedLook(entry, folder / name, (step,)))
+        its: tuple[str, Kind] = (name, "answer")
+        state = "failed" if name in failed else "done"
+        lines[its] = Line(name, "answer", state, made_of, failed.get(name, ""))  # type: ignore[arg-type]
+    names = frozenset(entry.name for entry in entries)
+    plan = Plan(Path(folder.resolve().name), folder, tuple(looks), {}, names)
+    return write_gallery(folder, plan, lines)
+
+
+def _content(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""

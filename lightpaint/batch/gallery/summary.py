@@ -1,0 +1,293 @@
+"""What came of each look, read from its folder: numbers, lights, and a small picture."""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from PIL import Image
+
+from lightpaint.arrays import RGB
+from lightpaint.batch.manifest.folder_names import THUMBNAILS
+from lightpaint.batch.plan.journal import Line
+from lightpaint.batch.plan.plan import Plan, PlannedLook
+from lightpaint.batch.work.task import EXPORT, Kind
+from lightpaint.colour.display import to_8_bit
+from lightpaint.colour.exposure import choose_exposure
+from lightpaint.colour.transform import ViewTransform
+from lightpaint.errors import LightpaintError
+from lightpaint.files import read_text, replacing
+from lightpaint.images.blocks import block_mean
+from lightpaint.images.denoise import denoised
+from lightpaint.images.estimate import read_estimate
+from lightpaint.lighting.file import read_lighting
+from lightpaint.records import strict_json
+from lightpaint.relit.export.exports import plain_cell
+from lightpaint.result_folder import RECORD
+from lightpaint.version import __version__
+
+FORMAT = "lightpaint-batch 1"
+
+#: Pixels of a picture in the gallery from left to right, at most: of a few looks, which are
+#: compared as large as a window, and of more of them; quality of its JPEG.
+WIDE, WIDE_LOOKS, NARROW, QUALITY = 960, 64, 320, 82
+
+#: Columns of summary.csv before those of the lights.
+COLUMNS = (
+    "look",
+    "sensor",
+    "state",
+    "delta_e",
+    "noise",
+    "share_met",
+    "agrees",
+    "target",
+    "scene",
+    "variation",
+    "folder",
+    "why",
+)
+
+#: What stands behind its name in the columns of a light: luminance, emission, kelvin.
+LIGHT_COLUMNS = ("", " R", " G", " B", " K")
+
+State = Literal["done", "failed", "waiting"]
+
+
+@dataclass(frozen=True)
+class LightRow:
+    """A light in a look. y: luminance of its emission, in the scene's unit. hex: its colour."""
+
+    name: str
+    y: float
+    emission: RGB | None = None
+    hex: str | None = None
+    kelvin: float | None = None
+    duv: float | None = None
+    stops: float | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """A look, or one view of it.
+
+    folder: of its results, from the batch's. delta_e, noise, share_met: as of report.json; None
+    where nothing was painted. agrees: whether a render confirms it; None where there was none.
+    files: what is there to open. picture: small, from the batch's folder; "" where there is none.
+    """
+
+    look: str
+    state: State
+    why: str
+    folder: str
+    sensor: str = ""
+    scene: str = ""
+    target: str = ""
+    variation: str = ""
+    delta_e: float | None = None
+    noise: float | None = None
+    share_met: float | None = None
+    agrees: bool | None = None
+    view: tuple[str, float] | None = None
+    lights: tuple[LightRow, ...] = ()
+    files: tuple[str, ...] = ()
+    picture: str = ""
+    size: tuple[int, int] = field(default=(4, 3))
+
+
+def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
+    """A row for each view of each look, in the order of the manifest."""
+    rows: list[Row] = []
+    widest = WIDE if len(plan.looks) <= WIDE_LOOKS else NARROW
+    views: dict[str, tuple[str, float] | None] = {}
+    for look in plan.looks:
+        state, why = state_of(look, lines)
+        for folder in view_folders(look):
+            row = _row(plan, look, folder, state, why)
+            # What was made of others is shown as they are.
+            like = row.view or next((views[x] for x in look.entry.of if views.get(x)), None)
+            views.setdefault(look.entry.name, like)
+            if state == "done":
+                row = _with_picture(row, plan.folder, folder, like, _key(look, lines), widest)
+            rows.append(row)
+    return rows
+
+
+def state_of(look: PlannedLook, lines: Mapping[tuple[str, Kind], Line]) -> tuple[State, str]:
+    """Whether all its steps are done, as they are asked for now; and why not."""
+    state: State = "done"
+    for step in look.steps:
+        line = lines.get((step.task.look, step.task.kind))
+        if line is not None and line.state == "failed" and line.made_of == step.made_of:
+            return "failed", line.why
+        if line is None or line.made_of != step.made_of:
+            state = "waiting"
+    return state, ""
+
+
+def _key(look: PlannedLook, lines: Mapping[tuple[str, Kind], Line]) -> str:
+    return lines[look.entry.name, "answer"].made_of[:16]
+
+
+def view_folders(look: PlannedLook) -> list[Path]:
+    """Where the pictures of each view are."""
+    if not look.entry.by_sensor:
+        return [look.folder]
+    return [look.folder / str(scene.sensor) for scene in look.entry.scenes]
+
+
+def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) -> Row:
+    entry, told = look.entry, {}
+    if state == "done":
+        told = _json(folder / "report.json")
+    basis, seen, view = (told.get(key) or {} for key in ("basis", "seen", "view"))
+    sensor = basis.get("sensor") or (folder.name if entry.by_sensor else "")
+    if not sensor and entry.scenes and entry.scenes[0].sensor is not None:
+        sensor = str(entry.scenes[0].sensor)
+    scene = entry.scenes[0].path if entry.scenes else entry.basis.path if entry.basis else ""
+    names = ("report.html", "comparison.png", "relit.png", "relit.exr", "lighting.json")
+    places = dict.fromkeys((folder, look.folder))
+    there = [place / x for place in places for x in names if (place / x).is_file()]
+    if any(step.task.kind == "export" for step in look.steps):
+        there += sorted(x for x in (look.folder / EXPORT).glob("*") if x.name != RECORD)
+    return Row(
+        entry.name,
+        state,
+        why,
+        folder.relative_to(plan.folder).as_posix(),
+        sensor,
+        Path(scene).name,
+        told.get("target", ""),
+        entry.variation,
+        seen.get("delta_e"),
+        seen.get("noise"),
+        seen.get("share_met"),
+        (told.get("verification") or {}).get("agrees"),
+        (view["name"], view["stops"]) if "name" in view else None,
+        _lights(look.folder, told) if state == "done" else (),
+        tuple(x.relative_to(plan.folder).as_posix() for x in there) if state == "done" else (),
+    )
+
+
+def _lights(folder: Path, told: Mapping[str, Any]) -> tuple[LightRow, ...]:
+    with suppress(LightpaintError):
+        lighting = read_lighting(folder / "lighting.json")
+        rows = []
+        for light in lighting.lights:
+            seen = lighting.photometry(light)
+            stops = (told.get("lights") or {}).get(light.name, {}).get("stops")
+            told_ = (light.emission, seen.hex, seen.kelvin, seen.duv, stops)
+            rows.append(LightRow(light.name, seen.y, *told_))
+        return tuple(rows)
+    return ()
+
+
+def _json(path: Path) -> dict[str, Any]:
+    """What an object in a file says; {} of none, and of none of ours."""
+    with suppress(LightpaintError, ValueError):
+        told = strict_json(read_text(path, "report", LightpaintError))
+        return told if isinstance(told, dict) else {}
+    return {}
+
+
+def _with_picture(
+    row: Row, base: Path, folder: Path, view: tuple[str, float] | None, key: str, widest: int
+) -> Row:
+    """With a picture of the prediction, made once for each answer. widest: in pixels."""
+    of_view = f"-{folder.name}" if row.folder != row.look else ""
+    name = f"{THUMBNAILS}/{key}{of_view}-{widest}.jpg"
+    path = base / name
+    with suppress(LightpaintError, OSError):
+        if not _is_whole(path):
+            predicted = read_estimate(folder / "predicted.exr")[0]
+            small = block_mean(predicted.image, max(1, -(-predicted.image.shape[1] // widest)))
+            if predicted.half_difference.any():
+                small = denoised(small)
+            stops = choose_exposure(predicted.image)
+            transform = ViewTransform(*view) if view else ViewTransform("srgb", stops)
+            with replacing(path) as beside:
+                shown = Image.fromarray(to_8_bit(np.clip(transform.encode(small), 0, 1)))
+                how = {"quality": QUALITY, "subsampling": 0}
+                shown.save(beside, "JPEG", **how, comment=f"{transform.name} {transform.stops!r}")
+        with Image.open(path) as opened:
+            size, comment = opened.size, opened.info.get("comment", b"").decode()
+        # What it is seen through, chosen here or not, a mixer needs as well.
+        seen, _, stops = comment.partition(" ")
+        view = (seen, float(stops)) if stops else view
+        return Row(**{**vars(row), "picture": name, "size": size, "view": view})
+    return row
+
+
+def _is_whole(path: Path) -> bool:
+    """Return whether there is a small picture that can be shown."""
+    try:
+        with Image.open(path) as opened:
+            opened.load()
+            name, _, stops = opened.info.get("comment", b"").decode().partition(" ")
+            return opened.format == "JPEG" and bool(name) and math.isfinite(float(stops))
+    except (OSError, SyntaxError, ValueError):
+        return False
+
+
+def drop_pictures(folder: Path, rows: Iterable[Row]) -> None:
+    """Delete small pictures of earlier answers."""
+    kept = {row.picture for row in rows}
+    for path in (folder / THUMBNAILS).glob("*.jpg"):
+        if f"{THUMBNAILS}/{path.name}" not in kept:
+            path.unlink(missing_ok=True)
+
+
+def summary_document(rows: Iterable[Row]) -> dict[str, Any]:
+    """summary.json: all rows, with their lights."""
+    looks = [{k: v for k, v in asdict(row).items() if v not in (None, "", ())} for row in rows]
+    counts = {state: sum(x["state"] == state for x in looks) for state in ("done", "failed")}
+    return {"format": FORMAT, "lightpaint": __version__, **counts, "looks": looks}
+
+
+def is_summary(path: Path) -> bool:
+    """Whether a file is a summary.json of ours."""
+    return _json(path).get("format") == FORMAT
+
+
+def summary_json(rows: Iterable[Row]) -> str:
+    """summary.json as text."""
+    return json.dumps(summary_document(rows), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def summary_csv(rows: list[Row]) -> str:
+    """Return summary.csv: a line for each row, and five columns for each light.
+
+    These are the luminance of its emission, under its name, that in R, G and B, and its colour
+    temperature in kelvin, where it has one.
+    """
+    names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    columns = [f"{name}{ending}" for name in names for ending in LIGHT_COLUMNS]
+    table.writerow([*COLUMNS, *map(plain_cell, columns)])
+    for row in rows:
+        lights = {light.name: _light_cells(light) for light in row.lights}
+        cells = [_cell(getattr(row, column)) for column in COLUMNS]
+        none = [""] * len(LIGHT_COLUMNS)
+        table.writerow([*cells, *(x for name in names for x in lights.get(name, none))])
+    return text.getvalue()
+
+
+def _light_cells(light: LightRow) -> list[str]:
+    rgb = light.emission or ("", "", "")
+    kelvin = "" if light.kelvin is None else f"{light.kelvin:.0f}"
+    return [f"{light.y:.6g}", *(x if x == "" else f"{x:.6g}" for x in rgb), kelvin]
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else plain_cell(str(value))

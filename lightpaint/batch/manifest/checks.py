@@ -1,0 +1,222 @@
+"""What a table asks for, before files are read: what lacks, contradicts itself, is not there."""
+
+from collections.abc import Mapping
+from glob import has_magic
+from pathlib import Path
+from typing import Any
+
+from lightpaint.batch.manifest.file_patterns import files_matching
+from lightpaint.batch.manifest.keys import SOURCE, SUBJECTS, Handover, Mistakes, near_key
+from lightpaint.batch.manifest.manifest import Manifest, Table, subject
+from lightpaint.batch.manifest.variations import SOLVED
+from lightpaint.errors import LightpaintError
+from lightpaint.files import is_name
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.relit.export.usd import check_usd
+from lightpaint.relit.forms import FORMS
+from lightpaint.screen import some_names
+from lightpaint.settings import Settings
+from lightpaint.sources import GroupsFile
+
+#: What is wanted of a look if nobody says; of a lighting that is there already, and of a frame.
+WANTED, SHOWN = ("solve", "predict", "verify", "report"), ("predict",)
+
+#: What is there in the place of a scene, and is rendered already.
+BASES = ("basis", "light_groups")
+
+#: Keys of `Constraints.of`, as they stand in a lights file.
+CONSTRAINED = ("light", "tie", "prefer_current", "sparse")
+
+
+def check_together(mistakes: Mistakes, table: Table) -> None:
+    """Add what is missing, or contradicts itself."""
+    where, look = table.where, table.said
+    subjects = subject(look)
+    if not table.has(*SUBJECTS):
+        mistakes.add(
+            where, "nothing to show: give painting, paintings, views, lighting or lightings"
+        )
+    elif len(subjects) > 1:
+        mistakes.add(where, f"{' and '.join(subjects)} at once: give one of them")
+    given = [key for key in BASES if key in look]
+    if not table.has("scene", *BASES):
+        mistakes.add(where, "no scene and no basis: give one, here or in [defaults]")
+    elif len(given) > 1 or ("scene" in look and "light_groups" in look):
+        mistakes.add(where, "light_groups stand for scene and basis: give them alone")
+    if "pattern" in look and not table.has("light_groups"):
+        mistakes.add(where, "pattern is of light_groups: leave it out, or give them")
+    several = "views" in look or "sensors" in look
+    if "sensor" in look and "sensors" in look:
+        mistakes.add(where, "sensor and sensors at once: give one of them")
+    elif "views" in look and ("sensor" in look or "sensors" in look):
+        mistakes.add(where, "views name their sensors: leave sensor and sensors out")
+    elif several and given:
+        mistakes.add(where, "a basis has one view only: give the scene, to see it from several")
+    elif given and not table.has("scene"):
+        _check_of_basis(mistakes, where, look)
+    want, is_given = look.get("want", ()), "lighting" in look or "lightings" in look
+    if is_given and (idle := [x for x in ("solve", "verify", "report", "lights") if x in want]):
+        mistakes.add(where, f"want has {idle[0]!r}, and its lighting is given: leave it out")
+    elif "lights" in want:
+        check_by_sums(mistakes, table)
+    if is_given and (idle := [word for word in look.get("variations", ()) if word in SOLVED]):
+        mistakes.add(where, f"variations has {idle[0]!r}, and its lighting is given")
+
+
+def check_by_sums(mistakes: Mistakes, table: Table) -> None:
+    """Add what does not go with a lighting and nothing else."""
+    where, look = table.where, table.said
+    if len(look["want"]) > 1:
+        mistakes.add(where, "want has 'lights', which is the lighting alone: leave the rest out")
+    if "views" in look or "variations" in look:
+        mistakes.add(where, "want has 'lights', which is of one view, without variations")
+    settings = look.get("settings", {})
+    if settings.get("literal") is not True and "settings" not in table.unclear:
+        mistakes.add(where, "want has 'lights': settings need literal = true, or images are needed")
+    for key in ("time_s", "noise_correction", "refine", "suggest"):
+        if settings.get(key):
+            mistakes.add(where, f"want has 'lights', and {key} needs images: leave it out")
+
+
+def _check_of_basis(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """What a saved basis has no use of."""
+    for step in ("verify", "render"):
+        if step in look.get("want", ()):
+            mistakes.add(where, f"want has {step!r}, which needs the scene: give scene = ...")
+    if idle := [key for key in SOURCE if key in look and key not in (*BASES, "pattern")]:
+        mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
+
+
+def check_wanted(mistakes: Mistakes, table: Table) -> None:
+    """Add a render or an export that is told of and not wanted."""
+    for step in ("render", "export"):
+        if (
+            step in table.said
+            and "want" not in table.unclear
+            and step not in table.said.get("want", ())
+        ):
+            mistakes.add(
+                table.where, f"[{step}] says how, and want does not have {step!r}: add it there"
+            )
+
+
+def check_handover(mistakes: Mistakes, where: str, asked: Handover, entry: Any) -> None:
+    """That a look has what other programs are told from. entry: one of its looks."""
+    has_groups = isinstance(entry.basis, GroupsFile)
+    for form in asked.to:
+        if FORMS[form][has_groups] is None:
+            needed = "light groups" if form == "nuke" else "a scene, and no light groups"
+            mistakes.add(f"{where}, export", f"{form!r} is of {needed}: leave it out")
+        elif not has_groups and not entry.scenes and form not in ("csv", "json"):
+            mistakes.add(f"{where}, export", f"{form!r} needs the scene: give scene = ...")
+    if asked.stage and "usd" in asked.to and not Path(asked.stage).is_file():
+        mistakes.add(f"{where}, export", f"stage: no such file: {asked.stage}")
+    elif "usd" in asked.to:
+        try:
+            check_usd()
+        except LightpaintError as error:
+            mistakes.add(f"{where}, export", str(error))
+
+
+def check_sequence(mistakes: Mistakes, table: Table) -> None:
+    """Add why it goes nowhere: it needs several looks, or a path of sensors."""
+    where, said = table.where, table.said
+    path, frames = said.get("sensors"), said.get("frames")
+    lacking = [key for key in ("name", "through") if not table.has(key)]
+    lacking += ["frames"] if not table.has("frames", "sensors") else []
+    if lacking:
+        mistakes.add(where, f"{lacking[0]} is missing: give name, through and frames (or sensors)")
+    if "name" in said and not is_name(said["name"]):
+        mistakes.add(where, f"{said['name']!r} is no name for a folder: say name = ...")
+    if len(said.get("through", "..")) < 2 and not table.has("sensors"):
+        mistakes.add(where, f"through is {said['through']}: expected at least two names of looks")
+    if path is not None and frames not in (None, len(path)):
+        mistakes.add(where, f"{frames} frames of {len(path)} sensors: leave frames out")
+    elif path is not None and len(path) < 2:
+        mistakes.add(where, "sensors has one: a path goes through two or more")
+
+
+def settings_of(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> Settings:
+    said = mistakes.settings(look.get("settings", {}), where)
+    want = look.get("want", WANTED)
+    return Settings(**said, verify="verify" in want, report="report" in want)
+
+
+def constraints_of(manifest: Manifest, where: str, look: Mapping[str, Any]) -> Constraints:
+    """Return what is asked of the lights, by tables and files; what is said last goes before."""
+    asked, mistakes = Constraints(), manifest.mistakes
+    for given in look["constraints"]:
+        try:
+            if isinstance(given, str):
+                asked = asked.and_then(read_constraints(manifest.folder / given))
+            else:
+                asked = asked.and_then(_constraints(mistakes, f"{where}, constraints", given))
+        except LightpaintError as error:
+            mistakes.add(f"{where}, constraints", str(error))
+    return asked
+
+
+def _constraints(mistakes: Mistakes, where: str, given: Mapping[str, Any]) -> Constraints:
+    """Return what a table asks. What is wrong in it is added, light by light and key by key."""
+    said = {key: value for key, value in given.items() if key in CONSTRAINED}
+    for key in (key for key in given if key not in said):
+        near = near_key(key, CONSTRAINED)
+        hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(CONSTRAINED)}"
+        mistakes.add(where, f"unknown key {key!r}{hint}")
+    lights = said.pop("light", None)
+    if isinstance(lights, dict):
+        lights = {
+            name: asked for name, asked in lights.items() if _is_light(mistakes, where, name, asked)
+        }
+    for key, value in list(said.items()):
+        if not _will_do(mistakes, where, **{key: value}):
+            del said[key]
+    return Constraints.of(lights, **said)
+
+
+def _is_light(mistakes: Mistakes, where: str, name: str, asked: Any) -> bool:
+    """Return whether that can be asked of a light; each key by itself, and then together."""
+    # A Duv alone says nothing.
+    each = asked if isinstance(asked, dict) else {}
+    alone = [{name: {key: value}} for key, value in each.items() if key != "duv"]
+    wrong = [one for one in alone if not _will_do(mistakes, where, light=one)]
+    return not wrong and _will_do(mistakes, where, light={name: asked})
+
+
+def _will_do(mistakes: Mistakes, where: str, **asked: Any) -> bool:
+    try:
+        Constraints.of(**asked)
+    except LightpaintError as error:
+        mistakes.add(where, str(error))
+        return False
+    return True
+
+
+def check_files(manifest: Manifest, table: Table) -> None:
+    """Add what is named and not there, so that a slip of the pen is no failed look at midnight."""
+    where, look = table.where, table.said
+    groups = look.get("light_groups")
+    if groups is not None and not (manifest.folder / groups).exists():
+        manifest.mistakes.add(where, f"light_groups: no such file or folder: {groups}")
+    for key in ("scene", "basis", "mask", "lights_file"):
+        if key in look and not (manifest.folder / look[key]).is_file():
+            manifest.mistakes.add(where, f"{key}: no such file: {look[key]}")
+    if "template" in look and not (manifest.folder / look["template"]).is_dir():
+        manifest.mistakes.add(where, f"template: no such folder: {look['template']}")
+    for key in ("painting", "lighting"):
+        given = [look[key]] if key in look else look.get(f"{key}s", [])
+        for path in given:
+            if not matching(manifest.folder, path):
+                manifest.mistakes.add(where, f"{key}: no such file: {path}")
+    for sensor, path in look.get("views", {}).items():
+        if not (manifest.folder / path).is_file():
+            manifest.mistakes.add(where, f"views.{sensor}: no such file: {path}")
+
+
+def matching(base: Path, path: str) -> list[str]:
+    """The files that a path or a pattern names, in the order of their names."""
+    given = str(base / path)
+    if not has_magic(path) or Path(given).is_file():
+        return [given] if Path(given).is_file() else []
+    return sorted(files_matching(path, base))

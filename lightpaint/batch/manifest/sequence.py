@@ -1,0 +1,119 @@
+"""Lightings between lightings: the frames of a sequence, even in stops or as people see."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import floor
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.batch.manifest.keys import Space
+from lightpaint.batch.manifest.variations import with_emission
+from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
+from lightpaint.colour.hue import WHITE_DUV
+from lightpaint.errors import LightingError
+from lightpaint.lighting.lighting import Lighting
+
+#: Stops below the brighter end at which a light that is off begins, or ends, in `log`.
+DARK = 10.0
+
+#: Linear Rec.709 to cone responses, and their cube roots to Oklab (Ottosson 2020).
+TO_CONES = np.array(
+    [
+        [0.4122214708, 0.5363325363, 0.0514459929],
+        [0.2119034982, 0.6806995451, 0.1073969566],
+        [0.0883024619, 0.2817188376, 0.6299787005],
+    ]
+)
+TO_LAB = np.array(
+    [
+        [0.2104542553, 0.7936177850, -0.0040720468],
+        [1.9779984951, -2.4285922050, 0.4505937099],
+        [0.0259040371, 0.7827717662, -0.8086757660],
+    ]
+)
+
+
+def at_frame(frame: int, frames: int, keys: int) -> tuple[int, float]:
+    """Between which two of `keys` lightings a frame lies, by the first, and how far, 0 to 1."""
+    if keys == 1:
+        return 0, 0.0
+    position = frame * (keys - 1) / (frames - 1)
+    first = min(floor(position), keys - 2)
+    return first, position - first
+
+
+def between(ends: Sequence[Lighting], share: float, *, space: Space) -> Lighting:
+    """The lighting at `share`, 0 to 1, of the way from one to the other.
+
+    Raises LightingError if the two are not of the same lights.
+    """
+    one, other = ends
+    if one.members != other.members or one.fixed != other.fixed:
+        raise LightingError(
+            "the lightings of a sequence are of different lights, or of lights in other groups"
+        )
+    mix = _in_stops if space == "log" else _in_oklab
+    lights = tuple(
+        light
+        if light.is_fixed
+        else with_emission(
+            light, mix(np.array(light.emission), np.array(other[light.name].emission), share)
+        )
+        for light in one.lights
+    )
+    return replace(one, lights=lights, certificate=None)
+
+
+def _in_stops(one: Doubles, other: Doubles, share: float) -> Doubles:
+    """Brightness by the same stops in each frame, and the colour evenly as people see it.
+
+    Channel by channel instead, a lamp would pass colours that are in neither end: from red to blue,
+    green. What is off, or DARK stops below the other end, begins there, in the other's colour.
+    """
+    if share in (0.0, 1.0):
+        return other if share else one
+    bright = [float(luminance(rgb)) for rgb in (one, other)]
+    least = max(bright) * 2.0**-DARK
+    if least == 0:
+        return np.zeros(3)
+    hues = [rgb / y for rgb, y in zip((one, other), bright, strict=True) if y > least]
+    y = max(bright[0], least) ** (1 - share) * max(bright[1], least) ** share
+    if len(hues) == 1 or np.ptp(one) == np.ptp(other) == 0:
+        return np.asarray(y * hues[0])
+    return np.asarray(y * _hue_between(hues[0], hues[1], share))
+
+
+def _hue_between(one: Doubles, other: Doubles, share: float) -> Doubles:
+    """Return the colour, (3,) of luminance 1, so far on the way between two of luminance 1.
+
+    Whites stay white: they go along the black bodies, evenly in mireds and Duv, where a straight
+    way from 2000 to 9000 K would be pink in the middle, at a Duv of -0.010. Other colours go
+    straight in Oklab at equal lightness, which does not depend on how bright they are.
+    """
+    whites = [cct_and_duv(rgb) for rgb in (one, other)]
+    if all(white is not None and abs(white[1]) <= WHITE_DUV for white in whites):
+        (kelvin, duv), (kelvin_, duv_) = whites  # type: ignore[misc]
+        mired = (1 - share) * 1e6 / kelvin + share * 1e6 / kelvin_
+        return kelvin_to_rgb(1e6 / mired, (1 - share) * duv + share * duv_)
+    ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (one, other)]
+    lab = (1 - share) * ends[0] / ends[0][0] + share * ends[1] / ends[1][0]
+    # Between two colours a lamp can have lies now and then one that it cannot.
+    linear = np.maximum(_of_lab(lab), 0.0)
+    return np.asarray(linear / luminance(linear))
+
+
+def _of_lab(lab: Doubles) -> Doubles:
+    """Return linear Rec.709, (3,), of Oklab."""
+    return np.asarray(np.linalg.solve(TO_CONES, np.linalg.solve(TO_LAB, lab) ** 3))
+
+
+def _in_oklab(one: Doubles, other: Doubles, share: float) -> Doubles:
+    if share in (0.0, 1.0):
+        return other if share else one
+    if np.ptp(one) == np.ptp(other) == 0:  # as of what can only be dimmed: grey to the last bit
+        light = ((1 - share) * np.cbrt(one[0]) + share * np.cbrt(other[0])) ** 3
+        return np.full(3, light)
+    ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (one, other)]
+    lab = (1 - share) * ends[0] + share * ends[1]
+    return np.maximum(_of_lab(lab), 0.0)

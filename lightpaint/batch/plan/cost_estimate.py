@@ -1,0 +1,74 @@
+"""How long a plan takes, and how much memory: from constants that were measured.
+
+Samples as docs/benchmarks.md has them of the gallery, on two cores. Looks by processor seconds in
+benchmarks/batch.py's own batches, some looks each on a machine that had other work: a rough guide.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook
+
+#: Seconds of a sample of one pixel, all lights together, and for each light that it is added to.
+SAMPLE_S, LIGHT_SAMPLE_S = 9.6e-7, 1e-8
+
+#: Seconds of a look: of any; of what is solved for each pixel, and for each pixel and light; and of
+#: a report for each pixel.
+LOOK_S, PIXEL_S, PIXEL_LIGHT_S, REPORT_S = 0.07, 1.7e-6, 1.6e-7, 1.2e-5
+
+#: What is taken for a basis that is a file.
+SAVED = Cost("", 12, (360, 640), 0, 0)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Seconds of bases and of looks, those of final renders among them; bytes at the peak."""
+
+    bases_s: float
+    looks_s: float
+    memory: int
+
+
+def estimate(plan: Plan) -> Estimate:
+    """Of what is left of `plan`, if no basis is kept."""
+    left = [look for look in plan.chosen_looks if not look.failure and not look.is_done]
+    needed = dict.fromkeys(
+        key
+        for look in left
+        for step in look.steps
+        if not step.is_done
+        for key in step.task.bases
+        if key in plan.costs
+    )
+    costs = [plan.costs[key] for key in needed]
+    return Estimate(
+        sum(rendered_s(cost.samples, cost.lights) for cost in costs),
+        sum(look_s(look, plan) for look in left),
+        max((cost.memory for cost in costs), default=0),
+    )
+
+
+def rendered_s(samples: int, lights: int) -> float:
+    """Of so many samples of a basis."""
+    return samples * (SAMPLE_S + LIGHT_SAMPLE_S * lights)
+
+
+def look_s(look: PlannedLook, plan: Plan) -> float:
+    """Of the steps of a look that are left, on two cores."""
+    costs = [plan.costs.get(key, SAVED) for key in look.steps[0].task.bases]
+    pixels = sum(cost.size[0] * cost.size[1] for cost in costs)
+    want, spent_s = look.entry.want, 0.0
+    if not look.steps[0].is_done:
+        lights = max((cost.lights for cost in costs), default=0)
+        spent_s += LOOK_S
+        spent_s += pixels * (PIXEL_S + PIXEL_LIGHT_S * lights) * look.entry.is_solved
+        spent_s += REPORT_S * pixels * ("report" in want)
+        spent_s += SAMPLE_S * sum(cost.samples for cost in costs) * ("verify" in want)
+    if any(step.task.kind == "render" and not step.is_done for step in look.steps):
+        spent_s += SAMPLE_S * _final_samples(look, costs)
+    return spent_s
+
+
+def _final_samples(look: PlannedLook, costs: Iterable[Cost]) -> int:
+    spp = look.entry.final.spp
+    return sum(cost.size[0] * cost.size[1] * (spp or cost.spp) for cost in costs)

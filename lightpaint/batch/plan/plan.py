@@ -1,0 +1,126 @@
+"""What is planned: looks, their steps, what they cost."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.work.task import Kind, Task
+from lightpaint.batch.work.worker_cache import Held
+from lightpaint.errors import BatchError
+from lightpaint.screen import some_names
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of one look. made_of: fingerprint of all that goes in. is_done: earlier."""
+
+    task: Task
+    made_of: str
+    is_done: bool
+
+
+@dataclass(frozen=True)
+class PlannedLook:
+    """One look. failure: why it cannot be done; it is the only one. remarks: worth knowing."""
+
+    entry: Entry
+    folder: Path
+    steps: tuple[Step, ...]
+    failure: str = ""
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing is left to do."""
+        return not self.failure and all(step.is_done for step in self.steps)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of a basis that is to be obtained. samples: of all pixels; memory: bytes at the peak."""
+
+    scene: str
+    lights: int
+    size: tuple[int, int]
+    spp: int
+    memory: int
+
+    @property
+    def samples(self) -> int:
+        """Of all pixels."""
+        return self.size[0] * self.size[1] * self.spp
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All looks of a manifest. costs: of each basis, by its key. chosen: names of those to do.
+
+    held: scenes as they were loaded to be looked at, so that they are not loaded twice. remarks: on
+    the batch as a whole, worth knowing.
+    """
+
+    manifest: Path
+    folder: Path
+    looks: tuple[PlannedLook, ...]
+    costs: Mapping[str, Cost]
+    chosen: frozenset[str]
+    held: Held = field(default_factory=Held, repr=False, compare=False)
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def chosen_looks(self) -> tuple[PlannedLook, ...]:
+        """Those to do."""
+        return tuple(look for look in self.looks if look.entry.name in self.chosen)
+
+    @property
+    def steps(self) -> list[tuple[str, Kind]]:
+        """All steps, in the order of the looks."""
+        return [(step.task.look, step.task.kind) for look in self.looks for step in look.steps]
+
+    def only(self, pattern: str | None) -> "Plan":
+        """The plan of the looks whose names match, and of those that these are made of.
+
+        Raises BatchError if there is none.
+        """
+        if pattern is None:
+            return self
+        wanted = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
+        if not wanted:
+            names = some_names(look.entry.name for look in self.looks)
+            raise BatchError(f"no look matches {pattern!r}: there are {names}")
+        for look in reversed(self.looks):  # what others are made of stands before them
+            if look.entry.name in wanted:
+                wanted |= set(look.entry.of)
+        return replace(self, chosen=frozenset(wanted))
+
+
+def by_bases(steps: Sequence[Step], looks: Mapping[str, PlannedLook]) -> list[list[Step]]:
+    """Steps together that share their bases, after all that they are made of through others."""
+    left, groups = list(steps), []
+    while left:
+        ready = {step.task.look: step.task.bases for step in left}
+        pending, waits = dict(ready), True
+        while waits:
+            waits = False
+            for look, bases in list(ready.items()):
+                made_of = [x for x in looks[look].entry.of if x in pending]
+                if any(ready.get(x) != bases for x in made_of):
+                    del ready[look]
+                    waits = True
+        for keys in dict.fromkeys(ready.values()):
+            groups.append([step for step in left if ready.get(step.task.look) == keys])
+        left = [step for step in left if step.task.look not in ready]
+    return groups
+
+
+def waves(steps: Sequence[Step], looks: Mapping[str, PlannedLook]) -> list[list[Step]]:
+    """Steps that wait for none of the others; those that wait for these; and so on."""
+    left, found = list(steps), []
+    while left:
+        names = {step.task.look for step in left}
+        wave = [step for step in left if not names & set(looks[step.task.look].entry.of)]
+        found.append(wave)
+        left = [step for step in left if step not in wave]
+    return found

@@ -1,0 +1,240 @@
+"""What is to be done of a manifest, and what is done already; all checked before any sample."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.render.render import memory_needed
+from lightpaint.batch.gallery.gallery import check_gallery
+from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.keys import Mistakes
+from lightpaint.batch.manifest.look_list import entries_of
+from lightpaint.batch.manifest.manifest import Manifest, read_manifest
+from lightpaint.batch.manifest.variations import varied
+from lightpaint.batch.plan.fingerprint import Fingerprints
+from lightpaint.batch.plan.journal import Journal
+from lightpaint.batch.plan.look_errors import look_over
+from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook, Step
+from lightpaint.batch.work.derived_looks import adjusted, made_folder
+from lightpaint.batch.work.task import EXPORT, answer_task, bases_of, export_task, render_task
+from lightpaint.batch.work.worker_cache import Held
+from lightpaint.errors import ALONE, BatchError, LightpaintError
+from lightpaint.files import check_writable
+from lightpaint.job import Job
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.sums import why_not_by_sums
+from lightpaint.relit.relight import scene_of
+from lightpaint.result_folder import is_as_written
+from lightpaint.results import view_names
+from lightpaint.scene.quality import on_film, samples
+from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
+from lightpaint.settings import Settings
+
+
+def plan(
+    manifest: str | Path, folder: str | Path, *, force: bool = False, command: str = ""
+) -> Plan:
+    """Read `manifest` (docs/batch.md), and check every look of it, before anything is rendered.
+
+    Args:
+        manifest: TOML.
+        folder: Receives a folder for each look.
+        force: Whether results of something else, or changed by hand, are replaced.
+        command: The shell command that asks for this, for the reports.
+
+    Raises:
+        BatchError: With all mistakes, one line each.
+        OutputError: If `folder` cannot be written.
+    """
+    read, folder = read_manifest(manifest), Path(folder)
+    found = entries_of(read)
+    if not read.mistakes.found:
+        check_writable(folder)
+        check_gallery(folder, force=force)
+    planner = _Planner(read, folder, found.whole, force=force, command=command)
+    looks = tuple(planner.planned(entry) for entry in found.whole)
+    for _, entry in found.rest:
+        planner.look_over(entry)
+    if read.mistakes.found:
+        raise BatchError(*read.mistakes.found)
+    names = frozenset(look.entry.name for look in looks)
+    planner.held.only(())
+    held, remarks = planner.held, planner.journal.remarks
+    return Plan(read.path, folder, looks, planner.costs, names, held, remarks)
+
+
+class _Planner:
+    """Looks at one entry after the other, with what several of them share."""
+
+    def __init__(
+        self,
+        manifest: Manifest,
+        folder: Path,
+        entries: Sequence[Entry],
+        *,
+        force: bool,
+        command: str,
+    ) -> None:
+        self._mistakes: Mistakes = manifest.mistakes
+        self._force, self._command = force, command
+        self._folders = {entry.name: folder / entry.name for entry in entries}
+        self.held, self.journal = Held(), Journal(folder)
+        self._prints = Fingerprints(manifest.folder)
+        self._failed: set[str] = set()
+        self.costs: dict[str, Cost] = {}
+
+    def planned(self, entry: Entry) -> PlannedLook:
+        """What is to be done for one look. What is wrong with the manifest is added to its
+        mistakes; what is wrong with the look's own files is its failure.
+        """
+        failure = ""
+        remarks: tuple[str, ...] = ()
+        reads: tuple[Path, ...] = ()
+        try:
+            entry, reads, remarks = self._looked_at(entry)
+        except ALONE as error:
+            failure = str(error)
+        except LightpaintError as error:
+            self._mistakes.add(entry.where, str(error))
+            failure = str(error)
+            self.look_over(entry)
+        if not failure and (gone := self._failed & set(entry.of)):
+            failure = f"it is made of {some_names(sorted(gone))}, which failed"
+        if failure:
+            self._failed.add(entry.name)
+        steps = self._steps(entry, reads if not failure else (), is_possible=not failure)
+        return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
+
+    def look_over(self, entry: Entry) -> None:
+        """Add all mistakes of a look that cannot be planned, of which one would hide the others."""
+        look_over(entry, self.held, self._mistakes)
+
+    def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
+        """The answer, and its render and what other programs get, if that is wanted."""
+        how: dict[str, Any] = {"force": self._force, "command": self._command, "reads": reads}
+        tasks = [answer_task(entry, self._folders, **how)]
+        made_of = [self._prints.answer(entry, reads)]
+        if "render" in entry.want:
+            tasks.append(render_task(entry, self._folders, **how))
+            made_of.append(self._prints.render(entry))
+        if "export" in entry.want:
+            tasks.append(export_task(entry, self._folders, **how))
+            made_of.append(self._prints.export(entry))
+        folder = self._folders[entry.name]
+        is_whole = is_possible and is_as_written(folder)
+        steps = []
+        for task, its in zip(tasks, made_of, strict=True):
+            line = self.journal.lines.get((task.look, task.kind))
+            is_done = line is not None and (line.state, line.made_of) == ("done", its)
+            # What was rendered of an earlier answer went with it.
+            is_whole = is_whole and is_done
+            if task.kind == "export":
+                is_whole = is_whole and is_as_written(folder / EXPORT)
+            steps.append(Step(task, its, is_whole))
+        return tuple(steps)
+
+    def _looked_at(self, entry: Entry) -> tuple[Entry, tuple[Path, ...], tuple[str, ...]]:
+        """With all decided that follows from its files; what it reads; what is worth saying."""
+        scenes = tuple(map(self.held.scene, entry.scenes))
+        # Of saved bases no more than one is held, and by no look.
+        self.held.only(bases_of(entry))
+        basis = None if entry.basis is None else self.held.saved(replace(entry.basis))
+        if not entry.is_solved:
+            return entry, *self._made(replace(entry, scenes=scenes, basis=basis))
+        settings, asked = entry.settings, entry.constraints
+        job = self._job(entry, scenes, basis, settings, asked)
+        if entry.variation:
+            how = replace(settings, hold=job.fit.hold)
+            settings, asked = varied(entry.variation, how, asked, adjusted(job))
+            job = self._job(entry, scenes, basis, settings, asked)
+        if entry.is_by_sums:
+            _check_by_sums(job)
+        self._note_costs(entry, [view.scene for view in job.views], job.settings)
+        if entry.final.resolution is not None and "render" in entry.want:
+            on_film(scenes[0].content, None, entry.final.resolution)
+        reads = tuple(dict.fromkeys(job.results.reads))
+        entry = replace(entry, settings=settings, constraints=asked)
+        return entry, reads, job.remarks
+
+    def _job(
+        self,
+        entry: Entry,
+        scenes: Sequence[Any],
+        basis: Any,
+        settings: Settings,
+        asked: Constraints,
+    ) -> Job:
+        """The job of a look, which checks it; its painting is read anew, and let go of again."""
+        paintings = tuple(replace(painting) for painting in entry.paintings)
+        settings = replace(settings, force=self._force, command=self._command)
+        folder = self._folders[entry.name]
+        return Job(tuple(scenes), paintings, folder, basis, asked, settings, entry.by_sensor)
+
+    def _made(self, entry: Entry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+        """Of a look that is made of lightings: those of files are looked at."""
+        scenes: list[Scene] = [file.content for file in entry.scenes]
+        scene = scenes[0] if scenes else None
+        given = None if entry.basis is None else entry.basis.content
+        groups = given if isinstance(given, LightGroups) else None
+        reads: tuple[Path, ...] = () if scene is None else scene.read_files
+        if groups is not None:
+            reads += tuple(groups.files)
+        elif entry.basis is not None:
+            reads += (Path(entry.basis.path),)
+        if entry.lighting:
+            lighting = read_lighting(entry.lighting)
+            reads += (Path(entry.lighting),)
+            if scene is not None:
+                scene_of(scene, lighting)
+                if (have := set(lighting)) != (want := {light.name for light in scene.lights}):
+                    raise BatchError(
+                        f"{entry.lighting} has the lights {some_names(sorted(have))}, and the "
+                        f"scene {some_names(sorted(want))}: load it with the same lights and groups"
+                    )
+            elif isinstance(given, LightGroups | Basis):
+                names = (given.basis if isinstance(given, LightGroups) else given).names
+                if set(lighting) != set(names):
+                    raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
+        folders = [str(self._folders[name] / "lighting.json") for name in entry.of]
+        lightings = tuple([entry.lighting] if entry.lighting else folders)
+        views = view_names(scenes) if entry.by_sensor else [""]
+        how: dict[str, Any] = {"views": views, "groups": groups, "force": self._force}
+        made_folder(self._folders[entry.name], scene, lightings, **how).check()
+        settings = entry.settings
+        films = [on_film(one, settings.quality, settings.resolution) for one in scenes]
+        self._note_costs(entry, films, settings)
+        if scene is not None and entry.final.resolution is not None and "render" in entry.want:
+            on_film(scene, None, entry.final.resolution)
+        return reads, ()
+
+    def _note_costs(self, entry: Entry, films: Sequence[Scene | None], settings: Settings) -> None:
+        """What each basis costs that is to be obtained. films: on which it is rendered."""
+        if entry.basis is not None:
+            return
+        for key, film in zip(bases_of(entry), films, strict=True):
+            if film is None or key in self.costs:
+                continue
+            asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+            self.costs[key] = Cost(
+                f"{film.path.name} through {film.sensor_names[film.sensor]}",
+                len(film.lights),
+                film.size,
+                film.spp if asked is None else asked,
+                memory_needed(film),
+            )
+
+
+def _check_by_sums(job: Job) -> None:
+    """Raise BatchError for a lighting that does not follow from sums."""
+    [view] = job.views
+    why = why_not_by_sums(view.target, job.fit)
+    if not why and view.basis is None and view.scene is not None:
+        why = why_not_one_pass(view.scene) or ""
+    if why:
+        raise BatchError(f"want = ['lights'] takes sums alone, and {why}: want 'solve' instead")

@@ -1,0 +1,117 @@
+"""Bases that an engine renders, in parts."""
+
+from dataclasses import replace
+from typing import Any
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.parts import LESSON, LESSONS, Part, PartSums, plan_parts
+from lightpaint.basis.render.render import (
+    ONE_PASS,
+    check_memory,
+    goes_on,
+    method_of,
+    render_basis,
+    with_first_hits,
+)
+from lightpaint.batch.plan.cost_estimate import rendered_s
+from lightpaint.batch.work.engine import Engine
+from lightpaint.batch.work.spool import Spool
+from lightpaint.batch.work.work_items import Film, Lesson, PartOfBasis
+from lightpaint.errors import BasisError
+from lightpaint.progress import Progress
+from lightpaint.scene.scene import Scene
+
+
+class InParts:
+    """Renders bases of one film by an engine: a `render_basis` for `obtain_basis`."""
+
+    def __init__(self, engine: Engine, film: Film) -> None:
+        self._engine = engine
+        self._film = replace(film, scene=replace(film.scene))
+
+    def __call__(
+        self,
+        scene: Scene,
+        *,
+        spp: int | None,
+        time_s: float | None,
+        seed: int,
+        start: Basis | None = None,
+        progress: Progress,
+        **others: Any,
+    ) -> Basis:
+        """As `render_basis`. How much a time comes to only who renders knows: that is done here."""
+        if time_s is not None:
+            how: dict[str, Any] = {"time_s": time_s, "seed": seed, "progress": progress, **others}
+            return render_basis(scene, start=start, **how)
+        spp = scene.spp if spp is None else spp
+        if start is not None and start.origin.spp >= spp:
+            return with_first_hits(start.asking(scene.asked), scene, seed)
+        if start is not None and not goes_on(start, method_of(scene)):
+            start = None
+        check_memory(scene)
+        parts = plan_parts(scene, spp, start=start)
+        spool = Spool(scene, parts, seed=seed, start=start)
+        learned = lesson_by(self._engine, self._film, scene, spp, seed, start, spool)
+        sums = PartSums(scene, parts, seed=seed, start=start)
+        self._add_all(scene, parts, sums, seed, spool, progress)
+        basis = sums.basis(learned)
+        spool.drop()
+        return basis
+
+    def _add_all(
+        self,
+        scene: Scene,
+        parts: list[Part],
+        sums: PartSums,
+        seed: int,
+        spool: Spool,
+        progress: Progress,
+    ) -> None:
+        """Add all parts to `sums`: those that are kept, and those that the engine renders."""
+        learned = str(spool.learned) if spool.learned.is_file() else ""
+        left = {}
+        for k, part in enumerate(parts):
+            kept = spool.part(part)
+            if kept is not None:
+                sums.add(part, *kept)
+                continue
+            pixels = (part.bottom - part.top) * scene.size[1]
+            lights = len(scene.lights) if part.light is None else 1
+            expected_s = rendered_s(pixels * part.spp, lights)
+            errand = PartOfBasis(f"part {k}", self._film, part, seed, learned, expected_s)
+            left[errand.name] = errand
+        progress("basis", len(parts) - len(left), len(parts), "parts")
+        for count, done in enumerate(self._engine.run(list(left.values()))):
+            if done.failure:
+                raise BasisError(done.failure)
+            part, (planes, seen) = left[done.look].part, done.value
+            spool.keep_part(part, planes, seen)
+            sums.add(part, planes, seen)
+            progress("basis", len(parts) - len(left) + count + 1, len(parts), "parts")
+
+
+def lesson_by(
+    engine: Engine,
+    film: Film,
+    scene: Scene,
+    spp: int,
+    seed: int,
+    start: Basis | None,
+    spool: Spool,
+) -> Floats | None:
+    """What all parts choose by, which is put into the spool; None where nothing is chosen."""
+    if method_of(scene) != ONE_PASS:
+        return None
+    learned = spool.lesson() if start is None else start.learned
+    if learned is None:
+        expected_s = rendered_s(LESSON * LESSONS, len(scene.lights))
+        [done] = engine.run([Lesson("lesson", film, spp, seed, expected_s)])
+        if done.failure:
+            raise BasisError(done.failure)
+        learned = done.value
+        assert learned is not None
+    if not spool.learned.is_file():
+        spool.keep_lesson(learned)
+    return learned

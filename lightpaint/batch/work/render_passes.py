@@ -1,0 +1,35 @@
+"""Final renders in ranges of passes, whose sums are those of a render in one go to the last bit."""
+
+import gc
+from typing import Any
+
+from lightpaint.arrays import Doubles
+from lightpaint.batch.manifest.keys import Final
+from lightpaint.scene.render import Stream, pass_sum, passes_of
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.turns import tracing
+
+
+class Frame:
+    """Renders passes of one relit scene, which stays loaded: close it before another is."""
+
+    def __init__(self, scene: Scene, final: Final) -> None:
+        self._scene, self._final = scene, final
+        self._passes = passes_of(scene, final.spp)
+        self._loaded: Any = scene.load()
+
+    def sum(self, some: range) -> dict[int, Doubles]:
+        """The undivided sum, (h, w, 3), of those passes that belong to a half, by the half."""
+        sums: dict[int, Doubles] = {}
+        for k in some:
+            half, spp = self._passes[k]
+            seed, stream = self._final.seed, Stream.VERIFICATION
+            with tracing():
+                its = pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
+            sums[half] = sums[half] + its if half in sums else its
+        return sums
+
+    def close(self) -> None:
+        """Let go of the scene."""
+        self._loaded = None
+        gc.collect()

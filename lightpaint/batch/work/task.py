@@ -1,0 +1,208 @@
+"""One step of one look, as text that can be sent, and what came of it."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.keys import Final, Handover, Space
+from lightpaint.batch.manifest.variations import SHIFTED
+from lightpaint.batch.work.work_items import Move
+from lightpaint.errors import BatchError
+from lightpaint.records import read_record, strict_json
+from lightpaint.settings import Settings
+from lightpaint.sources import BasisFile, GroupsFile, SceneFile, to_json
+
+FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
+
+#: The answer, its final render, and what other programs get of it.
+Kind = Literal["answer", "render", "export"]
+
+#: Where the last goes, in the folder of the look.
+EXPORT = "export"
+
+
+@dataclass(frozen=True)
+class Task:
+    """One step of one look, of files and plain values.
+
+    look: name. kind: step. job: as `Job.to_json` writes it; of an answer that is made of others
+    without a target. lightings: files that it is made of; reads: all others but those of bases;
+    share, space: between two lightings; mireds: how much warmer. final: how it is rendered.
+    handover: what other programs get. bases: keys of what it is solved with, and files where that
+    is kept, "" where it is to be obtained. expected_s: roughly how long it takes. is_by_sums:
+    whether nothing but the lighting is wanted.
+    """
+
+    look: str
+    kind: Kind
+    job: str
+    lightings: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    share: float = 0.0
+    space: Space = "log"
+    mireds: float = 0.0
+    final: Final = field(default_factory=Final)
+    handover: Handover = field(default_factory=Handover)
+    bases: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    expected_s: float = 0.0
+    is_by_sums: bool = False
+    format: Literal["lightpaint-task 1"] = FORMAT
+
+    @property
+    def name(self) -> str:
+        """As of `Errand`."""
+        return self.look
+
+    @property
+    def writes(self) -> str:
+        """As of `Errand`."""
+        return str(json.loads(self.job)["folder"])
+
+    @property
+    def force(self) -> bool:
+        """Whether results of something else, or changed by hand, are replaced."""
+        return bool(json.loads(self.job)["settings"]["force"])
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """As of `Errand`: of a final render also what lies beside the lighting."""
+        beside: list[str] = []
+        if self.kind == "render":
+            beside = [str(x) for x in sorted(Path(self.writes).rglob("*")) if x.is_file()]
+        return tuple(dict.fromkeys([*self.reads, *self.lightings, *beside]))
+
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """As of `Errand`."""
+        return tuple(file for file in self.files if file)
+
+    def moved(self, move: Move) -> "Task":
+        """As of `Errand`."""
+        return replace(
+            self,
+            job=json.dumps(_moved(json.loads(self.job), move)),
+            bases=tuple(json.dumps(_moved(json.loads(key), move)) for key in self.bases),
+            lightings=tuple(map(move, self.lightings)),
+            reads=tuple(map(move, self.reads)),
+            files=tuple(file and move(file) for file in self.files),
+        )
+
+    def to_json(self) -> str:
+        """This task as text, to be done elsewhere."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> "Task":
+        """The task that `to_json` wrote. Raises BatchError for what is none."""
+        try:
+            data = strict_json(text)
+            signed = {
+                key: data.pop(key) for key in ("expected_s", "mireds", "share") if key in data
+            }
+            return read_record(Task, {**data, **{k: float(v) for k, v in signed.items()}})
+        except (AttributeError, TypeError, ValueError) as error:
+            said = " ".join(str(error).split())
+            raise BatchError(f"this is no task: {said}; make one with Task.to_json") from None
+
+
+def answer_task(
+    entry: Entry,
+    folders: Mapping[str, Path],
+    *,
+    reads: Sequence[Path] = (),
+    force: bool,
+    command: str,
+) -> Task:
+    """The answer of a look. folders: of all looks, by name. reads: files that it reads."""
+    settings = {**_plain(entry.settings), "force": force, "command": command}
+    lightings = [str(folders[name] / "lighting.json") for name in entry.of]
+    return Task(
+        entry.name,
+        "answer",
+        to_json(
+            entry.scenes,
+            entry.paintings,
+            entry.basis,
+            entry.constraints,
+            Settings(**settings),
+            folder=str(folders[entry.name]),
+            by_sensor=entry.by_sensor,
+        ),
+        tuple([entry.lighting] if entry.lighting else lightings),
+        tuple(map(str, reads)),
+        entry.share,
+        entry.space,
+        SHIFTED.get(entry.variation, 0.0),
+        entry.final,
+        entry.handover,
+        bases_of(entry),
+        ("",) * len(bases_of(entry)),
+        is_by_sums=entry.is_by_sums,
+    )
+
+
+def render_task(
+    entry: Entry,
+    folders: Mapping[str, Path],
+    *,
+    reads: Sequence[Path] = (),
+    force: bool,
+    command: str,
+) -> Task:
+    """The final render of a look."""
+    answer = answer_task(entry, folders, reads=reads, force=force, command=command)
+    lighting = str(folders[entry.name] / "lighting.json")
+    return Task(entry.name, "render", answer.job, (lighting,), answer.reads, final=entry.final)
+
+
+def export_task(
+    entry: Entry,
+    folders: Mapping[str, Path],
+    *,
+    reads: Sequence[Path] = (),
+    force: bool,
+    command: str,
+) -> Task:
+    """What other programs get of a look."""
+    answer = answer_task(entry, folders, reads=reads, force=force, command=command)
+    lighting = str(folders[entry.name] / "lighting.json")
+    # Of light groups it needs what they are called.
+    bases = answer.bases if isinstance(entry.basis, GroupsFile) else ()
+    how: dict[str, Any] = {"handover": entry.handover, "bases": bases}
+    return Task(entry.name, "export", answer.job, (lighting,), answer.reads, **how)
+
+
+def bases_of(entry: Entry) -> tuple[str, ...]:
+    """The key of each basis that a look is solved with: equal keys, equal bases."""
+    if entry.basis is not None:
+        return (key_of_basis(entry.basis),)
+    return tuple(key_of_scene(scene, entry.settings) for scene in entry.scenes)
+
+
+def key_of_basis(basis: BasisFile | GroupsFile) -> str:
+    """Of a saved one, or of light groups."""
+    return json.dumps({"basis": asdict(basis)})
+
+
+def key_of_scene(scene: SceneFile, settings: Settings) -> str:
+    """Of one that is rendered: the scene through its sensor, and what settings make of it."""
+    rendered = ("spp", "time_s", "seed", "resolution", "quality", "use_cache", "exact_spp")
+    how = {name: getattr(settings, name) for name in rendered}
+    return json.dumps({"scene": asdict(scene), **how})
+
+
+def _moved(given: Any, move: Move) -> Any:
+    """A job's plain values by other paths: `move` leaves all other texts as they are."""
+    if isinstance(given, dict):
+        return {key: _moved(value, move) for key, value in given.items()}
+    if isinstance(given, list):
+        return [_moved(value, move) for value in given]
+    return move(given) if isinstance(given, str) else given
+
+
+def _plain(settings: Settings) -> dict[str, Any]:
+    return {name: getattr(settings, name) for name in Settings.expected}

@@ -1,0 +1,58 @@
+"""The files of the page: a table that is made at the start, which is all that can be asked for."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpaint.browser import bundled
+
+#: What a browser is told of each kind of file; others are not part of the page.
+KINDS = {
+    ".html": "text/html;charset=utf-8",
+    ".js": "text/javascript;charset=utf-8",
+    ".css": "text/css;charset=utf-8",
+    ".json": "application/json",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".wasm": "application/wasm",
+    ".woff2": "font/woff2",
+    ".txt": "text/plain;charset=utf-8",
+}
+
+PAGE = Path(__file__).parents[1] / "page"
+
+#: The module that begins it; a browser gets it with all that it imports.
+ENTRY = "/main.js"
+
+ICON = "/icon.svg"
+
+
+@dataclass(frozen=True)
+class PageFile:
+    """One file of the page, as it was at the start."""
+
+    kind: str
+    content: bytes
+
+
+def page_files(folder: Path = PAGE) -> dict[str, PageFile]:
+    """What is answered to which path; `/` is the page itself.
+
+    What is hidden, links to something else, and what is no file of a page is passed over.
+    """
+    root, table = folder.resolve(), {}
+    for path in sorted(root.rglob("*")):
+        place = path.relative_to(root)
+        is_hidden = any(part.startswith((".", "_")) for part in place.parts)
+        if is_hidden or path.suffix not in KINDS or not path.resolve().is_relative_to(root):
+            continue
+        if path.is_file():
+            table[f"/{place.as_posix()}"] = PageFile(KINDS[path.suffix], path.read_bytes())
+    if "/index.html" in table:
+        table["/"] = table["/index.html"]
+    if ICON in table:
+        # Some browsers ask for it whatever a page says.
+        table["/favicon.ico"] = table[ICON]
+    if root == PAGE.resolve():
+        # A browser takes ten milliseconds for each file, whoever serves it.
+        table[ENTRY] = PageFile(KINDS[".js"], bundled(ENTRY[1:]).encode())
+    return table

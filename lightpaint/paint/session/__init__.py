@@ -1,0 +1,1 @@
+"""A painting in progress: its canvas, its lighting, its looks, and what pages hear of them."""

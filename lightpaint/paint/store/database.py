@@ -1,0 +1,271 @@
+"""The SQLite database of a session: opened by one process alone, errors in one line.
+
+The lock is the system's on the open file (`locking_mode = EXCLUSIVE`): it ends with its process,
+however that ends, and leaves nothing behind that somebody would have to remove.
+"""
+
+import json
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from pathlib import Path
+
+from lightpaint.errors import LightpaintError, OutputError, PaintError
+from lightpaint.files import first_line, flush
+from lightpaint.paint.store.steps import Identity, SeenFrom
+from lightpaint.records import strict_json
+from lightpaint.screen import some_names
+
+#: "lpnt", by which files know what they are, and which tables there are.
+APPLICATION, VERSION = 0x6C706E74, 2
+
+#: Pages (of 16 KiB) of what was thrown away that are given back at a start: 64 MB, a moment.
+GIVEN_BACK = 4096
+
+#: FULL: what is written is there when the current ends, too.
+SYNCHRONOUS = "FULL"
+
+TABLES = """
+CREATE TABLE about (name TEXT PRIMARY KEY, value) WITHOUT ROWID;
+CREATE TABLE step (id INTEGER PRIMARY KEY, kind TEXT, label TEXT, fields TEXT, places TEXT);
+CREATE TABLE pixels (step INTEGER PRIMARY KEY, before BLOB, change BLOB);
+CREATE TABLE look (id INTEGER PRIMARY KEY, fields TEXT);
+CREATE TABLE look_array (look INTEGER, name TEXT, dtype TEXT, shape TEXT, data BLOB);
+"""
+
+_DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+
+
+def opened(path: Path | None, identity: Identity | None) -> sqlite3.Connection:
+    """The database at `path`, made if there is none, for this process alone; None: in memory.
+
+    Raises PaintError for one that is in use, damaged, or of other lights or another size than
+    `identity`; OutputError for a place that cannot be written.
+    """
+    with _told(path):
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        database = sqlite3.connect(
+            path or ":memory:", timeout=0, isolation_level=None, check_same_thread=False
+        )
+        try:
+            _prepare(database, path, identity)
+        except BaseException:
+            database.close()
+            raise
+    return database
+
+
+def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity | None) -> None:
+    for setting in (
+        "locking_mode = EXCLUSIVE",  # first of all: WAL then needs no room for shared memory
+        "trusted_schema = OFF",  # tables that others made may not call anything
+        "page_size = 16384",
+        "auto_vacuum = INCREMENTAL",
+        "journal_mode = WAL",
+        f"synchronous = {SYNCHRONOUS}",
+    ):
+        database.execute(f"PRAGMA {setting}").fetchall()
+    with transaction(database):
+        [(application,)] = database.execute("PRAGMA application_id")
+        [(version,)] = database.execute("PRAGMA user_version")
+        [(tables,)] = database.execute("SELECT count(*) FROM sqlite_schema")
+        if not tables:
+            for statement in filter(str.strip, TABLES.split(";")):
+                database.execute(statement)
+            database.execute(f"PRAGMA application_id = {APPLICATION}")
+            database.execute(f"PRAGMA user_version = {VERSION}")
+        elif application != APPLICATION:
+            raise PaintError(f"{path} is no session of the painter: {AFRESH}")
+        elif version == 1:
+            _renew(database)
+        elif version != VERSION:
+            raise PaintError(
+                f"{path} was written by another version of lightpaint (format {version}, not "
+                f"{VERSION}): {AFRESH}"
+            )
+        if identity is not None:
+            _check(database, path, identity)
+            _keep(database, json.dumps(asdict(identity)))
+    with suppress(sqlite3.OperationalError):  # on a full disk
+        # A row for each page, which only a script takes all of.
+        database.executescript(f"PRAGMA incremental_vacuum({GIVEN_BACK})")
+
+
+def identify(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
+    """That an open database is of this. Raises PaintError for one of something else."""
+    with _told(path), transaction(database):
+        _check(database, path, identity)
+        _keep(database, json.dumps(asdict(identity)))
+
+
+def _renew(database: sqlite3.Connection) -> None:
+    """Of the first version, which knew one view: a region becomes a list of one place."""
+    database.execute("ALTER TABLE step RENAME COLUMN region TO places")
+    rows = database.execute("SELECT id, places FROM step").fetchall()
+    for number, region in rows:
+        where = strict_json(region)
+        places = json.dumps([] if where is None else [[0, *where]])
+        database.execute("UPDATE step SET places = ? WHERE id = ?", (places, number))
+    database.execute(f"PRAGMA user_version = {VERSION}")
+
+
+def _keep(database: sqlite3.Connection, identity: str) -> None:
+    """That it is of this; nothing is written if it is already, as the disk may be full."""
+    if (identity,) not in database.execute("SELECT value FROM about WHERE name = 'identity'"):
+        database.execute("INSERT OR REPLACE INTO about VALUES ('identity', ?)", (identity,))
+
+
+#: How a session that another process has is told, and what can be done instead.
+IN_USE = "is in use"
+ELSEWHERE = "choose another folder (folder=...)"
+AFRESH = f"{ELSEWHERE}, or start afresh, which keeps it under another name (new=True)"
+
+
+def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
+    """Raise PaintError for a session of something else."""
+    for (said,) in database.execute("SELECT value FROM about WHERE name = 'identity'"):
+        its = Identity.of_json(strict_json(said))
+        if len(its.views) > len(identity.views):
+            raise PaintError(
+                f"{path} is a session of {len(its.views)} views, and this is of "
+                f"{len(identity.views)}: {AFRESH}"
+            )
+        # Views may have come after those that it has.
+        for old, new in zip(its.views, identity.views, strict=False):
+            _check_view(path, identity.scene, old, new)
+        if its.lights != identity.lights:
+            raise PaintError(
+                f"{path} is a session of the lights {some_names(its.lights)}, and "
+                f"{identity.scene} has {some_names(identity.lights)}: {AFRESH}"
+            )
+
+
+def _check_view(path: Path | None, scene: str, its: SeenFrom, now: SeenFrom) -> None:
+    if its.size != now.size:
+        raise PaintError(
+            f"{path} is a session of {its.size[1]}x{its.size[0]} pixels, and {scene} has "
+            f"{now.size[1]}x{now.size[0]}: {AFRESH}"
+        )
+    if its.sensor and now.sensor and its.sensor != now.sensor:
+        raise PaintError(
+            f"{path} is a session of the view through {its.sensor}, and this is through "
+            f"{now.sensor}: {AFRESH}"
+        )
+
+
+@contextmanager
+def transaction(database: sqlite3.Connection) -> Iterator[None]:
+    """All of the block is written, for good, or nothing."""
+    database.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        database.execute("COMMIT")
+    except BaseException:
+        if database.in_transaction:  # of a full disk SQLite has gone back itself
+            database.execute("ROLLBACK")
+        raise
+
+
+@contextmanager
+def _told(path: Path | None) -> Iterator[None]:
+    """Whatever prevents the opening, in one line."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise _spoken(path, error) from None
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+    except (ArithmeticError, KeyError, TypeError, ValueError) as error:
+        raise damaged(path, error) from None
+
+
+class DamagedError(PaintError):
+    """A session file that is not as it was written."""
+
+
+def damaged(path: Path | None, error: Exception) -> DamagedError:
+    """A session that cannot be read, as it is said."""
+    return DamagedError(f"{path} is damaged ({first_line(error)}): {AFRESH}")
+
+
+def _spoken(path: Path | None, error: sqlite3.Error) -> LightpaintError:
+    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+    if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+        return PaintError(
+            f"{path} {IN_USE}: another lightpaint paints there; end that one, or {ELSEWHERE}"
+        )
+    if code in _DAMAGED or not isinstance(error, sqlite3.OperationalError):
+        return damaged(path, error)
+    return OutputError(f"cannot write {path}: {first_line(error)}")
+
+
+def place_of(path: Path | None) -> tuple[int, int] | None:
+    """Which file is there, by the system's own name for it; None if there is none."""
+    try:
+        about = None if path is None else path.stat()
+    except OSError:
+        return None
+    return None if about is None else (about.st_dev, about.st_ino)
+
+
+def rewritten(
+    database: sqlite3.Connection, path: Path, identity: Identity | None
+) -> sqlite3.Connection:
+    """All of an open database whose file was removed, at `path` again; the old one is closed.
+
+    The system keeps a file that somebody has open. Raises LightpaintError where it cannot be
+    written; the old one is open then.
+    """
+    beside = path.with_name(f".{path.name}.new")
+    with _told(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside.unlink(missing_ok=True)
+        try:
+            database.execute("VACUUM INTO ?", (str(beside),))
+            flush(beside)
+            os.replace(beside, path)
+        except BaseException:
+            beside.unlink(missing_ok=True)
+            raise
+    database.close()  # before its place is taken: it removes what is called like its own log
+    return opened(path, identity)
+
+
+def free_name(path: Path) -> Path:
+    """Return the first name that no earlier session at `path` was kept under."""
+    number = 1
+    while (aside := path.with_name(f"{path.stem}-{number}{path.suffix}")).exists():
+        number += 1
+    return aside
+
+
+def check_pages(database: sqlite3.Connection) -> None:
+    """Raise sqlite3.Error where pages of an open database are not as they were written."""
+    [(found,)] = database.execute("PRAGMA quick_check(1)")
+    if found != "ok":
+        raise sqlite3.DatabaseError(found)
+
+
+def set_aside(path: Path) -> Path | None:
+    """Give the session at `path` another name. Returns it; None where there is no session.
+
+    Raises PaintError where another process has it, OutputError where it cannot be renamed.
+    """
+    if not path.exists():
+        return None
+    try:
+        opened(path, None).close()  # what its last process left beside it goes into it
+    except PaintError as error:
+        if IN_USE in str(error):
+            raise
+    aside = free_name(path)
+    try:
+        for ending in ("-wal", "-journal", ""):  # of one that is damaged
+            if os.path.exists(f"{path}{ending}"):
+                os.rename(f"{path}{ending}", f"{aside}{ending}")
+    except OSError as error:
+        raise OutputError(f"cannot rename {path}: {error.strerror or error}") from None
+    return aside

@@ -1,0 +1,89 @@
+"""What a session file holds and is read when somebody asks for it: pixels of steps and of looks."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.errors import PaintError
+from lightpaint.files import first_line
+from lightpaint.paint.store.compression import packed, unpacked
+from lightpaint.paint.store.pixels import Pixels, Region
+from lightpaint.paint.store.steps import Patch
+from lightpaint.records import strict_json
+
+#: What looks are made of.
+DTYPES = ("float32", "float64", "float16", "uint8", "int16")
+
+#: An array of a look: dtype, shape as JSON, data; and all of them by name.
+PackedArray = tuple[str, str, bytes]
+PackedArrays = dict[str, PackedArray]
+
+
+class KeptPatch(Patch):
+    """A patch that is in a file. read: its pixels before and after."""
+
+    def __init__(
+        self, view: int, region: Region, read: Callable[[], tuple[Pixels, Pixels]]
+    ) -> None:
+        vars(self).update(view=view, region=region, _read=read)
+
+    @property
+    def before(self) -> Pixels:
+        return self._pixels()[0]
+
+    @property
+    def after(self) -> Pixels:
+        return self._pixels()[1]
+
+    def _pixels(self) -> tuple[Pixels, Pixels]:
+        found: tuple[Pixels, Pixels] = vars(self)["_read"]()
+        return found
+
+
+class LookFile(Protocol):
+    """What a file of looks is asked for."""
+
+    def look_names(self, number: int) -> list[str]:
+        """Names of the arrays of a look, in order."""
+
+    def look_array(self, number: int, name: str) -> PackedArray:
+        """One of them. Raises KeyError if there is none."""
+
+
+class LookArrays(Mapping[str, npt.NDArray[Any]]):
+    """Arrays of the look of a number that are in a file."""
+
+    def __init__(self, file: LookFile, number: int) -> None:
+        self._file, self._number = file, number
+
+    def is_of(self, file: LookFile, number: int) -> bool:
+        """Whether these are of that look in that file."""
+        return (self._file, self._number) == (file, number)
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        dtype, shape, data = self._file.look_array(self._number, name)
+        if dtype not in DTYPES:
+            raise PaintError(f"a damaged look: {dtype}")
+        try:
+            return np.asarray(unpacked(data, dtype, tuple(map(int, strict_json(shape)))))
+        except (TypeError, ValueError) as error:
+            raise PaintError(f"a damaged look: {first_line(error)}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._file.look_names(self._number))
+
+    def __len__(self) -> int:
+        return len(self._file.look_names(self._number))
+
+
+def packed_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> PackedArrays:
+    """Arrays of a look, packed. Raises PaintError for a type that none has."""
+    found = {}
+    for name, array in arrays.items():
+        if array.dtype.name not in DTYPES:
+            raise PaintError(f"a look of {array.dtype.name}: expected {', '.join(DTYPES)}")
+        found[name] = (array.dtype.name, json.dumps(array.shape), packed(array))
+    return found

@@ -1,0 +1,387 @@
+"""The session file: each step is in it when `append` returns, whatever happens next.
+
+It is a SQLite database in WAL mode, and no journal of our own. What ends a process, or the
+current, in the middle of a write leaves the last whole step; SQLite has been tried at that far more
+than a file format of ours would be. Undo cuts the tail off in one transaction with the step that
+takes its place; looks change their names and go, and the room they took is used again or given
+back; and of a long history only what is to be seen is read at a start, since labels and pixels
+stand in two tables. An append-only journal would need all of that built.
+
+Pixels are kept packed (`compression.py`) and read when somebody asks for them, so that a history
+without limit takes no memory.
+
+A file that somebody removes is written anew with the next step: the system keeps what is open. A
+full disk ends nothing: what cannot be written stays in memory, in order, `unsaved` says so, and
+`flush` or the next step writes it.
+"""
+
+import json
+import sqlite3
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from threading import RLock
+from typing import Any
+
+from lightpaint.errors import LightpaintError, OutputError, PaintError
+from lightpaint.files import first_line
+from lightpaint.paint.store.compression import is_marked, packed_patches, unpacked_patch
+from lightpaint.paint.store.database import (
+    DamagedError,
+    check_pages,
+    damaged,
+    identify,
+    opened,
+    place_of,
+    rewritten,
+    transaction,
+)
+from lightpaint.paint.store.lazy_arrays import (
+    KeptPatch,
+    LookArrays,
+    PackedArray,
+    PackedArrays,
+    packed_arrays,
+)
+from lightpaint.paint.store.pixels import Pixels, Region
+from lightpaint.paint.store.steps import Identity, KeptLook, Patch, Step
+from lightpaint.records import strict_json
+
+#: What comes of a value that is another than was written.
+DAMAGES = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+
+_Write = Callable[[sqlite3.Connection], object]
+
+
+class Store:
+    """Steps and looks of one session, and a file that has them too.
+
+    Attributes:
+        path: The file; None for a session in memory only.
+        identity: What is painted on.
+        steps: All, in order, also those that were taken back; `append` cuts these off. Their
+            pixels are read from the file when they are asked for. To look at only.
+        position: How many of them are done.
+        unsaved: Why the last steps are in memory only, in one line; None if all is written.
+        remarks: What was worth saying of the file: what of it could not be read.
+    """
+
+    def __init__(self, path: Path | None, identity: Identity | None) -> None:
+        self.path, self.identity = path, identity
+        self.steps: list[Step] = []
+        self.position = 0
+        self.unsaved: str | None = None
+        self._lock = RLock()
+        self._looks: dict[int, KeptLook] = {}
+        self._ids: list[int] = []  # of the steps; they only grow
+        self._last = 0  # id of the last step there ever was
+        self._waiting: list[_Write] = []  # what is still to be written, in order
+        self._blobs: dict[int, tuple[bytes, bytes]] = {}  # pixels of steps that are not written
+        self._arrays: dict[int, PackedArrays] = {}  # the same of looks
+        self.remarks: list[str] = []
+        try:
+            self._begin()
+        except DamagedError as error:
+            if path is None or not path.is_file():
+                raise
+            self.remarks.append(_mended(path, identity, error))
+            self._begin()
+
+    @classmethod
+    def open(cls, path: Path, identity: Identity | None) -> "Store":
+        """The session at `path`, as it was left, or a new one; for this process alone.
+
+        identity: None where it is still to be known what is painted (`becomes`).
+
+        Raises PaintError for one that another process has, that is damaged, or that is of other
+        lights or another size; OutputError for a place that cannot be written.
+        """
+        return cls(path, identity)
+
+    def _begin(self) -> None:
+        """Open the file, and read all of it but pixels. Raises DamagedError, and others."""
+        self._database = opened(self.path, self.identity)
+        self._file = None if self.path is None else self.path.absolute()  # also from elsewhere
+        self._place = place_of(self._file)
+        self.steps.clear()
+        self._ids.clear()
+        self._looks.clear()
+        try:
+            check_pages(self._database)
+            self._read()
+        except (sqlite3.Error, *DAMAGES) as error:
+            self._database.close()
+            raise damaged(self.path, error) from None
+        except BaseException:
+            self._database.close()
+            raise
+
+    def mend(self) -> str:
+        """Go on with what can be read of the file, which turned out to be damaged.
+
+        Returns what was lost, in one line, which is also among the remarks. Raises PaintError where
+        that cannot be done.
+        """
+        with self._lock:
+            if self.path is None or self.flush() is not None:
+                raise PaintError(f"{self.path} is damaged")
+            self._database.close()
+            try:
+                said = _mended(self.path, self.identity, None)
+            finally:
+                self._begin()
+            self.remarks.append(said)
+            return said
+
+    def becomes(self, identity: Identity) -> None:
+        """It is of this, which was not known when it was opened. Raises PaintError if it is not."""
+        with self._lock:
+            identify(self._database, self.path, identity)
+            self.identity = identity
+
+    def append(self, step: Step) -> None:
+        """Do `step`, after what is done; what was taken back is cut off."""
+        with self._lock:
+            patches = step.patches
+            fields, places = _text(step.fields), json.dumps([_place(one) for one in patches])
+            blobs = packed_patches(patches) if patches else None
+            del self.steps[self.position :], self._ids[self.position :]
+            kept = self._ids[-1] if self._ids else 0
+            self._last = number = self._last + 1
+            if blobs is not None:
+                self._blobs[number] = blobs
+            self.steps.append(self._step(number, step.kind, step.label, fields, places))
+            self._ids.append(number)
+            self.position += 1
+
+            def write(database: sqlite3.Connection) -> None:
+                database.execute("DELETE FROM step WHERE id > ?", (kept,))
+                database.execute("DELETE FROM pixels WHERE step > ?", (kept,))
+                values = (number, step.kind, step.label, fields, places)
+                database.execute("INSERT INTO step VALUES (?, ?, ?, ?, ?)", values)
+                if blobs is not None:
+                    database.execute("INSERT INTO pixels VALUES (?, ?, ?)", (number, *blobs))
+
+            self._write(write)
+
+    def move_to(self, position: int) -> None:
+        """Take steps back, or do them again: `position` of them are done."""
+        with self._lock:
+            if not 0 <= position <= len(self.steps):
+                raise PaintError(f"no step {position}: there are {len(self.steps)}")
+            self.position = position
+            self._write(lambda _: None)
+
+    @property
+    def is_kept(self) -> bool:
+        """Return whether there is a file."""
+        return self.path is not None
+
+    def looks(self) -> list[KeptLook]:
+        """All looks, the oldest first; their arrays are read when they are asked for."""
+        with self._lock:
+            return list(self._looks.values())
+
+    def put_look(self, look: KeptLook) -> None:
+        """Keep a look, in the place of the one of its number if there is one."""
+        with self._lock:
+            fields, arrays = _text(look.fields), look.arrays
+            number, blobs = look.id, None
+            if not (isinstance(arrays, LookArrays) and arrays.is_of(self, number)):
+                blobs = packed_arrays(arrays)
+                self._arrays[number] = blobs
+            self._looks[number] = self._look(number, fields)
+
+            def write(database: sqlite3.Connection) -> None:
+                said = (number, fields)
+                database.execute("INSERT OR REPLACE INTO look VALUES (?, ?)", said)
+                if blobs is not None:
+                    database.execute("DELETE FROM look_array WHERE look = ?", (number,))
+                    rows = [(number, name, *row) for name, row in blobs.items()]
+                    database.executemany("INSERT INTO look_array VALUES (?, ?, ?, ?, ?)", rows)
+
+            self._write(write)
+
+    def drop_look(self, number: int) -> None:
+        """Forget a look. Raises PaintError if there is none of that number."""
+        with self._lock:
+            if self._looks.pop(number, None) is None:
+                raise PaintError(f"no look {number}")
+            self._arrays.pop(number, None)
+
+            def write(database: sqlite3.Connection) -> None:
+                database.execute("DELETE FROM look WHERE id = ?", (number,))
+                database.execute("DELETE FROM look_array WHERE look = ?", (number,))
+
+            self._write(write)
+
+    def flush(self) -> str | None:
+        """Write what is in memory only. Returns why that is not possible, or None."""
+        with self._lock:
+            if not self._waiting and self._is_there():
+                return self.unsaved
+            try:
+                self._come_back()
+                with transaction(self._database):
+                    for write in self._waiting:
+                        write(self._database)
+                    about = ("position", self.position)
+                    self._database.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", about)
+            except LightpaintError as error:
+                self.unsaved = f"what was done last is in memory only: {error}"
+                return self.unsaved
+            except sqlite3.Error as error:
+                self.unsaved = (
+                    f"what was done last is in memory only, since {self.path} cannot be written "
+                    f"({first_line(error)}): it is written as soon as there is room"
+                )
+                return self.unsaved
+            self._waiting, self.unsaved = [], None
+            self._blobs.clear()
+            self._arrays.clear()
+            return None
+
+    def close(self) -> None:
+        """Write what is left, and let others have the file.
+
+        Raises OutputError if something cannot be written; it is lost then.
+        """
+        with self._lock:
+            unsaved = self.flush()
+            self._waiting, self.unsaved = [], None  # closed again, there is nothing left to say
+            self._file = self._place = None
+            try:
+                self._database.close()
+            except sqlite3.Error as error:  # what is beside the file goes into it next time
+                unsaved = unsaved or first_line(error)
+        if unsaved is not None:
+            raise OutputError(f"the last steps are lost: {unsaved}")
+
+    def __enter__(self) -> "Store":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _is_there(self) -> bool:
+        return place_of(self._file) == self._place
+
+    def _come_back(self) -> None:
+        """Write it anew where somebody has removed it. Raises LightpaintError if that fails."""
+        if self._file is None or self._is_there():
+            return
+        if place_of(self._file) is not None:
+            raise PaintError(f"{self.path} is another file now: move that one away")
+        self._database = rewritten(self._database, self._file, self.identity)
+        self._place = place_of(self._file)
+
+    def _write(self, write: _Write) -> None:
+        self._waiting.append(write)
+        self.flush()
+
+    def _read(self) -> None:
+        """All but pixels, of the file."""
+        ask = self._database.execute
+        rows = ask("SELECT id, kind, label, fields, places FROM step ORDER BY id").fetchall()
+        for row in rows:
+            self.steps.append(self._step(*row))
+            self._ids.append(row[0])
+        self._last = self._ids[-1] if self._ids else 0
+        self.position = len(self.steps)
+        for (position,) in ask("SELECT value FROM about WHERE name = 'position'"):
+            self.position = min(int(position), len(self.steps))
+        for number, fields in ask("SELECT id, fields FROM look ORDER BY id").fetchall():
+            self._looks[number] = its = self._look(number, fields)
+            if not isinstance(its.fields["name"], str):
+                raise TypeError("a look without a name")
+
+    def _step(self, number: int, kind: str, label: str, fields: str, where: str) -> Step:
+        views, places = list[int](), list[tuple[Region, bool]]()
+        for view, top, bottom, left, right, *marked in strict_json(where):
+            region = int(top), int(bottom), int(left), int(right)
+            views.append(int(view))
+            places.append((region, bool(marked)))
+        patches = tuple(
+            KeptPatch(view, region, partial(self._pixels, number, places, k))
+            for k, (view, (region, _)) in enumerate(zip(views, places, strict=True))
+        )
+        return Step(str(kind), str(label), strict_json(fields), patches)
+
+    def _pixels(
+        self, number: int, places: list[tuple[Region, bool]], k: int
+    ) -> tuple[Pixels, Pixels]:
+        """Before and after step `number`, at its place k. Raises PaintError for a damaged file."""
+        with self._lock:
+            blobs = self._blobs.get(number)
+            if blobs is None:
+                with self._readable():
+                    found = "SELECT before, change FROM pixels WHERE step = ?"
+                    blobs = self._database.execute(found, (number,)).fetchone()
+        if blobs is None:
+            raise PaintError(f"a step that was cut off: {number}")
+        with self._readable():
+            return unpacked_patch(places, k, *blobs)
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        """Say what cannot be read as a DamagedError."""
+        try:
+            yield
+        except (sqlite3.Error, PaintError, *DAMAGES) as error:
+            raise damaged(self.path, error) from None
+
+    def _look(self, number: int, fields: str) -> KeptLook:
+        return KeptLook(number, strict_json(fields), LookArrays(self, number))
+
+    def look_names(self, number: int) -> list[str]:
+        """Names of the arrays of a look, in order."""
+        with self._lock:
+            if number in self._arrays:
+                return list(self._arrays[number])
+            found = "SELECT name FROM look_array WHERE look = ? ORDER BY rowid"
+            with self._readable():
+                return [name for (name,) in self._database.execute(found, (number,))]
+
+    def look_array(self, number: int, name: str) -> PackedArray:
+        """One of them, and no other is read. Raises KeyError if there is none."""
+        with self._lock:
+            if number in self._arrays:
+                return self._arrays[number][name]
+            found = "SELECT dtype, shape, data FROM look_array WHERE look = ? AND name = ?"
+            with self._readable():
+                row = self._database.execute(found, (number, name)).fetchone()
+        if row is None:
+            raise KeyError(name)
+        dtype, shape, data = row
+        return dtype, shape, data
+
+
+def _mended(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
+    from lightpaint.paint.store.recovery import mended
+
+    try:
+        return mended(path, identity)
+    except OSError as reason:
+        said = f"cannot write beside {path}: {reason.strerror or reason}"
+        raise error or OutputError(said) from None
+
+
+class MemoryStore(Store):
+    """The same without a file, for notebooks and tests."""
+
+    def __init__(self, identity: Identity | None = None) -> None:
+        super().__init__(None, identity)
+
+
+def _place(patch: Patch) -> list[int]:
+    """View and region, as they are kept, and a 1 if it is marked."""
+    return [*map(int, (patch.view, *patch.region)), *([1] if is_marked(patch) else [])]
+
+
+def _text(fields: Mapping[str, Any]) -> str:
+    """Fields as JSON. Raises PaintError for what JSON has no word for."""
+    try:
+        return json.dumps(dict(fields), ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise PaintError(f"this cannot be kept: {first_line(error)}") from None
