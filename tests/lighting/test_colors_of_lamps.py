@@ -1,0 +1,80 @@
+"""The gallery as it ships: paint that is white, warm or black turns no lamp green or magenta."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.basis.render.render import render_basis
+from lightpaint.colour.color import kelvin_to_rgb
+from lightpaint.colour.exposure import choose_exposure
+from lightpaint.colour.whites import white_range
+from lightpaint.lighting.analysis.uncertainty import correct_noise
+
+ROOT = Path(__file__).parent.parent.parent
+
+#: What the page calls green, in Duv.
+GREEN = 0.006
+
+#: Mixes of the whites that lamps may have reach 0.015 to the other side, and a margin lies around.
+PINK = -0.025
+
+
+@pytest.fixture(scope="module")
+def gallery() -> lp.Basis:
+    return render_basis(lp.load_scene(ROOT / "scenes/gallery/scene.xml").reduced("80x45"), spp=32)
+
+
+def _duv(basis: lp.Basis, target: lp.Target, **how: Any) -> np.ndarray:
+    solution = correct_noise(lp.solve(basis, target, **how))
+    assert solution.problem.fit.colors == "gentle"
+    return white_range(1901, 100_000).greener(solution.weights)
+
+
+def _over_look(basis: lp.Basis, painted: dict[tuple[float, ...], Any]) -> lp.Target:
+    """Colours of light on surfaces, in rectangles (top, bottom, left, right) of shares."""
+    image, weight = basis.present_look.copy(), np.zeros(basis.size, np.float32)
+    height, width = basis.size
+    assert basis.features is not None
+    for (top, bottom, left, right), light in painted.items():
+        rows = slice(round(top * height), round(bottom * height))
+        where = rows, slice(round(left * width), round(right * width))
+        image[where] = light * basis.features.albedo[where]
+        weight[where] = 1
+    return lp.Target(
+        "painted",
+        image,
+        weight,
+        everything=False,
+        transform=lp.ViewTransform("srgb", choose_exposure(basis.present_look)),
+        through_view=True,
+        over_look=True,
+    )
+
+
+@pytest.mark.parametrize("space", ["display", "linear"])
+def test_warm_light_on_the_vase_and_none_in_the_annex(gallery: lp.Basis, space: Any) -> None:
+    bright = 2 * float(gallery.present_look.mean())
+    vase, annex = (0.5, 0.63, 0.77, 0.83), (0.35, 0.6, 0.65, 0.75)
+    warm = bright * kelvin_to_rgb(2700)
+    duv = _duv(gallery, _over_look(gallery, {vase: warm, annex: np.zeros(3)}), space=space)
+    assert duv.max() < GREEN
+    assert duv.min() > PINK
+
+
+def test_white_light_on_a_wall_that_wood_reflects_on(gallery: lp.Basis) -> None:
+    """It is redder than the lamps; one that makes up for that would be green."""
+    bright = 2 * float(gallery.present_look.mean())
+    left = (0.3, 0.45, 0.02, 0.25)
+    for kelvin in (4000, 6500, 12_000):
+        white = bright * kelvin_to_rgb(kelvin)
+        assert _duv(gallery, _over_look(gallery, {left: white})).max() < GREEN
+
+
+@pytest.mark.parametrize("name", ["opening.png", "morning.exr", "overcast.png", "after-hours.png"])
+def test_shipped_paintings(gallery: lp.Basis, name: str) -> None:
+    target = lp.read_target(ROOT / "targets/gallery" / name).fitted_to(gallery.size, resize=True)
+    duv = _duv(gallery, target, colors="gentle")
+    assert duv.min() > PINK
