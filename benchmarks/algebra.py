@@ -23,9 +23,11 @@ from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.fit import Fit, meant_by
+from lightpaint.lighting.live import Live
+from lightpaint.lighting.live_view import LiveView
 from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.solve import solution_of
 from lightpaint.target.target import Target
 from lightpaint.threads import one_thread
 
@@ -128,25 +130,30 @@ def constrained(repeats: int) -> None:
 
 
 def strokes(count: int) -> None:
-    """A square of new colour, and of new importance, anywhere; then the solve from the last."""
+    """Print what a square of new colour, or of new importance, costs, and the next answer."""
     print(f"\nstroke of {BRUSH}x{BRUSH} pixels in {WIDTH}x{HEIGHT}, ms (least / median)")
     print(f"{'lights':>8s}{'painted':>12s}{'update':>16s}{'solve':>16s}{'together':>16s}")
-    whole = slice(0, 1), slice(0, 1)
     for n in (12, 64):
-        # The first stroke builds the tiles.
-        problem = Problem.of(*scene(n)).painted(whole, [0, 0, 0])
+        basis, target = scene(n)
+        image, importance = target.image.copy(), target.importance.copy()
+        view = LiveView(basis, image, importance)
+        live = Live([view], fit=meant_by(Fit(), [target]), constraints=Constraints())
         rng = np.random.default_rng(1)
-        solution = solution_of(problem)
+        # The first answer builds the tiles.
+        weights = live.answer(basis.present_weights)
         for kind in ("image", "importance"):
             updates, solves = [], []
             for _ in range(count):
                 top, left = rng.integers(0, HEIGHT - BRUSH), rng.integers(0, WIDTH - BRUSH)
                 region = slice(top, top + BRUSH), slice(left, left + BRUSH)
-                stroke = {kind: rng.random(3) if kind == "image" else rng.random()}
                 start = time.perf_counter()
-                problem = solution.problem.painted(region, **stroke)
+                if kind == "image":
+                    image[region] = rng.random(3)
+                else:
+                    importance[region] = rng.random()
+                view.painted(region, with_importance=kind == "importance")
                 between = time.perf_counter()
-                solution = solution_of(problem, start=solution.weights)
+                weights = live.answer(weights)
                 updates.append(between - start)
                 solves.append(time.perf_counter() - between)
             together = [sum(both) for both in zip(updates, solves, strict=True)]

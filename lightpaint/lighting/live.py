@@ -36,6 +36,7 @@ from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.live_sums import FILM, Films, SmallFilm
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.painting import rest_weight
 from lightpaint.lighting.pull import dimming_of, drawn_more, pull_of, to_present
 
 #: Steps between whites for one answer, at most: the next answer goes on.
@@ -100,7 +101,9 @@ class Live:
             # What is not allowed may well be nearer to the painting.
             start = _nearest(start, views, self._reduction)
             self._is_kept_to = True
-        rest_weight, reduction = self._rest_weight(views), self._with_gamuts(views)
+        painted, rest = reduce(add, (view.counts for view in views))
+        unpainted = rest_weight(float(painted), float(rest), self._fit)
+        reduction = self._with_gamuts(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
             return self._best(equations if pull is None else equations + pull, begin)
@@ -109,7 +112,7 @@ class Live:
             return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
 
         if self.mode == "linear":
-            equations = reduce(add, (x.tiles().equations(rest_weight) for x in views))
+            equations = reduce(add, (x.tiles().equations(unpainted) for x in views))
             pull = self._pull(views, self._basis.present_weights)
             found = best(equations, start)
             if self._fit.colors != "gentle":
@@ -119,7 +122,7 @@ class Live:
             return best(equations, found)
         pull = self._pull(views, start)
         films = self._films_of(views)
-        pixels = films.pixels(rest_weight, self._fit.transform)
+        pixels = films.pixels(unpainted, self._fit.transform)
         # A painting that another hand has changed may leave the answer before worse than none.
         starts = allowed(start), self._at_rest()
         return films.nearer(pixels, starts, best, pull, allowed)
@@ -189,14 +192,6 @@ class Live:
         to_colors = to_colors.times(sum(float(view.counts[0]) for view in views) / pixels)
         to_colors = drawn_more(to_colors, dimming_of(self._basis.present_weights, before))
         return to_colors if to_present is None else to_present + to_colors
-
-    def _rest_weight(self, views: tuple[LiveView, ...]) -> float:
-        """What a pixel counts that is not painted."""
-        fit = self._fit
-        if fit.unpainted or not fit.hold:
-            return fit.unpainted
-        painted, rest = reduce(add, (view.counts for view in views))
-        return float(min(fit.hold * painted / rest, 1.0)) if rest > 0 else 0.0
 
     def _films_of(self, views: tuple[LiveView, ...]) -> Films:
         if self._films is None or self._films[0] != views:

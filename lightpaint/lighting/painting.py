@@ -1,21 +1,17 @@
-"""The painting as the solve takes it, and while it is painted on (Eq 7-9)."""
+"""The painting as the solve takes it."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, Slices
+from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.emitters import asks_no_less, dark_of
 from lightpaint.lighting.fit import Emitters, Fit
 from lightpaint.lighting.loss import Loss, PaintingLoss, Squares
-from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.tiles import TiledEquations
 from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target
 
@@ -104,15 +100,16 @@ def squares_of(basis: Basis, target: Target, *, unpainted: float = 0.0) -> Squar
 
 
 def weight_of_rest(views: Views, fit: Fit) -> float:
-    """What each pixel that is not painted counts, h Σ D / Σ (1 − D) for hold h.
+    """Return the weight of each pixel that is not painted, as of `rest_weight`."""
+    return rest_weight(*painted_and_rest(views), fit)
 
-    No more than one that is painted: where little is left, that does not rule the rest.
+
+def rest_weight(painted: float, rest: float, fit: Fit) -> float:
+    """Return the weight of each pixel that is not painted, h Σ D / Σ (1 − D) for hold h.
+
+    painted, rest: Σ D and Σ (1 − D). It is at most that of a painted pixel, so that a small rest
+    does not outweigh the painting.
     """
-    return weight_between(*painted_and_rest(views), fit)
-
-
-def weight_between(painted: float, rest: float, fit: Fit) -> float:
-    """The same of Σ D and Σ (1 − D)."""
     if fit.unpainted or not fit.hold:
         return fit.unpainted
     return min(fit.hold * painted / rest, 1.0) if rest > 0 else 0.0
@@ -176,111 +173,3 @@ def brighter_will_do(views: Views) -> Bools:
 def painted_light(views: Views) -> Doubles:
     """Ψ of all views in float64."""
     return views.join([target.image.astype(np.float64) for target in views.targets])
-
-
-class Painting:
-    """Targets that are painted on, with the sums over tiles that follow the brush.
-
-    Updated in place: the arrays of `word` and of the targets are its own.
-    """
-
-    def __init__(self, whole: Basis, views: Views, *, fit: Fit) -> None:
-        self.strokes = 0
-        self.fit = fit
-        self.whole = whole
-        self.views = replace(views, targets=tuple(_own(target) for target in views.targets))
-        self.at_least = brighter_will_do(self.views)
-        self.light = painted_light(self.views)
-        self._take(weight_of_rest(self.views, fit))
-
-    def _take(self, unpainted: float) -> None:
-        """Sums anew, with this weight for each pixel that is not painted."""
-        bases = self.views.bases
-        self.unpainted = unpainted
-        self.looks = [present_look(basis, unpainted) for basis in bases]
-        self.word = joint_squares(self.views, unpainted=unpainted)
-        self.tiles = [
-            TiledEquations(
-                basis.images,
-                self.views.part(self.word.image, k),
-                self.views.part(self.word.weight, k),
-            )
-            for k, basis in enumerate(bases)
-        ]
-
-    @cached_property
-    def current(self) -> Floats:
-        """The present look, of all views."""
-        return self.whole.mix(self.whole.present_weights)
-
-    def loss(self, word: Squares, transform: ViewTransform | None) -> Loss:
-        """What a picture costs, with `word` for its squares."""
-        light, current = lambda: self.light, lambda: self.current
-        return loss_of(word, self.at_least, transform, painted=light, current=current)
-
-    @property
-    def equations(self) -> NormalEquations:
-        """M, b and ‖Ψ‖² of all views as they are now."""
-        first, *others = (tiles.equations for tiles in self.tiles)
-        for other in others:
-            first += other
-        return first
-
-    def paint(
-        self,
-        k: int,
-        region: Slices,
-        image: npt.ArrayLike | None,
-        importance: npt.ArrayLike | None,
-        at_least: npt.ArrayLike | None,
-    ) -> None:
-        """Paint over a rectangle of view k. Raises ValueError, and changes nothing, for misfits."""
-        target, basis, look = self.views.targets[k], self.views.bases[k], self.looks[k]
-        assert target.at_least is not None
-        self.tiles[k].touched(region)
-        if importance is not None:
-            given = np.asarray(importance)
-            if not (np.isfinite(given).all() and (given >= 0).all()):
-                raise ValueError("importance is a finite weight >= 0 of each pixel")
-            np.broadcast_to(given, target.importance[region].shape)
-        if image is not None:
-            if not np.isfinite(image).all():
-                raise ValueError("a painting is of finite numbers")
-            np.broadcast_to(image, target.image[region].shape)
-        if at_least is not None:
-            target.at_least[region] = at_least
-            self.views.part(self.at_least, k)[region] = at_least
-        if image is not None:
-            target.image[region] = image
-            self.views.part(self.light, k)[region] = target.image[region]
-        if importance is not None:
-            target.importance[region] = importance
-            if self.fit.emitters == "skip":
-                target.importance[region][basis.emitters_seen[region]] = 0
-        part = at_its_word(
-            target.image[region],
-            target.importance[region],
-            seen=basis.emitters_seen[region],
-            current=None if look is None else look[region],
-            unpainted=self.unpainted,
-        )
-        for name in ("image", "weight", "share"):
-            self.views.part(getattr(self.word, name), k)[region] = getattr(part, name)
-        # A stroke of colour leaves M as it is.
-        self.tiles[k].update(region, with_M=importance is not None)
-        self.strokes += 1
-        if importance is not None and self.fit.hold:
-            unpainted = weight_of_rest(self.views, self.fit)
-            if unpainted != self.unpainted:
-                self._take(unpainted)
-
-
-def _own(target: Target) -> Target:
-    """A copy whose arrays may be written to."""
-    nowhere = np.zeros(target.image.shape, bool)
-    return replace(
-        target,
-        image=target.image.copy(),
-        importance=target.importance.copy(),
-        at_least=nowhere if target.at_least is None else target.at_least.copy(),
-    )

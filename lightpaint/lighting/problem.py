@@ -25,7 +25,6 @@ from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Loss, Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.painting import (
-    Painting,
     brighter_will_do,
     joint_squares,
     loss_of,
@@ -84,16 +83,11 @@ class Problem(LinearProblem):
         dimming: (n,), by how much dimmer lights are than at present in an answer before, which the
             pull to their colours heeds; None where there was none.
         block_side: Pixels along the side of the blocks that `corrected` is of; 1 for single pixels.
-        painting: Where strokes go, once there are some.
-        strokes: How many there had been.
 
     Examples:
         >>> problem = lp.Problem.of(basis, target)
         >>> problem.equations.M.shape
         (3, 2, 2)
-        >>> brighter = problem.painted((slice(0, 4), slice(0, 8)), (1.0, 0.5, 0.2), 1.0)
-        >>> brighter.strokes
-        1
     """
 
     basis: Basis
@@ -111,8 +105,6 @@ class Problem(LinearProblem):
     refinement: Refinement | None = None
     dimming: Doubles | None = None
     block_side: int = 1
-    painting: Painting | None = None
-    strokes: int = 0
 
     __repr__ = shortly
 
@@ -259,53 +251,6 @@ class Problem(LinearProblem):
             squares=squares,
             equations=NormalEquations.of(basis, squares.image, squares.weight),
             corrected=None,
-            painting=None,
-        )
-
-    def painted(
-        self,
-        region: tuple[slice, slice],
-        image: npt.ArrayLike | None = None,
-        importance: npt.ArrayLike | None = None,
-        *,
-        at_least: npt.ArrayLike | None = None,
-        view: int = 0,
-    ) -> "Problem":
-        """Return this problem after a stroke: what is given replaces the painting in a rectangle.
-
-        region: slices of rows and columns of a view. image: (rows, columns, 3) linear, or one
-        colour; importance: (rows, columns) or one number; at_least: (rows, columns, 3), whether
-        brighter is as good; without it paint on an emitter in view is taken at its word. The
-        equations are updated tile by tile (Eq 7-9), and are to the last bit those that painting in
-        another order would have led to.
-
-        The pixels move on to the problem that is returned; this one keeps its equations, and
-        cannot be painted on again. Raises ValueError for what does not fit the region.
-        """
-        painting = self.painting
-        if painting is None:
-            painting = Painting(self.basis, self.views, fit=self.fit)
-        elif painting.strokes != self.strokes:
-            raise ValueError("this problem was painted on already: go on from what that returned")
-        painting.paint(view, region, image, importance, at_least)
-        word, reduction = replace(painting.word), self.full
-        if (gamuts := gamuts_for(self.basis, painting.views, self.fit)) is not None:
-            reduction = reduced_by(self.constraints, self.lights, self.fit, gamuts)
-        return replace(
-            self,
-            views=painting.views,
-            loss=painting.loss(word, self.loss.transform),
-            squares=word,
-            equations=painting.equations,
-            reduction=reduction,
-            full=reduction,
-            corrected=None,
-            noise_removed=0.0,
-            refinement=None,
-            dimming=None,
-            block_side=1,
-            painting=painting,
-            strokes=painting.strokes,
         )
 
 

@@ -158,24 +158,6 @@ def test_white_is_what_kelvin_does(make_basis: Any):
     np.testing.assert_allclose(found[1], basis.present_weights[1])
 
 
-def test_strokes_change_what_the_rest_weighs(make_basis: Any):
-    basis = _basis(make_basis)
-    problem = Problem.of(basis, _painted(basis, over_look=True))
-    region = (slice(3, 9), slice(2, 8))
-    after = problem.painted(region, (0.3, 0.2, 0.1), 1.0)
-    target = problem.views.targets[0]
-    image, importance = target.image.copy(), target.importance.copy()
-    image[region], importance[region] = (0.3, 0.2, 0.1), 1
-    anew = Problem.of(basis, replace(target, image=image, importance=importance))
-    for name in ("M", "b", "target_norm2"):
-        np.testing.assert_allclose(
-            getattr(after.equations, name), getattr(anew.equations, name), rtol=1e-12
-        )
-    np.testing.assert_allclose(solution_of(after).weights, solution_of(anew).weights, rtol=1e-9)
-    # Problems that were not painted on keep theirs.
-    assert problem.painted_share != after.painted_share
-
-
 def test_the_answer_says_how_it_was_found(make_basis: Any, tmp_path: Any):
     basis = _basis(make_basis)
     lighting = lp.solve(basis, _painted(basis, over_look=True)).lighting

@@ -20,7 +20,7 @@ from lightpaint.lighting.analysis.elsewhere import Elsewhere, what_changes
 from lightpaint.lighting.analysis.looking import Looking
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.painting import painted_and_rest, weight_between
+from lightpaint.lighting.painting import painted_and_rest, rest_weight
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
@@ -397,7 +397,7 @@ class _PixelSample:
         )
         if few_rest <= 0 or painted <= 0:
             return 0.0
-        return weight_between(painted, rest, fit) * (rest / few_rest) * (few_painted / painted)
+        return rest_weight(painted, rest, fit) * (rest / few_rest) * (few_painted / painted)
 
 
 def _in_blocks(views: Views, side: int) -> Views:

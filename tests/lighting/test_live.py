@@ -1,0 +1,164 @@
+"""What follows the brush is, after any strokes, what the painting as a whole would have made."""
+
+from functools import reduce
+from operator import add
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpaint.basis.basis import Basis
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit, meant_by
+from lightpaint.lighting.live import Live
+from lightpaint.lighting.live_view import LiveView
+from lightpaint.lighting.painting import weight_of_rest
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solve import solution_of
+from lightpaint.target.target import Target
+
+SIZES = (37, 41), (31, 17)
+SUMS = ("M", "b", "target_norm2")
+
+
+class _Brush:
+    """Arrays that are painted on, of a basis in which an emitter is seen."""
+
+    def __init__(self, make_basis: Any, seed: int, size: tuple[int, int]) -> None:
+        rng = np.random.default_rng(seed)
+        seen = np.zeros(size, bool)
+        seen[2:5, 3:9] = True
+        present = np.random.default_rng(99).random((4, 3))
+        planes = rng.random((4, *size, 3)) ** 2
+        self.basis: Basis = make_basis(images=planes, emission=present, seen=seen)
+        self.image = self.basis.present_look.copy()
+        self.importance = np.zeros(size, np.float32)
+        self.view = LiveView(self.basis, self.image, self.importance)
+
+    def stroke(self, rng: Any) -> None:
+        """Paint a rectangle: a colour, an importance, or both, but never over the emitter."""
+        height, width = self.importance.shape
+        top, left = rng.integers(0, height - 1), rng.integers(0, width - 1)
+        bottom, right = rng.integers(top + 1, height + 1), rng.integers(left + 1, width + 1)
+        region = slice(int(top), int(bottom)), slice(int(left), int(right))
+        kind = rng.choice(["colour", "importance", "both", "erase"])
+        if kind in ("colour", "both"):
+            self.image[region] = rng.random((*self.importance[region].shape, 3))
+        if kind in ("importance", "both"):
+            self.importance[region] = rng.random(self.importance[region].shape)
+            self.importance[self.basis.emitters_seen] = 0
+        if kind == "erase":
+            self.importance[region] = 0
+        self.view.painted(region, with_importance=kind != "colour")
+
+    @property
+    def target(self) -> Target:
+        """The whole painting, as somebody reads it from a file."""
+        image, importance = self.image.copy(), self.importance.copy()
+        return Target("t", image, importance, False, through_view=True, over_look=True)
+
+
+def _painted(make_basis: Any, seed: int, views: int, count: int) -> list[_Brush]:
+    brushes = [_Brush(make_basis, seed + k, SIZES[k]) for k in range(views)]
+    rng = np.random.default_rng([seed, 2])
+    for brush in brushes:
+        brush.view.tiles().equations(1.0)
+        for _ in range(count):
+            brush.stroke(rng)
+            if rng.random() < 0.5:
+                brush.view.tiles().equations(1.0)
+        if not brush.importance.any():
+            brush.importance[10:20, 5:9] = 0.5
+            brush.view.painted((slice(10, 20), slice(5, 9)))
+    return brushes
+
+
+def _meant(targets: list[Target], **fit: Any) -> Fit:
+    return meant_by(Fit(**fit), targets)
+
+
+@given(
+    st.integers(0, 10_000),
+    st.integers(1, 6),
+    st.integers(1, 2),
+    st.sampled_from([{"unpainted": 0.0, "hold": 0.0}, {"unpainted": 0.3}, {"hold": 2.0}]),
+)
+def test_sums_under_a_brush_are_those_of_the_whole_problem(
+    make_basis: Any, seed: int, count: int, views: int, fit: dict[str, float]
+) -> None:
+    brushes = _painted(make_basis, seed, views, count)
+    targets = [brush.target for brush in brushes]
+    meant = _meant(targets, space="linear", **fit)
+    problem = Problem.of([brush.basis for brush in brushes], targets, fit=meant)
+    rest = weight_of_rest(problem.views, meant)
+    live = reduce(add, (brush.view.tiles().equations(rest) for brush in brushes))
+    # ‖Ψ‖² is another constant: here paint and rest are two residuals of a pixel, there one.
+    for name in ("M", "b"):
+        found, expected = getattr(live, name), getattr(problem.equations, name)
+        # The present look, and 1 less what is painted, are in single precision.
+        np.testing.assert_allclose(found, expected, rtol=2e-6, atol=2e-6 * np.abs(expected).max())
+
+
+@given(st.integers(0, 10_000), st.integers(1, 6))
+def test_no_stroke_leaves_a_trace_in_the_sums(make_basis: Any, seed: int, count: int) -> None:
+    """What is painted has the bits of a view that begins with it; the rest but for round-off."""
+    [brush] = _painted(make_basis, seed, 1, count)
+    fresh = LiveView(brush.basis, brush.image, brush.importance)
+    paint, anew = (view.tiles().equations(0.0) for view in (brush.view, fresh))
+    both, both_anew = (view.tiles().equations(0.7) for view in (brush.view, fresh))
+    for name in SUMS:
+        assert getattr(paint, name).tobytes() == getattr(anew, name).tobytes()
+        np.testing.assert_allclose(getattr(both, name), getattr(both_anew, name), rtol=1e-6)
+
+
+def test_undoing_a_stroke_gives_back_the_bits(make_basis: Any) -> None:
+    [brush] = _painted(make_basis, 1, 1, 4)
+    before, region = brush.view.tiles().equations(0.0), (slice(5, 30), slice(2, 19))
+    image, importance = brush.image[region].copy(), brush.importance[region].copy()
+    brush.image[region], brush.importance[region] = (1.0, 0.5, 0.2), 1.0
+    brush.view.painted(region)
+    stroke = brush.view.tiles().equations(0.0)
+    brush.image[region], brush.importance[region] = image, importance
+    brush.view.painted(region)
+    undone = brush.view.tiles().equations(0.0)
+    for name in SUMS:
+        assert getattr(undone, name).tobytes() == getattr(before, name).tobytes()
+    assert stroke.M.tobytes() != before.M.tobytes()
+
+
+@pytest.mark.parametrize("views", [1, 2])
+@pytest.mark.parametrize("fit", [{"hold": 1.0}, {"unpainted": 0.1, "colors": "free"}])
+@pytest.mark.parametrize(
+    "asked", [{}, {"light 1": {"lock": True}}, {"light 0": {"limits": {"max": "40%"}}}]
+)
+def test_the_answer_under_a_brush_is_that_of_a_solve(
+    make_basis: Any, asked: dict[str, Any], fit: dict[str, Any], views: int
+) -> None:
+    constraints = Constraints.of(light=asked)
+    brushes = _painted(make_basis, 5, views, 0)
+    meant = _meant([brush.target for brush in brushes], space="linear", **fit)
+    live = Live([brush.view for brush in brushes], fit=meant, constraints=constraints)
+    rng, answer = np.random.default_rng(3), brushes[0].basis.present_weights
+    for _ in range(4):
+        for brush in brushes:
+            brush.stroke(rng)
+            answer = live.answer(answer)
+    targets = [brush.target for brush in brushes]
+    bases = [brush.basis for brush in brushes]
+    problem = Problem.of(bases, targets, constraints=constraints, fit=meant)
+    # Of one convex problem, whose sums agree in single precision.
+    np.testing.assert_allclose(live.answer(answer), solution_of(problem).weights, atol=2e-5)
+
+
+def test_rounds_under_a_brush_come_to_the_answer_of_a_display(make_basis: Any) -> None:
+    [brush] = _painted(make_basis, 8, 1, 5)
+    meant = _meant([brush.target], space="display", hold=1.0)
+    live = Live([brush.view], fit=meant, constraints=Constraints())
+    answer = brush.basis.present_weights
+    for _ in range(60):
+        answer = live.answer(answer)
+    problem = Problem.of(brush.basis, brush.target, fit=meant)
+    exact = problem.objective(solution_of(problem).weights).sum()
+    assert problem.objective(answer).sum() <= 1.001 * exact
