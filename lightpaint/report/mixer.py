@@ -16,7 +16,6 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.browser import bundled, styles
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display import to_8_bit
 from lightpaint.colour.lattice import curve_of, lattice_of
@@ -32,6 +31,7 @@ from lightpaint.report.figures import ENOUGH, data_uri
 from lightpaint.report.measures import that_do_most
 from lightpaint.report.of_basis import once, planes_of
 from lightpaint.threads import side_by_side
+from lightpaint.viewer.bundle import bundled, styles
 
 #: Pixels of a plane from left to right, and of all planes together, at most.
 WIDEST, MOST_PIXELS = 480, 1_000_000
@@ -96,7 +96,7 @@ def mixer_html(
 
 def mixer_assets() -> str:
     """Style and script of all mixers of a page."""
-    style, script = styles("mixer.css"), bundled("mixer.js")
+    style, script = styles("viewer/mixer/mixer.css"), bundled("viewer/mixer/mixer.js")
     return f'<style>\n{style}</style><script type="module">\n{script}</script>'
 
 

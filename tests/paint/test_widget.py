@@ -23,7 +23,6 @@ import pytest
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.browser import BundleError, bundled, source
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint import background_threads as beside
 from lightpaint.paint import protocol, studio
@@ -36,6 +35,7 @@ from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.settings import Settings, SettingsByName
+from lightpaint.viewer.bundle import BundleError, bundled, source
 
 pytest.importorskip("anywidget", reason="anywidget")
 comm = pytest.importorskip("comm", reason="comm")
@@ -807,7 +807,7 @@ def test_the_script_is_one_module() -> None:
     assert ".lightpaint" in bundle.widget_style()
     # Of what others wrote, who wrote it and under which licence.
     assert "MIT" in text
-    assert text == bundled.__wrapped__("widget.js")
+    assert text == bundled.__wrapped__("paint/page/widget.js")
 
 
 @pytest.mark.parametrize(
@@ -826,11 +826,11 @@ def test_the_script_is_one_module() -> None:
     ],
 )
 def test_what_is_not_understood_is_refused(files: Any, said: str, monkeypatch: Any) -> None:
-    monkeypatch.setattr("lightpaint.browser.source", lambda path: files[path])
-    monkeypatch.setattr("lightpaint.browser._code", lambda path: files[path])
+    monkeypatch.setattr("lightpaint.viewer.bundle.source", lambda path: files[path])
+    monkeypatch.setattr("lightpaint.viewer.bundle._code", lambda path: files[path])
     with pytest.raises(BundleError, match=said):
         bundled.__wrapped__("a.js")
 
 
 def test_sources_are_read_below_the_page_only() -> None:
-    assert source("widget.js").startswith("/**")
+    assert source("paint/page/widget.js").startswith("/**")

@@ -28,13 +28,13 @@ from lightpaint.batch.manifest.folder_names import FILES
 from lightpaint.batch.plan.journal import Line
 from lightpaint.batch.plan.plan import Plan
 from lightpaint.batch.work.task import Kind
-from lightpaint.browser import bundled, styles
 from lightpaint.errors import OutputError
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.png import png_bytes
 from lightpaint.report.comparison import fitted
 from lightpaint.screen import visible
 from lightpaint.version import __version__
+from lightpaint.viewer.bundle import bundled, styles
 
 #: Pictures of the sheet, at most, and in a row; width of each, gap, and height of the words.
 MOST, COLUMNS, WIDTH, GAP, BELOW = 120, 6, 240, 14, 22
@@ -107,8 +107,8 @@ def gallery_page(
         looks=in_script(told),
         transforms=in_script(transforms_of(shown) if mixers else {}),
         mixers="\n".join(mixers.values()),
-        style=styles("gallery.css", "mixer.css"),
-        script=bundled("gallery.js"),
+        style=styles("batch/gallery/gallery.css", "viewer/mixer/mixer.css"),
+        script=bundled("batch/gallery/gallery.js"),
         version=escape(__version__),
     )
 

@@ -1,13 +1,13 @@
 """The page for hosts that take one script and one style sheet: notebooks."""
 
-from lightpaint.browser import bundled, styles
+from lightpaint.viewer.bundle import bundled, styles
 
 
 def widget_script() -> str:
     """The painter as one ES module, whose default export is an anywidget's."""
-    return bundled("widget.js")
+    return bundled("paint/page/widget.js")
 
 
 def widget_style() -> str:
     """Its style sheet."""
-    return styles("style.css")
+    return styles("paint/page/style.css")

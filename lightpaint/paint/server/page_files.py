@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.browser import bundled
+from lightpaint.viewer.bundle import bundled
 
 #: What a browser is told of each kind of file; others are not part of the page.
 KINDS = {
@@ -19,6 +19,10 @@ KINDS = {
 }
 
 PAGE = Path(__file__).parents[1] / "page"
+
+#: What draws in it, and in pages of other rooms, served as `/viewer`. Modules of the page name it
+#: by its place in the package; of the many `..` in that, those beyond the root count for nothing.
+VIEWER = Path(__file__).parents[2] / "viewer"
 
 #: The module that begins it; a browser gets it with all that it imports.
 ENTRY = "/main.js"
@@ -39,20 +43,28 @@ def page_files(folder: Path = PAGE) -> dict[str, PageFile]:
 
     What is hidden, links to something else, and what is no file of a page is passed over.
     """
-    root, table = folder.resolve(), {}
-    for path in sorted(root.rglob("*")):
-        place = path.relative_to(root)
-        is_hidden = any(part.startswith((".", "_")) for part in place.parts)
-        if is_hidden or path.suffix not in KINDS or not path.resolve().is_relative_to(root):
-            continue
-        if path.is_file():
-            table[f"/{place.as_posix()}"] = PageFile(KINDS[path.suffix], path.read_bytes())
+    root = folder.resolve()
+    table = _files_below(root, "/")
     if "/index.html" in table:
         table["/"] = table["/index.html"]
     if ICON in table:
         # Some browsers ask for it whatever a page says.
         table["/favicon.ico"] = table[ICON]
     if root == PAGE.resolve():
+        table |= _files_below(VIEWER.resolve(), "/viewer/")
         # A browser takes ten milliseconds for each file, whoever serves it.
-        table[ENTRY] = PageFile(KINDS[".js"], bundled(ENTRY[1:]).encode())
+        table[ENTRY] = PageFile(KINDS[".js"], bundled(f"paint/page{ENTRY}").encode())
+    return table
+
+
+def _files_below(root: Path, start: str) -> dict[str, PageFile]:
+    """Return the files of a folder by their paths, which begin with `start`."""
+    table = {}
+    for path in sorted(root.rglob("*")):
+        place = path.relative_to(root)
+        is_hidden = any(part.startswith((".", "_")) for part in place.parts)
+        if is_hidden or path.suffix not in KINDS or not path.resolve().is_relative_to(root):
+            continue
+        if path.is_file():
+            table[f"{start}{place.as_posix()}"] = PageFile(KINDS[path.suffix], path.read_bytes())
     return table

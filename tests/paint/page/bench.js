@@ -1,9 +1,9 @@
 /** What tests of the picture engine call in the browser. */
 import { PaintCanvas } from "/engine/canvas.js";
-import { chooseView } from "/engine/choose.js";
-import { SRGB, lutOf } from "/engine/lut.js";
+import { chooseView } from "/viewer/drawing/choose.js";
+import { SRGB, lutOf } from "/viewer/drawing/lut.js";
 import { pictureOf } from "/engine/protocol.js";
-import { DEFAULTS } from "/engine/view.js";
+import { DEFAULTS } from "/viewer/drawing/view.js";
 
 /** An array of the site. */
 export async function array(name) {

@@ -74,7 +74,7 @@ def served(site: Site, path: str) -> tuple[dict[str, str], bytes]:
         return {"x-dtype": array.dtype.name, "x-shape": shape}, array.tobytes()
     if path == "/favicon.ico":
         return {"content-type": "image/x-icon"}, b""
-    for folder in (PAGE, HERE):
+    for folder in (PAGE, HERE, REPOSITORY / "lightpaint"):
         file = folder / path.lstrip("/")
         if file.is_file():
             return {"content-type": KINDS[file.suffix]}, file.read_bytes()

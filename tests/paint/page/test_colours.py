@@ -15,7 +15,7 @@ def colour(page: Any) -> Any:
     def call(name: str, arguments: Any) -> np.ndarray:
         made = page.evaluate(
             """async ([name, all]) => {
-                const colour = await import("/engine/colour.js");
+                const colour = await import("/viewer/drawing/colour.js");
                 return all.map((one) => colour[name](...one));
             }""",
             [name, arguments],

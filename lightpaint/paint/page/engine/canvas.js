@@ -6,8 +6,8 @@
  * drag that asks), and be dropped. What was before is kept in tiles, where the stroke has been.
  */
 import { changing } from './effects.js';
-import { VALUES, toFloats } from './half.js';
-import { union } from './layer.js';
+import { VALUES, toFloats } from '../../../viewer/drawing/half.js';
+import { union } from '../../../viewer/drawing/layer.js';
 
 /** @typedef {import("./protocol.js").Region} Region */
 /** @typedef {import("./effects.js").Effect} Effect */

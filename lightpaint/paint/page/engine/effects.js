@@ -1,6 +1,6 @@
 /** What a stroke makes of the pixels that it covers. */
-import { luminance } from './colour.js';
-import { VALUES } from './half.js';
+import { luminance } from '../../../viewer/drawing/colour.js';
+import { VALUES } from '../../../viewer/drawing/half.js';
 
 /** @typedef {import("./canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./canvas.js").Tile} Tile */

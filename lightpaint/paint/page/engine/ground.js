@@ -1,6 +1,6 @@
 /** What was asked of a whole picture: what lies below the strokes on it. */
-import { luminance } from './colour.js';
-import { VALUES } from './half.js';
+import { luminance } from '../../../viewer/drawing/colour.js';
+import { VALUES } from '../../../viewer/drawing/half.js';
 
 /** @typedef {import("./canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./protocol.js").RGB} RGB */

@@ -2,7 +2,7 @@
  * The tool in the hand: what a stroke of it does to the canvas, from where it begins to its end.
  */
 import { Path, fill, flood, stamp } from './brush.js';
-import { warmer } from './colour.js';
+import { warmer } from '../../../viewer/drawing/colour.js';
 import { groundOf } from './ground.js';
 
 /** @typedef {import("./brush.js").Point} Point */

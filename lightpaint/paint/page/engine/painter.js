@@ -4,15 +4,15 @@
  * It holds the painting, shows the pictures, turns what the hand does into strokes, and follows
  * what the session says of pixels and weights.
  */
-import { luminance } from './colour.js';
-import { VALUES } from './half.js';
+import { luminance } from '../../../viewer/drawing/colour.js';
+import { VALUES } from '../../../viewer/drawing/half.js';
 import { FIRST, LABELS, Stroke, askFor } from './hand.js';
 import { Hearers, SocketHost } from './host.js';
-import { union } from './layer.js';
-import { Encoder } from './lut.js';
-import { fullOf } from './overlay.js';
+import { union } from '../../../viewer/drawing/layer.js';
+import { Encoder } from '../../../viewer/drawing/lut.js';
+import { fullOf } from '../../../viewer/drawing/overlay.js';
 import { Screen } from './screen.js';
-import { at, zoomed } from './view.js';
+import { at, zoomed } from '../../../viewer/drawing/view.js';
 import { Work } from './work.js';
 
 /** @typedef {import("./brush.js").Point} Point */
@@ -20,8 +20,8 @@ import { Work } from './work.js';
 /** @typedef {import("./host.js").Host} Host */
 /** @typedef {import("./protocol.js").Region} Region */
 /** @typedef {import("./protocol.js").RGB} RGB */
-/** @typedef {import("./view.js").Kind} Kind */
-/** @typedef {import("./view.js").Pane} Pane */
+/** @typedef {import("../../../viewer/drawing/view.js").Kind} Kind */
+/** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
 
 /** Albedo that is black: what falls there is not seen. */
 const LEAST_ALBEDO = 0.02;

@@ -8,13 +8,11 @@
 /** Of this protocol. */
 export const VERSION = 2;
 
-/** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
-/** An array; float16 is the bits of halves in a Uint16Array (see half.js).
- * @typedef {{data: Data, shape: number[]}} Picture */
+/** @typedef {import("../../../viewer/drawing/lut.js").Data} Data */
+/** @typedef {import("../../../viewer/drawing/lut.js").Picture} Picture */
 /** @typedef {Record<string, Picture>} Arrays */
-/** Rows and columns of the picture, ends not included.
- * @typedef {[top: number, bottom: number, left: number, right: number]} Region */
-/** @typedef {[number, number, number]} RGB */
+/** @typedef {import("../../../viewer/drawing/view.js").Region} Region */
+/** @typedef {import("../../../viewer/drawing/colour.js").RGB} RGB */
 
 /** A message as it came: its fields, and its arrays beside them.
  * @typedef {{kind: string, seq?: number, reply?: number, arrays: Arrays, [field: string]: any}}
@@ -23,7 +21,7 @@ export const VERSION = 2;
 /** @typedef {{name: string, label: string, unit: string, parameter: string, plugin: string,
  *   form: string, members: string[], group: string | null, present: RGB, scale: number,
  *   is_fixed: boolean, is_scalar: boolean}} Light */
-/** @typedef {{side: number, low: number, high: number}} Shaper */
+/** @typedef {import("../../../viewer/drawing/lut.js").Shaper} Shaper */
 
 /** @typedef {{name: string, dtype: string, shape: number[]}} About */
 

@@ -1,10 +1,10 @@
 /** Where the pictures are drawn: one view, its size in device pixels, and when it draws. */
-import { chooseView } from './choose.js';
-import { DEFAULTS, panes } from './view.js';
+import { chooseView } from '../../../viewer/drawing/choose.js';
+import { DEFAULTS, panes } from '../../../viewer/drawing/view.js';
 
-/** @typedef {import("./view.js").PictureView} PictureView */
-/** @typedef {import("./view.js").Params} Params */
-/** @typedef {import("./view.js").Pane} Pane */
+/** @typedef {import("../../../viewer/drawing/view.js").PictureView} PictureView */
+/** @typedef {import("../../../viewer/drawing/view.js").Params} Params */
+/** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
 
 /** Milliseconds after which a picture that was drawn quickly is drawn sharply. */
 const REST = 180;
@@ -138,7 +138,7 @@ export class Screen {
     this.view?.draw({ ...this.params, ...shown, live: this.isLive });
   }
 
-  /** The picture that is shown for another. @param {import('./view.js').Kind} kind */
+  /** The picture that is shown for another. @param {import('../../../viewer/drawing/view.js').Kind} kind */
   standIn(kind) {
     return kind === 'solution' && this.isPresent ? 'present' : kind;
   }

@@ -4,7 +4,7 @@
  * What changes in the meantime is sent together with the next one. A stroke that is done is kept
  * until the session has said that it has it, and sent again, whole, after a lost connection.
  */
-import { union } from './layer.js';
+import { union } from '../../../viewer/drawing/layer.js';
 
 /** @typedef {import("./protocol.js").Region} Region */
 /** @typedef {import("./protocol.js").Arrays} Arrays */

@@ -2,9 +2,9 @@
  * What the page has of the session: the painting, weights, pictures; and how they follow it.
  */
 import { PaintCanvas } from './canvas.js';
-import { union } from './layer.js';
+import { union } from '../../../viewer/drawing/layer.js';
 import { Loader } from './loader.js';
-import { SRGB, lutOf } from './lut.js';
+import { SRGB, lutOf } from '../../../viewer/drawing/lut.js';
 import { VERSION, inView, stateOfView } from './protocol.js';
 import { Strokes } from './strokes.js';
 
@@ -18,7 +18,7 @@ import { Strokes } from './strokes.js';
 /**
  * What is shown. gains: which lights are heard, null for all. instead, other: weights that the
  * solution and the other mix are shown with.
- * @typedef {Omit<import("./view.js").Params, 'live'> & {transform: string, clean: boolean,
+ * @typedef {Omit<import("../../../viewer/drawing/view.js").Params, 'live'> & {transform: string, clean: boolean,
  *   gains: boolean[] | null, instead: RGB[] | null, other: RGB[] | null}} Show
  */
 
@@ -52,7 +52,7 @@ export class Work {
     this.weights = new Float64Array();
     /** How often the session had changed, as its last message says. */
     this.version = -1;
-    /** @type {import("./lut.js").Lut} */
+    /** @type {import("../../../viewer/drawing/lut.js").Lut} */
     this.lut = SRGB;
     /** Whether the present look is there, and whether the view has it. */
     this.knowsPresent = false;
@@ -245,7 +245,7 @@ export class Work {
     this.redraw([canvas.whole]);
   }
 
-  /** @param {import("./lut.js").Lut} lut */
+  /** @param {import("../../../viewer/drawing/lut.js").Lut} lut */
   setLut(lut) {
     this.lut = lut;
     this.screen.view?.setLut(lut);

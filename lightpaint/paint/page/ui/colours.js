@@ -10,7 +10,7 @@ export {
   toHex,
   toHsv,
   toKelvin,
-} from '../engine/colour.js';
+} from '../../../viewer/drawing/colour.js';
 
 /** @typedef {import('./engine.js').RGB} RGB */
 

@@ -1,6 +1,6 @@
 /** The controls that panels are made of. All are labelled, and work by keyboard and by touch. */
 
-import { slideByTouch } from '../touch.js';
+import { slideByTouch } from '../../../viewer/touch.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { asTyped } from './format.js';
 import { Icon } from './icons.js';

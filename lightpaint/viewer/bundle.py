@@ -13,9 +13,6 @@ import re
 from functools import cache
 from importlib import resources
 
-#: Where the modules are, below the package.
-PAGE = "paint/page"
-
 _IMPORT = re.compile(
     r"^import\s+(?:(?P<names>[^;'\"]+?)\s+from\s+)?(?P<q>['\"])(?P<path>[^'\"]+)(?P=q);?[ \t]*$",
     re.MULTILINE,
@@ -42,15 +39,15 @@ class BundleError(Exception):
 
 @cache
 def source(path: str) -> str:
-    """The text of one of the browser's files, by its path below `page/`."""
-    return resources.files("lightpaint").joinpath(PAGE, path).read_text(encoding="utf-8")
+    """Return the text of one of the browser's files, by its path below the package."""
+    return resources.files("lightpaint").joinpath(path).read_text(encoding="utf-8")
 
 
 @cache
 def _code(path: str) -> str:
     """What of a module does anything; of what others wrote, all of it, licence and names too."""
     text = source(path)
-    return text if path.startswith("vendor/") else _spare(text)
+    return text if "/vendor/" in path else _spare(text)
 
 
 @cache
@@ -63,7 +60,7 @@ def styles(*paths: str) -> str:
 def bundled(entry: str) -> str:
     """A module and all that it imports as one ES module, which exports what it exports.
 
-    entry: its path below `page/`. The same text wherever it is made. Raises BundleError.
+    entry: its path below the package. The same text wherever it is made. Raises BundleError.
     """
     order: list[str] = []
     _ordered(entry, order, ())

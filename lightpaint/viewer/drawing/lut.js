@@ -7,8 +7,10 @@
  */
 import { VALUES } from './half.js';
 
-/** @typedef {import("./protocol.js").Picture} Picture */
-/** @typedef {import("./protocol.js").Shaper} Shaper */
+/** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
+/** An array; float16 is the bits of halves in a Uint16Array (see half.js).
+ * @typedef {{data: Data, shape: number[]}} Picture */
+/** @typedef {{side: number, low: number, high: number}} Shaper */
 
 /** lattice: (side, side, side, 3) display values, axes r, g, b; of sRGB null.
  * curve: (side,) where it is one for all channels, else null.

@@ -6,8 +6,9 @@
  * set last.
  */
 
-/** @typedef {import("./protocol.js").Region} Region */
-/** @typedef {import("./protocol.js").Shaper} Shaper */
+/** Rows and columns of the picture, ends not included.
+ * @typedef {[top: number, bottom: number, left: number, right: number]} Region */
+/** @typedef {import("./lut.js").Shaper} Shaper */
 
 /** The painting; the mix of the planes with the weights; the mix with other weights (another
  * look); a picture that was set by name.

@@ -1,8 +1,8 @@
 /** One light of the mixer: its row, and what its sliders make of it. */
 
-import { slideByTouch } from './touch.js';
+import { slideByTouch } from '../touch.js';
 
-/** @typedef {import("./engine/protocol.js").RGB} RGB */
+/** @typedef {import("../drawing/colour.js").RGB} RGB */
 /** kelvin: where a look has it white, else null.
  * @typedef {{name: string, unit: string, isFixed: boolean, isScalar: boolean, isRest?: boolean,
  *   present: RGB, answer: RGB, kelvin: {present: number | null, answer: number | null}}} Light */

@@ -6,7 +6,7 @@
  */
 import { decodeSrgb, encodeSrgb } from './lut.js';
 
-/** @typedef {import("./protocol.js").RGB} RGB */
+/** @typedef {[number, number, number]} RGB */
 
 export { decodeSrgb as decode, encodeSrgb as encode };
 

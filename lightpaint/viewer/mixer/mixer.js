@@ -3,15 +3,15 @@
  *
  * Every `.mixer` of the document is filled from the JSON inside it; without scripts it stays hidden.
  */
-import { VALUES } from './engine/half.js';
-import { Encoder, SRGB } from './engine/lut.js';
-import { Mix } from './engine/mix.js';
+import { VALUES } from '../drawing/half.js';
+import { Encoder, SRGB } from '../drawing/lut.js';
+import { Mix } from '../drawing/mix.js';
 import { Row, kelvinTable, luminance } from './mixer_light.js';
 import { unpacked } from './unpack.js';
 
 /** @typedef {import("./unpack.js").Compact} Compact */
 /** @typedef {import("./mixer_light.js").Light} Light */
-/** @typedef {import("./engine/protocol.js").RGB} RGB */
+/** @typedef {import("../drawing/colour.js").RGB} RGB */
 
 /** lights: those with a plane of their own, in the order of the planes. shown: of these, which have
  * sliders; the others are as they are in the look. rest: the others together,
@@ -32,7 +32,7 @@ const [THUMB, BRIGHT] = [88, 0.98];
 
 class Mixer {
   /** @param {HTMLElement} root @param {Data} data @param {Uint16Array[]} planes
-   * @param {import("./engine/lut.js").Lut} lut */
+   * @param {import("../drawing/lut.js").Lut} lut */
   constructor(root, data, planes, lut) {
     this.data = data;
     this.planes = planes.map((halves, k) => ({ halves, scale: data.planes[k].scale }));
@@ -303,7 +303,7 @@ function drag(stage, hear) {
   });
 }
 
-/** @param {Data['transform']} about @returns {Promise<import("./engine/lut.js").Lut>} */
+/** @param {Data['transform']} about @returns {Promise<import("../drawing/lut.js").Lut>} */
 async function lutOf({ low, high, curve, lattice }) {
   if (curve) {
     // Which lattice it is the diagonal of is not asked where there is a curve.

@@ -1,5 +1,5 @@
 /** Pictures that images/compact.py made small. */
-import { finite } from './engine/half.js';
+import { finite } from '../drawing/half.js';
 
 /** data: base64, deflated. @typedef {{data: string, scale: number, dropped: number,
  *   size: [height: number, width: number]}} Compact */

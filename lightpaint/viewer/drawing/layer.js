@@ -1,7 +1,7 @@
 /** One picture as the CPU shows it: its light, its codes, and a canvas with them. */
 import { Encoder, SRGB } from './lut.js';
 
-/** @typedef {import("./protocol.js").Region} Region */
+/** @typedef {import("./view.js").Region} Region */
 
 export class Layer {
   /** @param {[height: number, width: number]} size of the picture

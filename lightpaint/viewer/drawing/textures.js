@@ -2,7 +2,7 @@
 import { LARGEST } from './half.js';
 import { SRGB } from './lut.js';
 
-/** @typedef {import("./protocol.js").Region} Region */
+/** @typedef {import("./view.js").Region} Region */
 
 /** The half that is 1. */
 const ONE = 0x3c00;

@@ -4,10 +4,10 @@
  * Cards that can be filtered and ordered, any two of them under a border, the table of their lights,
  * and a mixer for each basis, which begins from any of its looks.
  */
-import { begin } from './mixer.js';
+import { begin } from '../../viewer/mixer/mixer.js';
 
-/** @typedef {import("./engine/protocol.js").RGB} RGB */
-/** @typedef {import("./mixer.js").Look["transform"]} Transform */
+/** @typedef {import("../../viewer/drawing/colour.js").RGB} RGB */
+/** @typedef {import("../../viewer/mixer/mixer.js").Look["transform"]} Transform */
 /** @typedef {{name: string, y: number, emission?: RGB, hex?: string, kelvin?: number, duv?: number,
  *   stops?: number}} LookLight */
 /** links: name and address. basis: of its mixer. view: transform and stops.
@@ -400,7 +400,7 @@ function mix(look) {
   const transform = { ...(transforms[view] ?? transforms.srgb), stops };
   const lights = look.lights ?? [];
   const isWhite = (/** @type {LookLight} */ { duv }) => duv !== undefined && Math.abs(duv) <= WHITE;
-  /** @type {import("./mixer.js").Look} */
+  /** @type {import("../../viewer/mixer/mixer.js").Look} */
   const its = {
     name: look.look,
     emission: new Map(lights.map((light) => [light.name, light.emission ?? [0, 0, 0]])),
