@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from argparse import ArgumentParser
 from dataclasses import replace
 from pathlib import Path
@@ -183,3 +184,45 @@ def test_the_corridor_is_quoted_as_it_stands():
     [run] = (x for x in module.body if isinstance(x, ast.FunctionDef) and x.name == "run")
     del run.body[0]  # the docstring
     assert ast.dump(ast.parse(quoted).body[0]) == ast.dump(run)
+
+
+def test_the_walls_are_drawn_as_they_stand() -> None:
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    [layers] = (x["layers"] for x in contracts["contracts"] if x["name"] == "Rooms import one way")
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    [drawn] = re.findall(r"Imports run one way, downwards:\n\n((?:    .*\n)+)", text)
+    assert drawn.split() == " ".join(x for x in layers if x != "__main__").split()
+
+
+def _anchors(document: Path) -> set[str]:
+    """Return what headings of a document are linked by, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", document.read_text(), re.M)
+    words = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings)
+    return {word.replace(" ", "-") for word in words}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(document: Path) -> None:
+    text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
+    lost = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        path, _, anchor = link.partition("#")
+        if "://" in link:
+            continue
+        file = (document.parent / path).resolve() if path else document
+        if not file.exists() or (anchor and anchor not in _anchors(file)):
+            lost.append(link)
+    assert lost == []
+
+
+def test_every_option_is_in_some_document() -> None:
+    """Or in the help of a command alone, for those that say all there is to say of themselves."""
+    text = " ".join(document.read_text() for document in DOCUMENTS)
+    named = set(re.findall(r"(?<![\w-])(--?[a-zA-Z][a-z-]*)", text))
+    lost = {
+        action.option_strings[-1]
+        for parser in _parsers()
+        for action in parser._actions
+        if action.option_strings and not named & set(action.option_strings)
+    }
+    assert sorted(lost) == []
