@@ -11,9 +11,8 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.lit_pixels import LitPixels
-from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.loss import Loss, PixelLoss
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.pixels import Pixels
 from lightpaint.lighting.reweighted import STEP, Asked, Solve, change, rounds, value_of
 
 #: Pixels in a sample, or more, for each light.
@@ -38,7 +37,7 @@ CORRECTIONS, SHRUNK = 8, 0.7
 
 def near_optimum(
     basis: Basis,
-    loss: PaintingLoss,
+    loss: Loss,
     equations: NormalEquations,
     start: Doubles,
     solve: Solve,
@@ -50,7 +49,7 @@ def near_optimum(
     equations: of the pixels, as important as in `loss`. Others as of `descend`.
     """
     size = max(SAMPLE, EACH * len(start))
-    if loss.transform is None or np.count_nonzero(loss.importance) * PART < size:
+    if loss.pixels.has_pieces or np.count_nonzero(loss.importance) * PART < size:
         return None
     lit = LitPixels.of(basis, loss)
     part = sample(lit, np.einsum("cii->ic", equations.M), size)
@@ -101,7 +100,7 @@ def _said(lit: LitPixels, power: Doubles) -> Doubles:
     """(p,), how much of what is known of the lights is in a pixel: Σ D Φ² / power over them."""
     part = np.where(power > 0, 1 / np.where(power > 0, power, 1), 0).astype(np.float32)
 
-    def its(where: slice, pixels: Pixels) -> Doubles:
+    def its(where: slice, pixels: PixelLoss) -> Doubles:
         squares = np.square(lit.rows[:, where])
         said = sum(part[:, c] @ squares[..., c] for c in range(3))
         return np.asarray(said * pixels.importance)

@@ -9,18 +9,16 @@ blocks have to be follows from the noise of the present look, as the display sho
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis, mix
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_sums, enlarged
 from lightpaint.lighting.lit_pixels import LitPixels
-from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.loss import Cut, Loss
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.pull import to_present
 from lightpaint.lighting.views import Views
@@ -49,13 +47,16 @@ class BinnedPixels:
     """
 
     basis: Basis
-    loss: PaintingLoss
+    loss: Loss
     side: int
 
     @cached_property
     def equations(self) -> NormalEquations:
-        """The linear problem of the painted light, each block as important as its pixels."""
-        return NormalEquations.of(self.basis, self.loss.painted, self.loss.importance[..., None])
+        """The linear problem of what was meant at the present, each block as important as its
+        pixels.
+        """
+        meant = self.loss.meant(self.basis.mix(self.basis.present_weights))
+        return NormalEquations.of(self.basis, meant, self.loss.importance[..., None])
 
     @cached_property
     def prior(self) -> NormalEquations:
@@ -117,24 +118,29 @@ def _display_noise(
     return np.asarray(np.square(np.subtract(*ends, dtype=np.float64) / 2)[counts > 0].ravel())
 
 
-def binned_pixels(views: Views, loss: PaintingLoss, side: int) -> BinnedPixels:
-    """Return the blocks of a loss over all `views`, each pixel weighed by how much it counts."""
+def binned_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
+    """Return the blocks of a loss over all `views`, each pixel weighed by how much it counts.
+
+    None for a loss that is always one of single pixels.
+    """
     planes: list[list[Doubles]] = [[], []]
-    parts = []
+    parts: list[tuple[Cut, Doubles]] = []
     for k, basis in enumerate(views.bases):
-        its = loss.cut(lambda joint, k=k: views.part(joint, k))  # type: ignore[misc]
+        cut = partial(views.part, k=k)
+        its = loss.cut(cut)
         counts = its.importance.astype(np.float64)
         # Emitters that may be brighter say something where a block has nothing else.
-        glows = basis.emitters_seen & its.at_least.all(axis=-1)
+        glows = basis.emitters_seen & its.exceeds(np.inf).all(axis=-1)
         others = enlarged(block_sums(np.where(glows, 0, counts), side), side)
         counts[glows & (others[: counts.shape[0], : counts.shape[1]] > 0)] = 0
-        its = replace(its, importance=counts)
         total = block_sums(counts, side)
         safe = np.where(total > 0, total, 1)
         for made, images in zip(planes, (basis.images, basis.half_differences), strict=True):
             means = [block_sums(x * counts[..., None], side) / safe[..., None] for x in images]
             made.append(np.stack(means).reshape(len(means), -1, 3))
-        parts.append(_binned_loss(its, total, safe, side))
+        parts.append((cut, counts))
+    if (blocks := loss.of_blocks(parts, side)) is None:
+        return None
     images, halves = (np.concatenate(x, axis=1)[:, None].astype(np.float32) for x in planes)
     basis = replace(
         views.bases[0],
@@ -145,35 +151,4 @@ def binned_pixels(views: Views, loss: PaintingLoss, side: int) -> BinnedPixels:
         features=None,
         objects=None,
     )
-    return BinnedPixels(basis, _joined(parts), side)
-
-
-def _binned_loss(loss: PaintingLoss, total: Doubles, safe: Doubles, side: int) -> PaintingLoss:
-    """Return that of one view. total: (h', w'), importance of blocks; safe: the same, never 0."""
-    painted, held = (1 - loss.share) * loss.importance, loss.share * loss.importance
-
-    def mean(image: Floats, weight: Floats) -> Doubles:
-        some = block_sums(weight.astype(np.float64), side)
-        its = block_sums(image * weight[..., None].astype(np.float64), side)
-        return np.asarray(its / np.where(some > 0, some, 1)[..., None])
-
-    return replace(
-        loss,
-        painted=mean(loss.painted, painted),
-        importance=total,
-        share=block_sums(held.astype(np.float64), side) / safe,
-        current=mean(loss.current, held),
-        at_least=mean(loss.at_least.astype(np.float64), painted) > 0.5,
-    )
-
-
-def _joined(parts: list[PaintingLoss]) -> PaintingLoss:
-    """Return one row of all."""
-
-    def row(name: str) -> npt.NDArray[np.generic]:
-        arrays = [getattr(part, name) for part in parts]
-        return np.concatenate([x.reshape(-1, *x.shape[2:]) for x in arrays])[None]
-
-    names = ("painted", "importance", "share", "current", "at_least")
-    rows: dict[str, Any] = {name: row(name) for name in names}
-    return replace(parts[0], **rows)
+    return BinnedPixels(basis, blocks, side)

@@ -6,9 +6,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.loss import Loss, PixelLoss
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
-from lightpaint.lighting.pixels import Pixels
 
 #: Part of the pixels that must not count for it to be worth a copy of the others.
 FEW_LEFT_OUT = 0.1
@@ -22,16 +21,16 @@ class LitPixels:
     """
 
     rows: Floats
-    pixels: Pixels
+    pixels: PixelLoss
     which: Indices | None = None
 
     @classmethod
-    def whole(cls, basis: Basis, loss: PaintingLoss) -> "LitPixels":
+    def whole(cls, basis: Basis, loss: Loss) -> "LitPixels":
         """All there are."""
         return cls(basis.images.reshape(len(basis.images), -1, 3), loss.pixels)
 
     @classmethod
-    def of(cls, basis: Basis, loss: PaintingLoss) -> "LitPixels":
+    def of(cls, basis: Basis, loss: Loss) -> "LitPixels":
         """Those that count."""
         whole = cls.whole(basis, loss)
         counted = np.flatnonzero(whole.pixels.importance)
@@ -43,7 +42,7 @@ class LitPixels:
         """Σ w_i Φ_i, (3, p), in float64: a float32's round-off would hide the last steps."""
         made = np.empty((3, len(self.pixels)))
 
-        def mix(where: slice, _: Pixels) -> None:
+        def mix(where: slice, _: PixelLoss) -> None:
             for c in range(3):
                 made[c, where] = weights[:, c] @ self.rows[:, where, c].astype(np.float64)
 
@@ -53,7 +52,7 @@ class LitPixels:
     def objective_and_gradient(self, weights: Doubles) -> tuple[float, Doubles]:
         """The loss of weights, (n, 3), and half its gradient, (n, 3)."""
 
-        def its(where: slice, pixels: Pixels) -> tuple[float, Doubles]:
+        def its(where: slice, pixels: PixelLoss) -> tuple[float, Doubles]:
             rows = self.rows[:, where].transpose(2, 0, 1).astype(np.float64, order="C")
             x = np.stack([w @ lit for w, lit in zip(weights.T, rows, strict=True)])
             value, slope = pixels.objective_and_gradient(x)
@@ -65,7 +64,7 @@ class LitPixels:
     def slope(self, image: Doubles, weight: Doubles, x: Doubles, ahead: Doubles) -> float:
         """Half of how Σ weight (image − x)² falls on the way from x to `ahead`, at x."""
 
-        def its(where: slice, _: Pixels) -> float:
+        def its(where: slice, _: PixelLoss) -> float:
             at = x[:, where]
             return float((weight[:, where] * (image[:, where] - at) * (ahead[:, where] - at)).sum())
 

@@ -10,8 +10,9 @@ from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.transform import ViewTransform
 from lightpaint.images.blocks import block_mean, block_sums, enlarged
+from lightpaint.lighting.loss import STRIP
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.pixels import STRIP, Pixels, joined
+from lightpaint.lighting.pixels import PaintedPixels, joined
 from lightpaint.lighting.reweighted import between
 from lightpaint.lighting.tiles import FEW_LIGHTS, TiledEquations
 from lightpaint.threads import one_thread
@@ -150,13 +151,13 @@ class SmallFilm:
             )
         self._transform = transform
 
-    def pixels(self, rest_weight: float, transform: ViewTransform | None) -> Pixels:
+    def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """The loss of these pixels; an average counts as much as all that are in it."""
         rest = rest_weight * self._left
         weight = self._a + rest
         share = np.where(weight > 0, rest / np.where(weight > 0, weight, 1), 0)
         seen = self._seen_painted, self._seen_current
-        return Pixels(self._painted, weight, share, self._current, None, transform, seen)
+        return PaintedPixels(self._painted, weight, share, self._current, None, transform, seen)
 
 
 class Films:
@@ -167,14 +168,14 @@ class Films:
         rows = [film.rows for film in films]
         self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
 
-    def pixels(self, rest_weight: float, transform: ViewTransform | None) -> Pixels:
+    def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """The loss of all pixels, as of `SmallFilm`."""
         each = [film.pixels(rest_weight, transform) for film in self._films]
         return each[0] if len(each) == 1 else joined(each)
 
     def nearer(
         self,
-        pixels: Pixels,
+        pixels: PaintedPixels,
         starts: Sequence[Doubles],
         best: Callable[[NormalEquations, Doubles], Doubles],
         pull: NormalEquations | None,

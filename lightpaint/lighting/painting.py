@@ -11,7 +11,8 @@ from lightpaint.colour.transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.emitters import asks_no_less, dark_of
 from lightpaint.lighting.fit import Emitters, Fit
-from lightpaint.lighting.loss import Loss, PaintingLoss, Squares
+from lightpaint.lighting.loss import Loss, Squares
+from lightpaint.lighting.painting_loss import PaintingLoss
 from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target
 
@@ -146,7 +147,7 @@ def loss_of(
     painted: Callable[[], Doubles],
     current: Callable[[], Floats],
 ) -> Loss:
-    """What a picture costs: `word` itself where it says all.
+    """Choose what a picture costs: `word` itself where it says all.
 
     at_least: (h, w, 3), where brighter is as good. painted, current: Ψ and the present look, asked
     for where they are needed.

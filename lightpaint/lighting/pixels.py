@@ -1,31 +1,19 @@
-"""The loss of a painting, channel by channel: sums over pixels that lie as processors like them.
-
-A channel of all pixels is a row, and arithmetic goes over strips of them that stay in the
-processor's cache, several at a time; sums are added in order, so that their bits do not depend on
-how many processors there are.
-"""
+"""The loss of a painting, channel by channel."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.colour.transform import ViewTransform
-from lightpaint.threads import side_by_side
-
-#: Pixels in a strip.
-STRIP = 2**13
-
-Result = TypeVar("Result")
+from lightpaint.lighting.loss import PixelLoss
 
 
 @dataclass(frozen=True)
-class Pixels:
-    """Pixels of a `PaintingLoss`, which says what it is.
+class PaintedPixels(PixelLoss):
+    """Pixels of a `PaintingLoss`, which has the formula.
 
     painted, current: (3, p), linear. importance, share: (p,). at_least: (3, p), None where brighter
     is nowhere as good. seen: V of painted and of current, where somebody has it.
@@ -39,10 +27,7 @@ class Pixels:
     transform: ViewTransform | None
     seen: tuple[Doubles, Doubles] | None = None
 
-    def __len__(self) -> int:
-        return len(self.importance)
-
-    def at(self, which: slice | Indices) -> "Pixels":
+    def at(self, which: slice | Indices) -> "PaintedPixels":
         """Some of them."""
         return replace(
             self,
@@ -54,23 +39,19 @@ class Pixels:
             seen=None if self.seen is None else (self.seen[0][:, which], self.seen[1][:, which]),
         )
 
-    def weighed(self, by: Doubles) -> "Pixels":
+    def weighed(self, by: Doubles) -> "PaintedPixels":
         """With `by`, (p,), as much importance."""
         return replace(self, importance=self.importance * by)
 
-    @cached_property
-    def strips(self) -> tuple[tuple[slice, "Pixels"], ...]:
-        """All of them by parts, and where each is."""
-        if len(self) <= STRIP:
-            return ((slice(0, len(self)), self),)
-        parts = [slice(k, min(k + STRIP, len(self))) for k in range(0, len(self), STRIP)]
-        return tuple((where, self.at(where)) for where in parts)
+    @property
+    def clips(self) -> bool:
+        """Whether a display clips them."""
+        return self.transform is not None
 
-    def each(self, work: Callable[[slice, "Pixels"], Result]) -> list[Result]:
-        """What comes of each strip, in order."""
-        if len(self.strips) == 1:
-            return [work(*self.strips[0])]
-        return side_by_side(lambda strip: work(*strip), self.strips)
+    @property
+    def has_pieces(self) -> bool:
+        """Whether light itself is compared."""
+        return self.transform is None
 
     def shown(self, x: Doubles) -> Doubles:
         """V(x), of (3, p)."""
@@ -113,7 +94,7 @@ class Pixels:
         """image and weight, (3, p) each, of squares with F's gradient at x, (3, p)."""
         image, weight = np.empty((2, *x.shape))
 
-        def fill(where: slice, its: "Pixels") -> None:
+        def fill(where: slice, its: "PaintedPixels") -> None:
             lit = x[:, where]
             gradient, factor = its.gradient(lit, from_clipping=from_clipping)
             some = factor > 0
@@ -171,7 +152,7 @@ class Pixels:
         """By how much squares made at x follow the current look, (3, p). weight: theirs."""
         share = np.zeros_like(x)
 
-        def fill(where: slice, its: "Pixels") -> None:
+        def fill(where: slice, its: "PaintedPixels") -> None:
             steep = its._steep(x[:, where]) * its.share * its.importance
             np.divide(steep, weight[:, where], out=share[:, where], where=weight[:, where] > 0)
 
@@ -218,14 +199,14 @@ class Pixels:
         return np.asarray(self.share * (1 - self.share) * apart)
 
 
-def joined(parts: Sequence[Pixels]) -> Pixels:
+def joined(parts: Sequence[PaintedPixels]) -> PaintedPixels:
     """Pixels of several pictures as those of one, where brighter is nowhere as good."""
     first = parts[0]
 
-    def put(get: Callable[[Pixels], Doubles]) -> Doubles:
+    def put(get: Callable[[PaintedPixels], Doubles]) -> Doubles:
         return np.concatenate([get(part) for part in parts], axis=-1)
 
-    return Pixels(
+    return PaintedPixels(
         put(lambda its: its.painted),
         put(lambda its: its.importance),
         put(lambda its: its.share),
@@ -234,16 +215,6 @@ def joined(parts: Sequence[Pixels]) -> Pixels:
         first.transform,
         (put(lambda its: its._shown_painting), put(lambda its: its._shown_current)),
     )
-
-
-def planes_of(image: npt.NDArray[Any], kind: npt.DTypeLike = np.float64) -> npt.NDArray[Any]:
-    """(3, p) of an image (h, w, 3)."""
-    return np.ascontiguousarray(image.reshape(-1, 3).T, dtype=kind)
-
-
-def image_of(planes: Doubles, size: tuple[int, ...]) -> Doubles:
-    """(h, w, 3) of (3, p)."""
-    return np.ascontiguousarray(planes.T).reshape(*size, 3)
 
 
 def _of_squares(slope: Doubles, missed: Doubles) -> tuple[Doubles, Doubles]:

@@ -199,7 +199,7 @@ class Problem(LinearProblem):
     @property
     def is_linear(self) -> bool:
         """Whether its squares are all there is to its loss."""
-        return isinstance(self.loss, Squares)
+        return self.loss.is_linear
 
     @property
     def space(self) -> Space:
@@ -229,7 +229,7 @@ class Problem(LinearProblem):
 
     def objective(self, weights: Doubles) -> Doubles:
         """(3,), what weights (n, 3) miss."""
-        if isinstance(self.loss, Squares):
+        if self.is_linear:
             return self.equations.objective(weights)
         lit = LitPixels.whole(self.basis, self.loss)
         return lit.pixels.objective(lit.predicted(weights))

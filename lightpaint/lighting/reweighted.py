@@ -13,9 +13,8 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.lit_pixels import LitPixels
-from lightpaint.lighting.loss import PaintingLoss, Squares
+from lightpaint.lighting.loss import Loss, PixelLoss, Squares, image_of
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.pixels import Pixels, image_of
 from lightpaint.threads import side_by_side
 
 #: Rounds at most.
@@ -121,7 +120,7 @@ class Led:
 
 def descend(
     basis: Basis,
-    loss: PaintingLoss,
+    loss: Loss,
     start: Doubles,
     solve: Solve,
     *,
@@ -160,8 +159,7 @@ def rounds(
     until: the change of a light's picture that ends them.
     """
     pixels = lit.pixels
-    is_display = pixels.transform is not None
-    from_clipping = from_clipping and is_display
+    from_clipping = from_clipping and pixels.clips
     w, x = start, lit.predicted(start)
     value = value_of(pixels, asked, w, x)
     count = 0
@@ -173,9 +171,11 @@ def rounds(
         ahead = lit.predicted(best)
         step = change(equations, w, best)
         fall = 2 * lit.slope(image, weight, x, ahead) + asked.fall(w, best)
-        # A problem that is exact all the way has its optimum where the true one has it.
-        is_exact = pixels.same_squares(x, ahead)
-        done = step <= until or fall <= FALL * value if is_display else is_exact
+        if pixels.has_pieces:
+            # A problem that is exact all the way has its optimum where the true one has it.
+            done = pixels.same_squares(x, ahead)
+        else:
+            done = step <= until or fall <= FALL * value
         part, reached = 1.0, value_of(pixels, asked, best, ahead)
         is_worse = reached > value * (1 + ROUND_OFF)
         if is_worse or from_clipping or not done:
@@ -201,13 +201,13 @@ def change(equations: NormalEquations, w: Doubles, best: Doubles) -> float:
     return float((moved / np.where(largest > 0, largest, 1)).max())
 
 
-def value_of(pixels: Pixels, asked: Asked, w: Doubles, x: Doubles) -> float:
+def value_of(pixels: PixelLoss, asked: Asked, w: Doubles, x: Doubles) -> float:
     """The loss of a picture x, (3, p), and what is asked of its weights, (n, 3)."""
     return float(pixels.objective(x).sum()) + asked.value(w)
 
 
 def _part_of_step(
-    pixels: Pixels,
+    pixels: PixelLoss,
     asked: Asked,
     weights: tuple[Doubles, Doubles],
     pictures: tuple[Doubles, Doubles],

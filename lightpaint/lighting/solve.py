@@ -19,9 +19,8 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.linear import Answer, answer_of, solve_linear, solve_reduction
 from lightpaint.lighting.lit_pixels import LitPixels
-from lightpaint.lighting.loss import PaintingLoss, Squares
+from lightpaint.lighting.loss import Squares, image_of
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.pixels import image_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.pull import dimming_of, to_present
 from lightpaint.lighting.reweighted import Asked, Descent, descend, value_of
@@ -111,11 +110,10 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
 
 def _blocks_of(problem: Problem) -> BinnedPixels | None:
     """Return the blocks of pixels that are fitted; None where single pixels are."""
-    loss = problem.loss
-    if not isinstance(loss, PaintingLoss):
+    if problem.is_linear:
         return None
-    side = block_side(problem.views.bases, loss.transform)
-    return binned_pixels(problem.views, loss, side) if side > 1 else None
+    side = block_side(problem.views.bases, problem.loss.transform)
+    return binned_pixels(problem.views, problem.loss, side) if side > 1 else None
 
 
 def _solved_once(problem: Problem, begin: Doubles, blocks: BinnedPixels | None) -> Solution:
@@ -228,7 +226,6 @@ def _descended_between(
 ) -> Solution:
     """Descend to the least of the loss over what the reduction is. Others as of `_descended`."""
     basis, loss, pull, equations = problem.basis, problem.loss, problem.pull, problem.equations
-    assert isinstance(loss, PaintingLoss)
     if blocks is not None:
         basis, loss, equations = blocks.basis, blocks.loss, blocks.equations
         pull = blocks.prior if pull is None else pull + blocks.prior
@@ -281,7 +278,6 @@ def _of_blocks(problem: Problem, found: Descent, blocks: BinnedPixels) -> Proble
     What is solved are the equations of the blocks, and their prior: without most of the noise.
     """
     at, loss = found.reweighting.at, problem.loss
-    assert isinstance(loss, PaintingLoss)
     x = LitPixels.whole(problem.basis, loss).predicted(at)
     image, weight = loss.pixels.squares(x, from_clipping=False)
     parts = (image, weight, loss.pixels.shares(x, weight))

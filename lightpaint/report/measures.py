@@ -7,7 +7,6 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.loss import PaintingLoss
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.html import SHOWN, SPARE
 
@@ -86,9 +85,7 @@ def _norm2(solution: Solution) -> float:
 def brighter_as_allowed(solution: Solution, predicted: Floats) -> tuple[int, int] | None:
     """Pixels painted as at least so bright, and how many of them are brighter; None if none are."""
     loss = solution.problem.loss
-    if not isinstance(loss, PaintingLoss):
-        return None
-    its = loss.at_least & (solution.importance > 0)[..., None]
-    brighter = its & (predicted > loss.painted)
+    counts = (solution.importance > 0)[..., None]
+    its, brighter = (loss.exceeds(x) & counts for x in (np.inf, predicted))
     pixels = int(its.any(axis=-1).sum())
     return (pixels, int(brighter.any(axis=-1).sum())) if pixels else None

@@ -21,7 +21,7 @@ from lightpaint.lighting.binning import binned_pixels, block_side
 from lightpaint.lighting.fit import meant_by
 from lightpaint.lighting.live import Live
 from lightpaint.lighting.live_view import LiveView
-from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.painting_loss import PaintingLoss
 
 SCENES = Path(__file__).parent.parent.parent / "scenes"
 FILMS = {"cornell": "32x32", "stage": "80x45", "gallery": "80x45"}

@@ -19,9 +19,9 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.lighting.loss import PaintingLoss
+from lightpaint.lighting.loss import image_of, planes_of
 from lightpaint.lighting.normal_equations import inner_products
-from lightpaint.lighting.pixels import image_of, planes_of
+from lightpaint.lighting.painting_loss import PaintingLoss
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again, solve

@@ -23,7 +23,6 @@ from lightpaint.lighting.constraints.reduction import only
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.lit_pixels import LitPixels
-from lightpaint.lighting.loss import Squares
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, gamuts_for
 from lightpaint.lighting.pull import dimming_of
@@ -132,7 +131,7 @@ def _finder_once(solution: Solution) -> Callable[[Problem], Doubles]:
         reduction, found = solve_on_locus(asked, problem.reduction, at)
         return problem.reduced(reduction), found.weights
 
-    if isinstance(loss, Squares):
+    if solution.problem.is_linear:
         return lambda problem: squares(problem)[1]
     lit = LitPixels.of(solution.basis, loss)
     size = max(SAMPLE, EACH * len(at))

@@ -1,0 +1,152 @@
+"""A loss is an interface: one that the package does not know is solved, analysed and reported."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.lighting.analysis.analyse import analyse
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss import Cut, Loss, PixelLoss, planes_of
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solve import solution_of
+from lightpaint.target.target import Target
+
+SIZE = 12, 17
+
+
+@dataclass(frozen=True)
+class RobustPixels(PixelLoss):
+    """Σ 2 D c² (√(1 + (Ψ − x)²/c²) − 1): squares of what is missed up to c, its size beyond."""
+
+    painted: Doubles
+    importance: Doubles
+    scale: float
+
+    def at(self, which: Any) -> "RobustPixels":
+        return RobustPixels(self.painted[:, which], self.importance[which], self.scale)
+
+    def weighed(self, by: Doubles) -> "RobustPixels":
+        return replace(self, importance=self.importance * by)
+
+    def _root(self, x: Doubles) -> Doubles:
+        return np.sqrt(1 + np.square((self.painted - x) / self.scale))
+
+    def objective(self, x: Doubles) -> Doubles:
+        return np.asarray(2 * self.scale**2 * (self._root(x) - 1) @ self.importance)
+
+    def squares(self, x: Doubles, *, from_clipping: bool) -> tuple[Doubles, Doubles]:
+        return self.painted, self.importance / self._root(x)
+
+
+@dataclass(frozen=True)
+class RobustLoss(Loss):
+    """The same of a picture: a painting in which a few pixels are slips."""
+
+    painted: Floats
+    importance: Floats
+    scale: float
+
+    transform = None
+
+    @cached_property
+    def pixels(self) -> RobustPixels:
+        flat = np.asarray(self.importance, np.float64).ravel()
+        return RobustPixels(planes_of(self.painted), flat, self.scale)
+
+    def cut(self, part: Cut) -> "RobustLoss":
+        return replace(self, painted=part(self.painted), importance=part(self.importance))
+
+
+def _problem(make_basis: Any, seed: int, *, views: int = 1, slips: float = 0.1) -> Problem:
+    rng = np.random.default_rng(seed)
+    lights = rng.random((3, 3))
+    bases, targets = [], []
+    for _ in range(views):
+        basis = make_basis(images=rng.random((3, *SIZE, 3)) ** 3, emission=rng.random((3, 3)))
+        image = basis.mix(2 * lights).astype(np.float32)
+        image[rng.random(SIZE) < slips] *= 5
+        bases.append(replace(basis, lights=bases[0].lights) if bases else basis)
+        importance = rng.random(SIZE).astype(np.float32)
+        targets.append(Target("t", image, importance, everything=False))
+    problem = Problem.of(bases, targets, fit=Fit(space="linear", colors="free", hold=0.0))
+    its = problem.views
+    loss = RobustLoss(
+        its.join([target.image for target in its.targets]),
+        its.join([target.importance for target in its.targets]),
+        scale=0.05,
+    )
+    return replace(problem, loss=loss)
+
+
+@pytest.mark.parametrize("views", [1, 2])
+def test_a_third_loss_is_brought_to_its_least(make_basis: Any, views: int) -> None:
+    problem = _problem(make_basis, 1, views=views)
+    solution = solution_of(problem)
+    rows = problem.basis.images.reshape(3, -1, 3).astype(np.float64)
+
+    def cost(flat: Doubles) -> tuple[float, Doubles]:
+        x = np.einsum("npc,nc->cp", rows, flat.reshape(3, 3))
+        value, half = problem.loss.pixels.objective_and_gradient(x)
+        return value, 2 * np.einsum("npc,cp->nc", rows, half).ravel()
+
+    start = np.ones(9)
+    found = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=[(0, None)] * 9, tol=1e-14)
+    # Rounds end at a change of 1e-6.
+    np.testing.assert_allclose(solution.weights.ravel(), found.x, atol=1e-4)
+    assert solution.certificate.converged
+    # Slips do not count as they do where squares are the loss.
+    plain = solution_of(replace(problem, loss=problem.squares))
+    assert cost(solution.weights.ravel())[0] < 0.9 * cost(plain.weights.ravel())[0]
+
+
+def test_a_third_loss_heeds_what_is_asked_of_lights(make_basis: Any) -> None:
+    problem = _problem(make_basis, 1)
+    free = solution_of(problem)
+    locked = Constraints.of(light={"light 1": {"lock": True}})
+    [basis], [target] = problem.views.bases, problem.views.targets
+    asked = Problem.of(basis, target, constraints=locked, fit=problem.fit)
+    held = solution_of(replace(asked, loss=problem.loss))
+    np.testing.assert_allclose(held.weights[1], basis.present_weights[1])
+    assert problem.objective(held.weights).sum() > problem.objective(free.weights).sum()
+
+
+def test_a_third_loss_is_analysed(make_basis: Any) -> None:
+    solution = solution_of(_problem(make_basis, 2, views=2))
+    for analysis in analyse(solution):
+        assert np.isfinite(analysis.diagnosis.missed)
+        assert np.isfinite(analysis.uncertainty.weights).all()
+
+
+@given(st.integers(0, 1000))
+def test_squares_are_a_loss_as_any_other(make_basis: Any, seed: int) -> None:
+    """Without the short cut for what is a linear problem, the answer is the same."""
+    problem = _problem(make_basis, seed)
+    whole = problem.squares
+    direct = solution_of(replace(problem, loss=whole))
+    np.testing.assert_allclose(
+        whole.pixels.objective(planes_of(problem.basis.mix(direct.weights))),
+        whole.objective(problem.basis.mix(direct.weights)),
+        rtol=1e-12,
+    )
+    around = solution_of(replace(problem, loss=_Unknown(whole)))
+    np.testing.assert_allclose(around.weights, direct.weights, atol=1e-9)
+
+
+class _Unknown(Loss):
+    """Squares that do not say what they are."""
+
+    transform = None
+
+    def __init__(self, squares: Any) -> None:
+        self.pixels, self.importance = squares.pixels, squares.importance
+
+    def cut(self, part: Cut) -> "_Unknown":
+        raise NotImplementedError
