@@ -2,14 +2,15 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from fake_messages import fake_answer, fake_state
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import Message
-from lightpaint.paint.protocol import VERSION, Paint, Said
+from lightpaint.paint.protocol import Acknowledgement, Message, Notice, Paint, Said, SessionState
 
 
 class FakeSession:
@@ -41,14 +42,14 @@ class FakeSession:
             case Paint():
                 self.before_paint()
                 weights = np.full((2, 3), float(arrays["image"].sum()))
-                fields = {"stroke": said.stroke, "exact": False, "mode": "linear"}
-                return [Message("answer", fields, {"weights": weights})]
-        return [Message("done", {"of": type(said).__name__}), Message("say", {"text": "said"})]
+                return [fake_answer(stroke=said.stroke, weights=weights)]
+        return [Acknowledgement(), Notice(text="said")]
 
-    def greet(self, *, is_back: bool) -> Message:
-        names = dict.fromkeys(self.pictures, 1)
-        about = {"version": VERSION, "resources": names, "size": [2, 3], "is_back": is_back}
-        return Message("state", about)
+    def state(self) -> SessionState:
+        return fake_state(dict.fromkeys(self.pictures, 1))
+
+    def greet(self, *, is_back: bool) -> SessionState:
+        return replace(self.state(), is_back=is_back)
 
     def resource(self, name: str) -> npt.NDArray[Any]:
         if name not in self.pictures:

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from fake_session import FakeSession
 from keys import bearer, key_of, offered
+from raw_message import RawMessage
 from websockets.client import ClientProtocol
 from websockets.datastructures import Headers
 from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 
-from lightpaint.paint.frames import Message, of_frame, to_frame
+from lightpaint.paint.frames import of_frame, to_frame
 from lightpaint.paint.server.guard import PROTOCOL
 from lightpaint.paint.server.server import Server
 
@@ -90,7 +91,7 @@ class Page:
         assert self.protocol.handshake_exc is None
 
     def says(self, kind: str, **fields: object) -> None:
-        self.protocol.send_binary(to_frame(Message(kind, {"seq": 1, **fields}).content(), []))
+        self.protocol.send_binary(to_frame(RawMessage(kind, {"seq": 1, **fields}).content(), []))
         self._sent()
 
     def sends(self, data: bytes) -> None:

@@ -20,7 +20,8 @@ from lightpaint.expected import MAX_LISTED, MAX_NAME, MAX_PRIMARIES
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import MAX_BYTES, read_lighting
-from lightpaint.paint.frames import Message, said_of
+from lightpaint.paint.frames import said_of
+from lightpaint.paint.protocol import Message
 from lightpaint.paint.server.session_clients import Line
 from lightpaint.progress import wanted, while_wanted
 from lightpaint.records import strict_toml

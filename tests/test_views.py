@@ -26,9 +26,8 @@ from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
-from lightpaint.paint.frames import Message
 from lightpaint.paint.launch import subjects_of
-from lightpaint.paint.protocol import Ask, Export, Paint
+from lightpaint.paint.protocol import Ask, Export, Message, Paint
 from lightpaint.paint.session_file import identity_of
 from lightpaint.paint.store.steps import SeenFrom
 from lightpaint.paint.store.store import MemoryStore

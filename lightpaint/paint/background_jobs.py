@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes, as_halves
@@ -14,13 +15,24 @@ from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import StoppedError, Threads
-from lightpaint.paint.frames import Message
+from lightpaint.paint.protocol import (
+    Explanation,
+    ExportResult,
+    Message,
+    PreviewResult,
+    TaskStarted,
+    TaskStopped,
+    VerificationResult,
+)
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.session.snapshot import Moment
 from lightpaint.paint.store.requests import Wishes
 from lightpaint.paint.store.steps import of_view
 from lightpaint.paint.subject import Subject, painting_of
 from lightpaint.progress import Progress, while_wanted
+
+#: What takes long.
+Task = Literal["export", "verify", "explain"]
 
 Asked = protocol.Export | protocol.Verify | protocol.Explain
 
@@ -50,9 +62,9 @@ class Home(Protocol):
         """How far something is. Raises StoppedError once nobody wants it any more."""
 
 
-def _named(files: Iterable[Path]) -> list[str]:
+def _named(files: Iterable[Path]) -> tuple[str, ...]:
     """Files as a page is told of them."""
-    return [str(x.absolute()) for x in files]
+    return tuple(str(x.absolute()) for x in files)
 
 
 class Errands:
@@ -64,22 +76,24 @@ class Errands:
     def __init__(self, place: Home, threads: Threads) -> None:
         self._place, self._threads = place, threads
         self._writes, self._renders = Lock(), Lock()
-        self._seen: dict[int, tuple[int, dict[str, Any]]] = {}  # renders, by view: of which version
+        self._seen: dict[
+            int, tuple[int, VerificationResult]
+        ] = {}  # renders, by view: of which version
         self._foreseen = 0  # number of the last preview that was asked for
         self._wanted: protocol.Verify | None = None  # that was asked for last; None if stopped
         self._stops = 0  # how often somebody has stopped what is written
 
     def said(self, message: Asked) -> list[Message]:
         """Begin with it. Raises PaintError for what there is not."""
-        works: dict[type, Callable[[Any], None]] = {
-            protocol.Export: partial(self._export, stops=self._stops),
-            protocol.Verify: self._verified,
-            protocol.Explain: self._explain,
+        works: dict[type, tuple[Task, Callable[[Any], None]]] = {
+            protocol.Export: ("export", partial(self._export, stops=self._stops)),
+            protocol.Verify: ("verify", self._verified),
+            protocol.Explain: ("explain", self._explain),
         }
         if isinstance(message, protocol.Verify):
             if not message.run:
                 self._wanted = None
-                return [Message("started", {"what": "stop"})]
+                return [TaskStarted(what="stop")]
             if self._subject(message.view).scene is None:
                 raise PaintError("there is no scene to render: it was opened from a saved basis")
             # Here, and not in its thread: what is said next may be that it is to stop.
@@ -88,10 +102,10 @@ class Errands:
             self._subject(message.view)
         elif not message.run:
             self._stops += 1
-            return [Message("started", {"what": "stop"})]
-        what = type(message).__name__.lower()
-        self._threads.later(lambda: works[type(message)](message), what)
-        return [Message("started", {"what": what})]
+            return [TaskStarted(what="stop")]
+        what, work = works[type(message)]
+        self._threads.later(lambda: work(message), what)
+        return [TaskStarted(what=what)]
 
     def foresee(self, message: protocol.Preview, wishes: Wishes) -> list[Message]:
         """Begin to find what a change would do. Raises PaintError for a view that there is none of.
@@ -101,7 +115,7 @@ class Errands:
         self._subject(message.view)
         self._foreseen = message.number
         self._threads.later(lambda: self._foresee(message, wishes), "preview")
-        return [Message("started", {"what": "preview"})]
+        return [TaskStarted(what="preview")]
 
     def command(self, sensors: Sequence[str], wishes: Wishes) -> str:
         """The command that answers exported paintings alike, where there are commands."""
@@ -109,10 +123,10 @@ class Errands:
         paths = {sensor: str(painting_of(subject.folder, sensor)) for sensor in sensors}
         return subject.command(paths, wishes) if paths else ""
 
-    def verified(self, version: int) -> list[dict[str, Any]]:
+    def verified(self, version: int) -> tuple[VerificationResult, ...]:
         """What the last render of each view has shown, and whether it is of an earlier version."""
         seen = list(self._seen.values())
-        return [about | {"is_old": its != version} for its, about in seen]
+        return tuple(replace(about, is_old=its != version) for its, about in seen)
 
     def _subject(self, view: int) -> Subject:
         subjects = self._place.subjects
@@ -154,18 +168,18 @@ class Errands:
                         files.append(file)  # one by one: those before a stop are there
         except StoppedError:
             if self._stops != stops:
-                told = {"files": _named(files), "command": "", "is_stopped": True}
-                self._place.tell(Message("exported", told))
+                told = ExportResult(files=_named(files), command="", is_stopped=True)
+                self._place.tell(told)
             return
         # It is of the paintings that were written now: those of before may be others.
         is_asked, is_painted = bool(OF_PAINTING & set(message.what)), bool(moment.painted)
         sensors = moment.painted_sensors if is_asked and is_painted else ()
-        fields = {
-            "files": _named(files),
-            "command": self.command(sensors, moment.wishes),
-            "is_unpainted": is_asked and not is_painted,
-        }
-        self._place.tell(Message("exported", fields))
+        made = ExportResult(
+            files=_named(files),
+            command=self.command(sensors, moment.wishes),
+            is_unpainted=is_asked and not is_painted,
+        )
+        self._place.tell(made)
 
     def _verified(self, asked: protocol.Verify) -> None:
         def check() -> None:
@@ -179,7 +193,7 @@ class Errands:
                 self._verify(asked.view, check)
         except StoppedError:
             if self._wanted is None:  # else a page waits for the next one
-                self._place.tell(Message("stopped", {"what": "verify"}))
+                self._place.tell(TaskStopped(what="verify"))
 
     def _verify(self, view: int, check: Callable[[], None]) -> None:
         """Render the answer in a view. check: raises StoppedError once nobody wants that."""
@@ -196,10 +210,10 @@ class Errands:
         )
         check()
         self._place.put(of_view("verified", view), as_halves(picture))
-        about = {"agrees": agrees, "text": said, "view": view}
-        self._seen[view] = moment.version, about
         is_old = self._place.version != moment.version
-        self._place.tell(Message("verified", about | {"is_old": is_old}))
+        made = VerificationResult(agrees=agrees, text=said, view=view, is_old=is_old)
+        self._seen[view] = moment.version, made
+        self._place.tell(made)
 
     def _foresee(self, asked: protocol.Preview, wishes: Wishes) -> None:
         def check() -> None:
@@ -213,14 +227,20 @@ class Errands:
             found = proposed.foresight(weights, asked.view, clean=clean)
             check()
             is_old = self._place.version != proposed.version
-            about = {"number": asked.number, "view": asked.view, "is_old": is_old}
-            pictures = {"before": found.before, "after": found.after}
-            self._place.tell(Message("previewed", {**about, **found.fields}, pictures))
+            made = PreviewResult(
+                number=asked.number,
+                view=asked.view,
+                text=found.text,
+                is_at_cost=found.is_at_cost,
+                is_old=is_old,
+                before=found.before,
+                after=found.after,
+            )
+            self._place.tell(made)
 
     def _explain(self, asked: protocol.Explain) -> None:
         moment, _ = self._place.now()
         said, beyond = moment.beyond(asked.view)
         self._place.put(of_view("beyond", asked.view), beyond)
         is_old = self._place.version != moment.version
-        fields = {"sentences": said, "view": asked.view, "is_old": is_old}
-        self._place.tell(Message("explained", fields))
+        self._place.tell(Explanation(sentences=tuple(said), view=asked.view, is_old=is_old))

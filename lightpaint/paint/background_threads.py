@@ -7,11 +7,10 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from threading import Condition, Event, Thread, current_thread, get_native_id
-from typing import Literal
 
 from lightpaint.errors import LightpaintError, NothingToUndoError
 from lightpaint.files import first_line
-from lightpaint.paint.frames import Message
+from lightpaint.paint.protocol import Message, Notice, Tone
 from lightpaint.paint.store.store import Store
 
 #: Seconds of rest after a stroke before the exact answer is looked for.
@@ -25,9 +24,6 @@ NICE = 10
 
 #: Seconds in which a pass of a render ends.
 PATIENCE_S = 60.0
-
-#: How something is said to a page.
-Tone = Literal["info", "warn"]
 
 
 class StoppedError(Exception):
@@ -77,7 +73,7 @@ class Settling:
                 self._find()
             except Exception as error:
                 # A mistake of our own ends no session: the next stroke is answered again.
-                self._say(Message("say", {"text": told(error), "tone": "warn"}))
+                self._say(Notice(text=told(error), tone="warn"))
 
 
 class Writing:
@@ -131,7 +127,7 @@ class Threads:
             except StoppedError:
                 pass
             except Exception as error:
-                self._say(Message("say", {"text": told(error), "tone": "warn", "what": name}))
+                self._say(Notice(text=told(error), tone="warn", what=name))
 
         self.begin(run, name)
 

@@ -12,7 +12,6 @@ import json
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ import numpy.typing as npt
 from lightpaint.errors import PaintError
 from lightpaint.files import one_line
 from lightpaint.paint.protocol import KINDS, Said
+from lightpaint.paint.protocol.base import DTYPES
 from lightpaint.records import read_record, strict_json
 
 #: Longest frame that is read, in bytes, and longest JSON in it.
@@ -28,38 +28,6 @@ MAX_FRAME, MAX_TEXT = 2**28, 2**20
 
 #: Longest text in a message, in characters, and most values of a list or an object in it.
 MAX_CHARACTERS, MAX_VALUES = 1000, 4096
-
-#: What buffers may hold.
-DTYPES = {"float16": "<f2", "float32": "<f4", "float64": "<f8", "int16": "<i2", "uint8": "|u1"}
-
-Arrays = Mapping[str, npt.NDArray[Any]]
-
-
-@dataclass(frozen=True)
-class Message:
-    """One message of a session to its page: kind, fields for the JSON, arrays."""
-
-    kind: str
-    fields: Mapping[str, Any] = field(default_factory=dict)
-    arrays: Arrays = field(default_factory=dict)
-
-    def content(self, reply: int | None = None) -> dict[str, Any]:
-        """The JSON of it. reply: number of what it answers."""
-        made: dict[str, Any] = {"kind": self.kind, **_plain(self.fields)}
-        if reply is not None:
-            made["reply"] = reply
-        made["buffers"] = [
-            {"name": name, "dtype": _dtype(array), "shape": list(array.shape)}
-            for name, array in self.arrays.items()
-        ]
-        return made
-
-    def buffers(self) -> list[bytes]:
-        """The arrays as bytes, little endian, in order."""
-        return [
-            np.ascontiguousarray(array, DTYPES[_dtype(array)]).tobytes()
-            for array in self.arrays.values()
-        ]
 
 
 def to_frame(content: Mapping[str, Any], buffers: Sequence[bytes]) -> bytes:
@@ -171,21 +139,3 @@ def _described(content: Mapping[str, Any]) -> list[tuple[tuple[int, ...], str]]:
             raise PaintError(f"a buffer of shape {str(shape)[:40]}")
         found.append((tuple(shape or ()), DTYPES[dtype]))
     return found
-
-
-def _dtype(array: npt.NDArray[Any]) -> str:
-    name = array.dtype.name
-    return name if name in DTYPES else {"bool": "uint8"}.get(name, "float32")
-
-
-def _plain(value: Any) -> Any:
-    """Without what JSON has no word for: NaN and Inf are null."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

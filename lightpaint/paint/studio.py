@@ -7,6 +7,7 @@ which say what has come of them through `on_message`.
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from threading import RLock
 from typing import Any
 
@@ -24,20 +25,32 @@ from lightpaint.paint.background_threads import (
     Settling,
     StoppedError,
     Threads,
-    Tone,
     Writing,
     give_way,
     told,
 )
-from lightpaint.paint.frames import Message
 from lightpaint.paint.plane_denoiser import Cleaning
+from lightpaint.paint.protocol import (
+    AnswerUpdate,
+    Message,
+    Notice,
+    PictureData,
+    PictureUpdate,
+    ProgressReport,
+    SampleCount,
+    SessionPending,
+    SessionState,
+    TableInfo,
+    Tone,
+    TransformInfo,
+)
 from lightpaint.paint.session import picture_table as pictures
-from lightpaint.paint.session.answer_messages import analysis_fields, answer_fields
+from lightpaint.paint.session.answer_messages import judgement, light_info
 from lightpaint.paint.session.look_library import Looks
 from lightpaint.paint.session.picture_table import Picture, Pictures
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import Moment
-from lightpaint.paint.session.view_pictures import fields_of_views, offer_transforms, offer_view
+from lightpaint.paint.session.view_pictures import offer_transforms, offer_view, view_info
 from lightpaint.paint.store.pixels import Pixels
 from lightpaint.paint.store.requests import Wishes
 from lightpaint.paint.store.steps import Identity
@@ -81,8 +94,8 @@ class Studio:
         self.pictures = Pictures()
         self._session: Session | None = None
         self._looks: Looks | None = None
-        self._known: Mapping[str, Any] = {}  # the last exact answer, as it was said
-        self._progress: Mapping[str, Any] | None = None  # of the first picture
+        self._known: AnswerUpdate | None = None  # the last exact answer, as it was said
+        self._progress: ProgressReport | None = None  # of the first picture
         self._lock, self._is_open, self._failed = RLock(), True, ""
         self._telling = RLock()  # taken before the other, by whoever tells of what it made
         self._cleaning = Cleaning(
@@ -142,8 +155,8 @@ class Studio:
 
     # What a page asks
 
-    def state(self) -> Message:
-        """All there is, for a page that opens."""
+    def state(self) -> SessionState | SessionPending:
+        """All there is, for a client that begins."""
         first = self.subjects[0]
         with self._lock:
             session = self._session
@@ -155,17 +168,12 @@ class Studio:
                 "can_report": self.renders or len(self.subjects) == 1,
             }
             if session is None:
-                return Message(
-                    "waiting", {**about, "text": self._failed, "progress": self._progress}
-                )
-            about |= self._of_session(session)
-            known = self._known if self._known.get("version") == session.version else {}
-            bases = [view.basis for view in session.views]
-            answer = {**answer_fields(bases, session.weights), **known}
-            if not session.is_painted:
-                answer |= session.unpainted
-            arrays = session.weights_array
-            return Message("state", {**about, **session.about, "answer": answer}, arrays)
+                return SessionPending(**about, text=self._failed, progress=self._progress)
+            found, known = session.findings, self._known
+            if known is not None and known.version == session.version:
+                found = known.findings
+            about |= {"answer": found, "weights": session.weights}
+            return SessionState(**about, **self._of_session(session), **session.about)
 
     def greet(self, *, is_back: bool) -> Message:
         """The state, for a page that begins. What another one had begun is kept as it was left.
@@ -177,16 +185,14 @@ class Studio:
                 self._session.left(with_stroke=not is_back)
                 self._settling.ring()
             state = self.state()
-            return Message(state.kind, {**state.fields, "is_back": is_back}, state.arrays)
+            return replace(state, is_back=is_back)
 
     def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
         """What comes of a message at once. Raises LightpaintError for what cannot be done."""
         if isinstance(message, protocol.Hello | protocol.TakeOver):
             return [self.greet(is_back=True)]
         if isinstance(message, protocol.Fetch):
-            return [
-                Message("fetched", {"name": message.name}, {"data": self.resource(message.name)})
-            ]
+            return [PictureData(name=message.name, data=self.resource(message.name))]
         with self._lock:
             session, looks = self.session, self._looks
             assert looks is not None
@@ -257,7 +263,7 @@ class Studio:
 
         def renewed() -> Message:
             self.pictures.put(name, picture)
-            return Message("renewed", {"resources": {name: self.pictures.generations[name]}})
+            return PictureUpdate(resources={name: self.pictures.generations[name]})
 
         self._tell_of(renewed)
 
@@ -265,16 +271,16 @@ class Studio:
         """How far something is. Raises StoppedError where it has ended."""
         if not self._is_open:
             raise StoppedError
-        about = {"what": label, "done": done, "total": total, "unit": unit}
+        about = ProgressReport(what=label, done=done, total=total, unit=unit)
         if self._session is None:
             self._progress = about
         with MITSUBA.aside():  # whoever hears it may wait for a render of its own
-            self.tell(Message("progress", about))
+            self.tell(about)
 
     def _tell_kept(self, text: str, tone: Tone) -> None:
         """Whether what is done can be written."""
         self.on_unsaved(text)
-        self.tell(Message("say", {"text": text, "tone": tone}))
+        self.tell(Notice(text=text, tone=tone))
 
     def _obtain(self) -> None:
         """The bases, better and better."""
@@ -284,14 +290,14 @@ class Studio:
                 for bases in bases_of(self.subjects, self.hears):
                     self._take(bases)
                     self._cleaning.make(self.session.views)
-            self.tell(Message("progress", {"what": "basis", "done": 1, "total": 1, "unit": ""}))
+            self.tell(ProgressReport(what="basis", done=1, total=1, unit=""))
             self._cleaning.keep()
         except StoppedError:
             pass
         except Exception as error:
             is_told = self._session is None and self.on_failure is not None
             self._failed = told(error, at_length=not is_told)
-            self.tell(Message("say", {"text": self._failed, "tone": "warn"}))
+            self.tell(Notice(text=self._failed, tone="warn"))
             if self._session is None:
                 self.failure = error
                 self._tell_of(self.state)
@@ -345,17 +351,22 @@ class Studio:
         wanted, basis = self.subjects[0].wanted, session.basis
         painted = [view.name for view in session.views if view.is_painted]
         sensors = [""] if len(session.views) == 1 else painted
-        return fields_of_views(session.views) | {
-            "transforms": [x.name for x in self._transforms(session)],
-            "transform": {"name": session.transform.name, "stops": session.transform.stops},
-            "lut": {"side": pictures.SIDE, "low": pictures.LOW, "high": pictures.HIGH},
+        views = tuple(view_info(view) for view in session.views)
+        return {
+            "size": views[0].size,
+            "objects": views[0].objects,
+            "lights": tuple(map(light_info, basis.lights, views[0].scales)),
+            "views": views,
+            "transforms": tuple(x.name for x in self._transforms(session)),
+            "transform": TransformInfo(session.transform.name, session.transform.stops),
+            "lut": TableInfo(pictures.SIDE, pictures.LOW, pictures.HIGH),
             "resources": self.pictures.named(),
-            "looks": self._looks.listed() if self._looks is not None else [],
-            "basis": {
-                "spp": basis.origin.spp,
-                "wanted": wanted or basis.origin.spp,
-                "done": wanted is None or basis.origin.spp >= wanted,
-            },
+            "looks": self._looks.listed() if self._looks is not None else (),
+            "basis": SampleCount(
+                spp=basis.origin.spp,
+                wanted=wanted or basis.origin.spp,
+                done=wanted is None or basis.origin.spp >= wanted,
+            ),
             "verified": self._errands.verified(session.version),
             "first": not session.store.steps,
             "stroke": session.stroke,
@@ -382,13 +393,13 @@ class Studio:
                 return
             check()
             analyses = analyse(solution)
-            known = analysis_fields(analyses, moment.painted)
-            self._tell_answer(lambda: session.settled(moment, solution, **known))
+            judged = judgement(analyses, moment.painted)
+            self._tell_answer(lambda: session.settled(moment, solution, judged))
 
-    def _tell_answer(self, make: Callable[[], Message | None]) -> None:
-        def known() -> Message | None:
+    def _tell_answer(self, make: Callable[[], AnswerUpdate | None]) -> None:
+        def known() -> AnswerUpdate | None:
             message = make()
-            self._known = message.fields if message is not None else self._known
+            self._known = message or self._known
             return message
 
         self._tell_of(known)

@@ -20,6 +20,7 @@ import pytest
 from command import as_from_a_terminal, refused
 from keys import key_of, offered
 from light_groups import interleaved, pictures
+from raw_message import RawMessage
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
@@ -29,7 +30,7 @@ from lightpaint.cli.options import painted_of, settings_of, values_of
 from lightpaint.cli.parser import command_parser
 from lightpaint.cli.spelling import solve_command
 from lightpaint.paint.background_threads import Threads
-from lightpaint.paint.frames import Message, of_frame, to_frame
+from lightpaint.paint.frames import of_frame, to_frame
 from lightpaint.paint.launch import subject_of, subjects_of
 from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.store.requests import Wishes
@@ -231,7 +232,7 @@ def live(url: str) -> ClientConnection:
 def said(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[str, Any]:
     """Say something, and hear the answer to it; to `hello` the state when there is a picture."""
     arrays = {name: fields.pop(name) for name in ("image", "importance") if name in fields}
-    message = Message(kind, {"seq": seq, **fields}, arrays)
+    message = RawMessage(kind, {"seq": seq, **fields}, arrays)
     socket.send(to_frame(message.content(), message.buffers()))
     while True:
         frame = socket.recv(timeout=60)

@@ -2,8 +2,7 @@
 
 from serving import LARGE, Page, Serving, until
 
-from lightpaint.paint.frames import Message
-from lightpaint.paint.protocol import VERSION
+from lightpaint.paint.protocol import VERSION, PictureData
 
 
 def deaf(serving: Serving) -> Page:
@@ -12,7 +11,7 @@ def deaf(serving: Serving) -> Page:
     page.says("hello", version=VERSION)
     assert page.hears()[0]["kind"] == "state"
     assert serving.session.on_message is not None
-    serving.session.on_message(Message("fetched", {"name": "large"}, {"picture": LARGE}))
+    serving.session.on_message(PictureData(name="large", data=LARGE))
     return page
 
 

@@ -7,13 +7,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fake_messages import fake_answer
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from raw_message import RawMessage
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import DTYPES, MAX_TEXT, Message, of_frame, said_of, to_frame
-from lightpaint.paint.protocol import KINDS, Paint, Set, TakeOver, Tie
+from lightpaint.paint.frames import DTYPES, MAX_TEXT, of_frame, said_of, to_frame
+from lightpaint.paint.protocol import (
+    EVENTS,
+    KINDS,
+    Findings,
+    LightAnswer,
+    Paint,
+    Set,
+    TakeOver,
+    Tie,
+    typescript,
+)
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 PLAIN = st.recursive(
@@ -37,7 +49,7 @@ FINITE = arrays.arrays(
 
 @given(FIELDS, ARRAYS, st.none() | st.integers(0, 2**53))
 def test_what_a_session_says_arrives(fields: Any, given_arrays: Any, reply: int | None) -> None:
-    message = Message("say", fields, given_arrays)
+    message = RawMessage("say", fields, given_arrays)
     frame = to_frame(message.content(reply), message.buffers())
     content, buffers = of_frame(frame)
     assert content.pop("kind") == "say"
@@ -64,7 +76,7 @@ def _finite(value: Any) -> Any:
 @given(st.integers(0, 2**53 - 1), FINITE, st.integers(0, 100), st.booleans())
 def test_paint_arrives_to_the_last_bit(seq: int, image: Any, stroke: int, done: bool) -> None:
     fields = {"seq": seq, "stroke": stroke, "region": [1, 3, 0, 3], "done": done}
-    message = Message("paint", fields, {"image": image, "importance": image[..., 0]})
+    message = RawMessage("paint", fields, {"image": image, "importance": image[..., 0]})
     number, said, got = said_of(*of_frame(to_frame(message.content(), message.buffers())))
     assert number == seq
     assert said == Paint(stroke, (1, 3, 0, 3), done)
@@ -134,7 +146,7 @@ def test_nearly_right_messages_are_refused_or_read(content: Any, rest: bytes) ->
 
 @given(FINITE, st.data())
 def test_a_frame_cut_short_is_refused(image: Any, data: Any) -> None:
-    message = Message("paint", {"seq": 1, "stroke": 1, "region": [0, 2, 0, 3]}, {"image": image})
+    message = RawMessage("paint", {"seq": 1, "stroke": 1, "region": [0, 2, 0, 3]}, {"image": image})
     frame = to_frame(message.content(), message.buffers())
     end = data.draw(st.integers(0, len(frame) - 1))
     with pytest.raises(PaintError):
@@ -146,7 +158,7 @@ def test_a_frame_cut_short_is_refused(image: Any, data: Any) -> None:
 def test_what_is_no_number_is_refused(value: float, dtype: str) -> None:
     array = np.ones((1, 2, 3), dtype)
     array[0, 1, 2] = value
-    message = Message("paint", {"seq": 1, "stroke": 1, "region": [0, 1, 0, 2]}, {"image": array})
+    message = RawMessage("paint", {"seq": 1, "stroke": 1, "region": [0, 1, 0, 2]}, {"image": array})
     with pytest.raises(PaintError, match="NaN or Inf"):
         said_of(*of_frame(to_frame(message.content(), message.buffers())))
 
@@ -174,3 +186,31 @@ def test_a_refusal_is_short_whatever_is_refused() -> None:
         with pytest.raises(PaintError) as refusal:
             said_of({"kind": "hello", "seq": 1, **content}, [])
         assert len(str(refusal.value)) < 500
+
+
+def test_the_types_of_the_page_are_those_of_the_messages() -> None:
+    """Run `python -m lightpaint.paint.protocol.typescript` after a change."""
+    assert typescript.FILE.read_text(encoding="utf-8") == typescript.declarations()
+
+
+def test_every_message_says_what_it_is() -> None:
+    for message in (*KINDS.values(), *EVENTS.values()):
+        assert message.__doc__
+        assert not message.__doc__.startswith(f"{message.__name__}(")
+        assert message.__dataclass_params__.frozen
+
+
+def test_what_is_left_out_and_what_is_null() -> None:
+    found = Findings(lights=(LightAnswer((1.0, 0.5, float("inf")), None, None, "#fff", True, 1.0),))
+    fields = fake_answer(**{"lights": found.lights}).fields
+    assert "headline" not in fields
+    assert fields["lights"] == [
+        {
+            "emission": [1.0, 0.5, None],
+            "stops": None,
+            "kelvin": None,
+            "swatch": "#fff",
+            "is_on": True,
+            "share": 1.0,
+        }
+    ]

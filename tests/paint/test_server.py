@@ -14,15 +14,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fake_messages import fake_answer, fake_progress
 from fake_session import FakeSession
 from keys import bearer, offered
+from raw_message import RawMessage
 from serving import in_a_loop
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import Message, of_frame, to_frame
-from lightpaint.paint.protocol import VERSION, Paint
+from lightpaint.paint.frames import of_frame, to_frame
+from lightpaint.paint.protocol import VERSION, Message, Paint, PictureData, PictureUpdate
 from lightpaint.paint.server import client, server
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
@@ -82,7 +84,7 @@ def served(stranger: Served) -> Served:
 
 
 def frame(kind: str, seq: int, arrays: dict[str, Any] | None = None, **fields: Any) -> bytes:
-    message = Message(kind, {"seq": seq, **fields}, arrays or {})
+    message = RawMessage(kind, {"seq": seq, **fields}, arrays or {})
     return to_frame(message.content(), message.buffers())
 
 
@@ -339,7 +341,7 @@ def test_a_picture_is_kept_by_its_generation_only(served: Served) -> None:
             answer = served.browser.get(f"/data/present{asked}")
             assert answer.headers["cache-control"] == "no-store"
         assert served.session.on_message is not None
-        served.session.on_message(Message("renewed", {"resources": {"present": 2}}))
+        served.session.on_message(PictureUpdate(resources={"present": 2}))
         assert heard(socket)["kind"] == "renewed"
         assert "immutable" in served.browser.get("/data/present?g=2").headers["cache-control"]
         assert served.browser.get("/data/present?g=1").headers["cache-control"] == "no-store"
@@ -358,8 +360,8 @@ def test_each_message_is_answered_by_its_number(served: Served) -> None:
         assert (content["kind"], content["reply"]) == ("answer", 8)
         np.testing.assert_array_equal(np.frombuffer(weights, "<f8"), np.full(6, 3.0))
         socket.send_bytes(frame("undo", 9))
-        assert heard(socket) == {"kind": "done", "of": "Undo", "reply": 9, "buffers": []}
-        assert heard(socket) == {"kind": "say", "text": "said", "buffers": []}
+        assert heard(socket) == {"kind": "done", "reply": 9, "buffers": []}
+        assert heard(socket) == {"kind": "say", "text": "said", "tone": "info", "buffers": []}
         socket.send_bytes(paint(10, label="nothing"))
         assert heard(socket)["reply"] == 10
     assert len(served.session.threads) == 1
@@ -658,10 +660,10 @@ class Deaf:
 def test_of_what_nobody_asked_for_a_slow_page_gets_the_newest() -> None:
     page = client.Client(Deaf())
     for k in range(1000):
-        page.send(Message("answer", {"version": k}))
-        page.send(Message("progress", {"what": "render", "done": k}))
-        page.send(Message("progress", {"what": "denoise", "done": k}))
-        page.send(Message("renewed", {"resources": {f"plane/{k % 3}": k}}))
+        page.send(fake_answer(version=k))
+        page.send(fake_progress("render", k))
+        page.send(fake_progress("denoise", k))
+        page.send(PictureUpdate(resources={f"plane/{k % 3}": k}))
     unsent = [message for message, _ in page._unsent]
     assert [m.fields.get("version") for m in unsent if m.kind == "answer"] == [999]
     assert [m.fields["done"] for m in unsent if m.kind == "progress"] == [999, 999]
@@ -691,7 +693,7 @@ def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
 
     def said(said: Any, arrays: Any) -> list[Message]:
         asked.append(said)
-        return [Message("fetched", {"name": said.name}, {"picture": np.zeros(100, np.float64)})]
+        return [PictureData(name=said.name, data=np.zeros(100, np.float64))]
 
     session.said = said  # type: ignore[method-assign]
 
@@ -761,11 +763,11 @@ def test_two_pages_that_fight_over_the_session_harm_nobody(served: Served) -> No
 def test_answers_to_what_was_asked_are_not_dropped_and_who_is_too_slow_is_sent_away() -> None:
     page = client.Client(Deaf())
     for k in range(client.MOST_UNSENT):
-        page.send(Message("answer", {}), k)
+        page.send(fake_answer(), k)
     assert len(page._unsent) == client.MOST_UNSENT
-    page.send(Message("answer", {}), 0)
+    page.send(fake_answer(), 0)
     assert page._unsent == []
-    page.send(Message("answer", {}), 1)
+    page.send(fake_answer(), 1)
     assert page._unsent == []
 
 

@@ -399,14 +399,14 @@ def test_a_hand_on_one_of_tied_lights_moves_all_of_them(basis: lp.Basis, space: 
 
 def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
     session = session_of(basis)
-    usual = session.about["meant"]["hold"]
+    usual = session.about["meant"].hold
     assert usual > 0
     session.said(protocol.Set({"hold": 0}), {})
-    assert session.about["meant"]["hold"] == session.moment().settings.hold == 0
+    assert session.about["meant"].hold == session.moment().settings.hold == 0
     assert options_of(session.wishes) == ["--hold 0"]
-    assert session.about["history"]["undo"] == ["What you did not paint"]
+    assert session.about["history"].undo == ("What you did not paint",)
     session.said(protocol.Set({"hold": None}), {})
-    assert session.about["meant"]["hold"] == usual
+    assert session.about["meant"].hold == usual
     session.said(protocol.Undo(), {})
     assert session.about["settings"] == {"hold": 0}
 

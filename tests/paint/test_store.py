@@ -538,7 +538,7 @@ def test_a_painting_is_reached_though_a_look_is_damaged(tmp_path: Path, make_bas
         importance = session.views[0].pixels(session.views[0].whole).importance
         np.testing.assert_array_equal(importance[:, 0], [1] * 4 + [0] * 4 + [1] * 4)
         found = Looks(session, Pictures())
-        assert [one["name"] for one in found.listed()] == ["look 2"]
+        assert [one.name for one in found.listed()] == ["look 2"]
         [said] = store.remarks
         assert "1 step, the look look 1 could not be read" in said
 

@@ -22,7 +22,7 @@ from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.paint import plane_denoiser as cleaning
 from lightpaint.paint import protocol, studio, subject
 from lightpaint.paint import session_exports as exports
-from lightpaint.paint.frames import Message
+from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import picture_table as pictures
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import Moment

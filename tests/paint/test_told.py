@@ -11,13 +11,14 @@ from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.analysis.elsewhere import Elsewhere
 from lightpaint.lighting.analysis.held_back import Loosening, Reason
 from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.paint.protocol import Advice
 from lightpaint.paint.session.answer_messages import (
     HELP,
-    foreseen_fields,
-    help_fields,
+    advice,
+    foreseen,
     helped,
     sketched,
-    unpainted_fields,
+    unpainted_headline,
     why_not_closer,
 )
 from lightpaint.report.sentences import spoken_cause
@@ -97,9 +98,9 @@ def test_a_sketch_is_helped_and_not_judged(missed: float, about: Any, said: str)
 )
 def test_what_a_sentence_advises_is_said_as_data(about: Any, helps: str | None):
     seen = replace(Seen(10.0, 0.0, 20.0, PLACE), **about)
-    cause, fields = helped(seen), help_fields(seen)
+    cause, fields = helped(seen), advice(seen)
     assert (cause and cause.kind) == helps
-    assert (fields and fields["kind"]) == helps
+    assert (fields and fields.kind) == helps
     advised = [held for held, words in HELP.items() if words in sketched(seen)]
     assert advised == [one for one in (helps,) if one in HELP]
 
@@ -107,30 +108,30 @@ def test_what_a_sentence_advises_is_said_as_data(about: Any, helps: str | None):
 def test_a_button_says_what_it_lets_go_and_what_that_brings():
     seen = replace(Seen(10.0, 0.0, 20.0, PLACE), reasons=(OFF, HOLD))
     assert "; annex_window is switched off." in sketched(seen)
-    fields = {"kind": "off", "names": ["annex_window"], "closes": 0.57, "hold": None}
-    assert help_fields(seen) == fields
+    fields = Advice("off", ("annex_window",), closes=0.57, hold=None)
+    assert advice(seen) == fields
     weaker = Loosening(0.8, 0.35, Elsewhere(2.0, 12.0, "annex"))
     held = replace(seen, reasons=(replace(HOLD, loosening=weaker),))
-    assert help_fields(held) == {"kind": "hold", "names": [], "closes": 0.35, "hold": 0.8}
+    assert advice(held) == Advice("hold", (), closes=0.35, hold=0.8)
     assert spoken_cause(held.reasons[0]) == (
         "What is not painted is held near how it is; a hold of 0.8 would take away 35 % of the "
         "miss, and change the annex by ΔE 12."
     )
     # Of what takes several, none closes a share by itself.
     joint = replace(seen, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))
-    told = help_fields(joint)
+    told = advice(joint)
     assert told is not None
-    assert told["closes"] is None
+    assert told.closes is None
 
 
 def test_a_preview_says_what_it_brings_and_what_it_costs():
     annex = Elsewhere(2.0, 12.0, "annex")
     its = {"delta_e": (17.2, 6.9), "is_at_cost": False}
     told = "Closes 57 % of what is missed (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
-    assert foreseen_fields(0.57, annex, **its) == {"text": told, "is_at_cost": False}
-    costly = foreseen_fields(0.57, annex, **{**its, "is_at_cost": True})
-    assert costly == {"text": f"{told} That is more than it brings.", "is_at_cost": True}
-    none = foreseen_fields(0.004, None, **its)["text"]
+    assert foreseen(0.57, annex, **its) == (told, False)
+    costly = foreseen(0.57, annex, **{**its, "is_at_cost": True})
+    assert costly == (f"{told} That is more than it brings.", True)
+    none = foreseen(0.004, None, **its)[0]
     assert none == "Brings the answer no closer."
 
 
@@ -174,8 +175,8 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
 
 @pytest.mark.parametrize("is_asked", [False, True])
 def test_lamps_that_became_white_are_not_called_the_present_lighting(is_asked: bool):
-    said = unpainted_fields(is_asked=is_asked, is_white=True)["headline"]
+    said = unpainted_headline(is_asked=is_asked, is_white=True)
     assert "nearest to its colour" in said
     assert "present lighting" not in said
-    plain = unpainted_fields(is_asked=is_asked, is_white=False)["headline"]
+    plain = unpainted_headline(is_asked=is_asked, is_white=False)
     assert ("present lighting" in plain) != is_asked

@@ -25,10 +25,10 @@ from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import told
-from lightpaint.paint.frames import Message
 from lightpaint.paint.notebook import widget_arguments as cells
 from lightpaint.paint.notebook.widget_files import widget_script, widget_style
 from lightpaint.paint.notebook.widget_views import Places
+from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
@@ -306,7 +306,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         return handler if isinstance(handler, ObserveHandler) else Callback(handler, self._warn)
 
     def _warn(self, text: str) -> None:
-        self._places.tell(Message("say", {"text": text, "tone": "warn"}))
+        self._places.tell(Notice(text=text, tone="warn"))
 
     def _now(self) -> dict[str, Any]:
         """What the session has, by name of what says so; what has not changed is the same object.
@@ -366,8 +366,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             with self._lock:
                 self._heard(message)
 
-        if not self._is_there.is_set() and message.kind in ("state", "say"):
-            self._failed = "" if message.kind == "state" else message.fields["text"]
+        if not self._is_there.is_set() and isinstance(message, SessionState | Notice):
+            self._failed = message.text if isinstance(message, Notice) else ""
             self._is_there.set()
         if self._loop is None:
             act()
@@ -376,7 +376,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _heard(self, message: Message) -> None:
         self._places.tell(message)
-        if message.kind == "state" or message.fields.get("exact"):
+        if isinstance(message, SessionState) or _is_exact(message):
             self._follow()
 
     def _set_once_there(self, name: str, value: Any) -> None:
@@ -397,6 +397,10 @@ def _opened(place: Path | None, identity: Identity) -> Store:
         return MemoryStore(identity)
     with cells.in_a_notebook():
         return Store.open(place, identity)
+
+
+def _is_exact(message: Message) -> bool:
+    return isinstance(message, AnswerUpdate) and message.exact
 
 
 def _running_loop() -> asyncio.AbstractEventLoop | None:

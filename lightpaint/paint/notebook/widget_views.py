@@ -5,8 +5,8 @@ from threading import RLock
 from typing import Any
 
 from lightpaint.paint.background_threads import told, tone_of
-from lightpaint.paint.frames import Message, said_of
-from lightpaint.paint.protocol import VERSION, Hello, Said, TakeOver
+from lightpaint.paint.frames import said_of
+from lightpaint.paint.protocol import VERSION, Closing, Failure, Hello, Message, Said, TakeOver
 from lightpaint.paint.studio import Studio
 
 #: Numbers of messages that one place has at which the painter is shown: `seq // MESSAGES`.
@@ -36,7 +36,7 @@ class Places:
                     self._tell_taken(page, seq)
                     return
         except Exception as error:  # of our own, too, which anywidget would say nothing of
-            answers = [Message("failed", {"text": told(error), "tone": tone_of(error)})]
+            answers = [Failure(text=told(error), tone=tone_of(error))]
         for k, message in enumerate(answers):
             self.tell(message, seq if k == 0 else None)
 
@@ -44,7 +44,7 @@ class Places:
         """What is answered; None to a page that does not have it."""
         if isinstance(said, Hello) and said.version != VERSION:
             text = "lightpaint has been updated: run the cell again"
-            return [Message("closed", {"reason": "version", "text": text})]
+            return [Closing(reason="version", text=text)]
         if isinstance(said, Hello | TakeOver):
             is_back = page == self._page
             self._give(page)
@@ -59,7 +59,7 @@ class Places:
 
     def _tell_taken(self, page: int, reply: int | None = None) -> None:
         text = "the painter is open at another place"
-        self.tell(Message("closed", {"reason": "taken", "text": text}), reply, page=page)
+        self.tell(Closing(reason="taken", text=text), reply, page=page)
 
     def tell(self, message: Message, reply: int | None = None, *, page: int | None = None) -> None:
         """Say it to who has the painter, or to `page`."""

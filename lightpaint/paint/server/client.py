@@ -8,8 +8,21 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import Message, of_frame, said_of, to_frame
-from lightpaint.paint.protocol import VERSION, Hello, Paint, Said, TakeOver
+from lightpaint.paint.frames import of_frame, said_of, to_frame
+from lightpaint.paint.protocol import (
+    VERSION,
+    AnswerUpdate,
+    Closing,
+    Failure,
+    Hello,
+    LookList,
+    Message,
+    Paint,
+    PictureUpdate,
+    ProgressReport,
+    Said,
+    TakeOver,
+)
 
 #: Messages of a page that wait to be answered, and bytes of them, before no more are taken from its
 #: socket.
@@ -207,11 +220,11 @@ def _heard(frame: bytes | None) -> Heard:
         content, buffers = of_frame(frame)
         if _is_other_version(content):
             text = "lightpaint has been updated: load this page again"
-            return Heard(_number(content), None, {}, _closed("version", text))
+            return Heard(_number(content), None, {}, Closing(reason="version", text=text))
         seq, said, arrays = said_of(content, buffers)
         return Heard([seq], said, arrays)
     except PaintError as error:
-        return Heard(_number(content), None, {}, Message("failed", {"text": str(error)}))
+        return Heard(_number(content), None, {}, Failure(text=str(error)))
 
 
 def _is_other_version(content: Mapping[str, Any]) -> bool:
@@ -225,10 +238,6 @@ def _number(content: Mapping[str, Any]) -> list[int]:
     return [seq] if type(seq) is int and 0 <= seq < 2**53 else []
 
 
-def _closed(reason: str, text: str) -> Message:
-    return Message("closed", {"reason": reason, "text": text})
-
-
 def _is_within(inner: tuple[int, ...], outer: tuple[int, ...]) -> bool:
     top, bottom, left, right = outer
     return top <= inner[0] and inner[1] <= bottom and left <= inner[2] and inner[3] <= right
@@ -236,13 +245,13 @@ def _is_within(inner: tuple[int, ...], outer: tuple[int, ...]) -> bool:
 
 def _sort(message: Message) -> tuple[Any, ...] | None:
     """Of messages that nobody asked for: those of which only the newest counts."""
-    if message.kind == "progress":
-        return "progress", message.fields.get("what")
-    return (message.kind,) if message.kind in ("answer", "renewed", "looks") else None
+    if isinstance(message, ProgressReport):
+        return "progress", message.what
+    is_newest = isinstance(message, AnswerUpdate | PictureUpdate | LookList)
+    return (message.kind,) if is_newest else None
 
 
 def _merged(old: Message, new: Message) -> Message:
-    if new.kind != "renewed":
-        return new
-    names = {**old.fields.get("resources", {}), **new.fields.get("resources", {})}
-    return Message("renewed", {**new.fields, "resources": names}, new.arrays)
+    if isinstance(old, PictureUpdate) and isinstance(new, PictureUpdate):
+        return PictureUpdate(resources={**old.resources, **new.resources})
+    return new

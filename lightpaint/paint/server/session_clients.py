@@ -20,8 +20,16 @@ import numpy.typing as npt
 
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import told, tone_of
-from lightpaint.paint.frames import Message
-from lightpaint.paint.protocol import Said
+from lightpaint.paint.protocol import (
+    Acknowledgement,
+    Closing,
+    Failure,
+    Message,
+    PictureData,
+    PictureUpdate,
+    Said,
+    SessionState,
+)
 from lightpaint.paint.server.client import Client, Heard
 from lightpaint.paint.store.store import Store
 from lightpaint.progress import while_wanted
@@ -90,7 +98,7 @@ class Line:
         self._is_over = True
         self.session.on_message = None
         for client in self._clients:
-            client.send(Message("closed", {"reason": "ended", "text": self.farewell}))
+            client.send(Closing(reason="ended", text=self.farewell))
         await _all([client.sent() for client in self._clients])
         await asyncio.to_thread(self._worker.shutdown, cancel_futures=True)
 
@@ -144,7 +152,7 @@ class Line:
             answers = await self._answers(client, heard)
             for message in answers:
                 self._note(message)
-            first, *others = answers or [Message("done")]
+            first, *others = answers or [Acknowledgement()]
             for seq in heard.replies or (None,):
                 client.send(first, seq)
             for message in others:
@@ -169,11 +177,11 @@ class Line:
             assert heard.said is not None
             return await self._done(self.session.said, heard.said, heard.arrays)
         except LightpaintError as error:
-            return [Message("failed", {"text": str(error), "tone": tone_of(error)})]
+            return [Failure(text=str(error), tone=tone_of(error))]
         except Exception as error:
             # A mistake of lightpaint's own: whoever paints goes on, and whoever mends it is told.
             self.say("".join(traceback.format_exception(error)))
-            return [Message("failed", {"text": told(error, at_length=False)})]
+            return [Failure(text=told(error, at_length=False))]
 
     async def _present_holder(self, client: Client) -> Client | None:
         """Who has the session when `client` asks: what one that has left had said is done first."""
@@ -201,9 +209,10 @@ class Line:
 
     def _note(self, message: Message) -> None:
         """Remember which pictures there are by now."""
-        if message.kind in ("state", "renewed"):
-            found = {str(k): int(v) for k, v in message.fields.get("resources", {}).items()}
-            self.generations = found if message.kind == "state" else {**self.generations, **found}
+        if isinstance(message, SessionState):
+            self.generations = dict(message.resources)
+        elif isinstance(message, PictureUpdate):
+            self.generations = {**self.generations, **message.resources}
 
 
 async def _all(waits: list[Coroutine[Any, Any, None]]) -> None:
@@ -216,7 +225,7 @@ async def _all(waits: list[Coroutine[Any, Any, None]]) -> None:
 
 
 def _taken(text: str) -> Message:
-    return Message("closed", {"reason": "taken", "text": text})
+    return Closing(reason="taken", text=text)
 
 
 def _same_page(holder: Client | None, client: Client) -> bool:
@@ -228,4 +237,4 @@ async def pictured(line: Line, name: str) -> Message:
     """A picture as a message, whose bytes can be sent. Raises PaintError."""
     if len(name) > 200:
         raise PaintError("no picture has such a name")
-    return Message("fetched", {"name": name}, {"picture": await line.resource(name)})
+    return PictureData(name=name, data=await line.resource(name))

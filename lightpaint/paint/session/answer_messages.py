@@ -1,8 +1,7 @@
 """What a page is told of an answer: short sentences, and of each light what people go by."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from lightpaint.lighting.analysis.diagnosis import parts_of_miss
 from lightpaint.lighting.analysis.elsewhere import Elsewhere
 from lightpaint.lighting.analysis.held_back import Reason
 from lightpaint.lighting.analysis.seen import UNSEEN, Seen
+from lightpaint.paint.protocol import Advice, Closeness, Findings, LightAnswer, LightInfo
 from lightpaint.report.sentences import (
     MET,
     spoken_amount,
@@ -67,78 +67,112 @@ PARTS = {
 ASKED = {"forbidden": "would need lights of other colours or levels than they may have"}
 
 
-def light_fields(light: BasisLight) -> dict[str, Any]:
-    """Of a light, what does not change."""
-    members = list(light.members)
-    return {
-        "name": light.name,
-        "label": light.name,
-        "unit": light.unit,
-        "parameter": light.parameter,
-        "plugin": light.plugin,
-        "form": light.form,
-        "members": members,
-        "group": light.name if len(members) > 1 else None,
-        "present": list(light.emission),
-        "is_fixed": light.is_fixed,
-        "is_scalar": light.is_scalar,
-    }
+def light_info(light: BasisLight, scale: float) -> LightInfo:
+    """Return what does not change of a light. scale: as of `LightInfo`."""
+    members = tuple(light.members)
+    return LightInfo(
+        name=light.name,
+        label=light.name,
+        unit=light.unit,
+        parameter=light.parameter,
+        plugin=light.plugin,
+        form=light.form,
+        members=members,
+        group=light.name if len(members) > 1 else None,
+        present=light.emission,
+        is_fixed=light.is_fixed,
+        is_scalar=light.is_scalar,
+        scale=scale,
+    )
 
 
-def answer_fields(bases: Sequence[Basis], weights: Doubles) -> dict[str, Any]:
-    """Of each light as it is answered: emission, change, colour, part of the picture.
+def answer_findings(bases: Sequence[Basis], weights: Doubles) -> Findings:
+    """Return what is known of each light at once: emission, change, colour, part of the picture.
 
     Of several views `shares` has its part of each, too.
     """
     lit = [(basis.totals * weights) @ LUMINANCE for basis in bases]
-    lights = [
+    lights = tuple(
         _light(light, weight, share)
         for light, weight, share in zip(bases[0].lights, weights, _shares(sum(lit)), strict=True)
-    ]
-    return {"lights": lights} | ({"shares": [_shares(x) for x in lit]} if len(bases) > 1 else {})
+    )
+    shares = tuple(_shares(x) for x in lit) if len(bases) > 1 else None
+    return Findings(lights=lights, shares=shares)
 
 
-def _shares(lit: Doubles) -> list[float]:
+def _shares(lit: Doubles) -> tuple[float, ...]:
     whole = float(lit.sum())
-    return [float(x) / whole if whole > 0 else 0.0 for x in lit]
+    return tuple(float(x) / whole if whole > 0 else 0.0 for x in lit)
 
 
-def _light(light: BasisLight, weight: Doubles, share: float) -> dict[str, Any]:
+def _light(light: BasisLight, weight: Doubles, share: float) -> LightAnswer:
     seen = photometry(as_rgb(weight), unit=light.unit)
     now, then = (float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight))
     is_white = seen.kelvin is not None and seen.duv is not None and abs(seen.duv) <= WHITE
-    return {
-        "emission": [float(x) for x in weight],
-        "stops": float(np.log2(then / now)) if now > 0 and then > OFF * now else None,
-        "kelvin": seen.kelvin if is_white else None,
-        "swatch": seen.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
-        "is_on": then > OFF * now,
-        "share": share,
-    }
+    return LightAnswer(
+        emission=as_rgb(weight),
+        stops=float(np.log2(then / now)) if now > 0 and then > OFF * now else None,
+        kelvin=seen.kelvin if is_white else None,
+        swatch=seen.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
+        is_on=then > OFF * now,
+        share=share,
+    )
 
 
-def analysis_fields(analyses: Sequence[Analysis], painted: Sequence[int]) -> dict[str, Any]:
-    """The headline, what holds the lights, and of each light how sure it is and whether held.
+@dataclass(frozen=True)
+class Judgement:
+    """What the analysis of an answer says.
+
+    worst: of the view that is missed most. of_views: of each view; None for one that is not
+    painted. lights: `error`, `held` and `unreached` of each, as of `LightAnswer`.
+    """
+
+    worst: Closeness
+    of_views: tuple[Closeness | None, ...]
+    lights: tuple[tuple[str | None, bool, bool], ...]
+
+    def completes(self, found: Findings) -> Findings:
+        """Return the findings at once, with what the analysis says."""
+        lights = tuple(
+            replace(light, error=error, held=is_held, unreached=is_unreached)
+            for light, (error, is_held, is_unreached) in zip(
+                found.lights or (), self.lights, strict=True
+            )
+        )
+        worst = self.worst
+        return replace(
+            found,
+            lights=lights,
+            headline=worst.headline,
+            help=worst.help,
+            delta_e=worst.delta_e,
+            delta_e_asked=worst.delta_e_asked,
+            sentences=worst.sentences,
+            of_views=self.of_views,
+        )
+
+
+def judgement(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
+    """Return the headline, what holds the lights, and how sure each is and whether it is held.
 
     painted: the view of each analysis. What is said of the whole is of the view missed most.
     """
     solution = analyses[0].solution
     errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
     settings = solution.lighting.lights
-    of_views = {view: _seen_fields(its) for view, its in zip(painted, analyses, strict=True)}
-    worst = max(of_views.values(), key=lambda its: float(its["delta_e"]))
-    return {
-        **worst,
-        "of_views": [of_views.get(k) for k in range(max(painted) + 1)],
-        "of_lights": [
-            {"error": error, "held": its.is_active, "unreached": not any(its.reached)}
+    of_views = {view: _closeness(its) for view, its in zip(painted, analyses, strict=True)}
+    return Judgement(
+        worst=max(of_views.values(), key=lambda its: its.delta_e),
+        of_views=tuple(of_views.get(k) for k in range(max(painted) + 1)),
+        lights=tuple(
+            (error, its.is_active, not any(its.reached))
             for error, its in zip(errors, settings, strict=True)
-        ],
-    }
+        ),
+    )
 
 
-def unpainted_fields(*, is_asked: bool, is_white: bool) -> dict[str, Any]:
-    """What is said before anything is painted, and after all of it has been undone.
+def unpainted_headline(*, is_asked: bool, is_white: bool) -> str:
+    """Say what the answer is before anything is painted, and after all of it has been undone.
 
     is_asked: whether something is asked of the lights. is_white: whether all are to be white.
     """
@@ -148,7 +182,7 @@ def unpainted_fields(*, is_asked: bool, is_white: bool) -> dict[str, Any]:
     if is_asked:
         also = ", and keeps to what you ask of it" if is_white else ", but for what you ask of them"
         stay = f"{stay if is_white else 'the lights stay as they are'}{also}"
-    return {"headline": f"Nothing is painted: {stay}.", "help": None, "of_views": None}
+    return f"Nothing is painted: {stay}."
 
 
 def sketched(seen: Seen) -> str:
@@ -214,38 +248,35 @@ def helped(seen: Seen) -> Reason | None:
     return None if first.kind == "views" else first
 
 
-def help_fields(seen: Seen) -> dict[str, Any] | None:
-    """The same for a page, whose button it is: what to let go of, and what that would bring.
-
-    closes: share of what is missed; None where it takes more than that. hold: the weaker one.
-    """
+def advice(seen: Seen) -> Advice | None:
+    """Return the same for a page, whose button it is: what to let go of, and what that brings."""
     if (cause := helped(seen)) is None:
         return None
-    fields: dict[str, Any] = {"kind": cause.kind, "names": list(cause.names)}
-    if cause.kind != "hold":
-        return fields | {"closes": None if cause.is_joint else cause.share, "hold": None}
+    kind, names = cause.kind, tuple(cause.names)
+    if kind != "hold":
+        return Advice(kind, names, None if cause.is_joint else cause.share, None)
     weaker = cause.loosening
     if weaker is None:
-        return fields | {"closes": None, "hold": 0.0}
-    return fields | {"closes": weaker.share, "hold": weaker.hold}
+        return Advice(kind, names, None, 0.0)
+    return Advice(kind, names, weaker.share, weaker.hold)
 
 
-def _seen_fields(analysis: Analysis) -> dict[str, Any]:
-    """How close one view is, and why not closer."""
+def _closeness(analysis: Analysis) -> Closeness:
+    """Return how close one view is, and why not closer."""
     seen = analysis.seen
-    return {
-        "headline": sketched(seen),
-        "help": help_fields(seen),
-        "delta_e": seen.delta_e,
-        "delta_e_asked": seen.asked,
-        "sentences": [] if seen.is_close else what_holds(analysis.diagnosis, seen),
-    }
+    return Closeness(
+        headline=sketched(seen),
+        help=advice(seen),
+        delta_e=seen.delta_e,
+        delta_e_asked=seen.asked,
+        sentences=() if seen.is_close else tuple(what_holds(analysis.diagnosis, seen)),
+    )
 
 
-def foreseen_fields(
+def foreseen(
     closes: float, rest: Elsewhere | None, *, delta_e: tuple[float, float], is_at_cost: bool
-) -> dict[str, Any]:
-    """Say what a change would bring, before it is made.
+) -> tuple[str, bool]:
+    """Say what a change would bring, before it is made, and whether it changes more than that.
 
     closes: share of what is missed that it takes away. rest: what it changes where nobody painted.
     delta_e: over the paint, now and then. is_at_cost: whether it changes more than it brings.
@@ -256,7 +287,7 @@ def foreseen_fields(
     else:
         said = "Brings the answer no closer"
     if rest is None or rest.worst < UNSEEN:
-        return {"text": f"{said}.", "is_at_cost": False}
+        return f"{said}.", False
     told = f"{said}, and changes {spoken_changed(rest)}."
     more = " That is more than it brings." if is_at_cost else ""
-    return {"text": told + more, "is_at_cost": is_at_cost}
+    return told + more, is_at_cost

@@ -8,9 +8,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from lightpaint.arrays import as_rgb
 from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.paint.frames import Message
-from lightpaint.paint.protocol import CopyLook, DropLook, LoadLook, MixLooks, RenameLook, SaveLook
+from lightpaint.paint.protocol import (
+    CopyLook,
+    DropLook,
+    LoadLook,
+    LookInfo,
+    LookList,
+    Message,
+    MixLooks,
+    RenameLook,
+    SaveLook,
+)
 from lightpaint.paint.session.picture_table import Pictures, small_picture
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.pixels import Pixels
@@ -40,18 +50,18 @@ class Looks:
         for look in session.store.looks():
             self._offer(look)
 
-    def listed(self) -> list[dict[str, Any]]:
-        """What a page is told of each."""
-        return [
-            {
-                "id": look.id,
-                "name": look.fields["name"],
-                "stamp": look.fields.get("stamp"),
-                "weights": np.asarray(look.arrays["weights"]).tolist(),
-                "thumbnail": f"look/{look.id}",
-            }
+    def listed(self) -> tuple[LookInfo, ...]:
+        """Return what clients are told of each."""
+        return tuple(
+            LookInfo(
+                id=look.id,
+                name=look.fields["name"],
+                stamp=look.fields.get("stamp"),
+                weights=tuple(map(as_rgb, np.asarray(look.arrays["weights"]))),
+                thumbnail=f"look/{look.id}",
+            )
             for look in self._session.store.looks()
-        ]
+        )
 
     def said(self, message: OfLooks) -> Message:
         """What has come of a message. Raises PaintError for a look that there is none of."""
@@ -73,7 +83,7 @@ class Looks:
                 store.drop_look(self._look(number).id)
                 for k in range(len(self._session.views)):
                     self._pictures.withdraw(of_view(f"look/{number}", k))
-        return Message("looks", {"looks": self.listed(), "resources": self._pictures.named()})
+        return LookList(looks=self.listed(), resources=self._pictures.named())
 
     def load(self, message: LoadLook) -> list[Message]:
         """Go on from a look."""

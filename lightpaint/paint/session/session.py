@@ -11,6 +11,7 @@ paintings.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,8 @@ from lightpaint.errors import LightpaintError, NothingToUndoError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
-from lightpaint.paint.frames import Message
-from lightpaint.paint.session.answer_messages import answer_fields, unpainted_fields
+from lightpaint.paint.protocol import AnswerUpdate, CanvasPatch, Message
+from lightpaint.paint.session.answer_messages import Judgement, answer_findings, unpainted_headline
 from lightpaint.paint.session.canvas import Canvases
 from lightpaint.paint.session.live_answer import Answering
 from lightpaint.paint.session.snapshot import Moment
@@ -203,63 +204,59 @@ class Session:
                 return [self._wish(", ".join(TITLES[key] for key in message.values), wishes)]
         raise PaintError(f"a session has no answer to {type(message).__name__}")
 
-    def answer(self, **more: Any) -> Message:
-        """The weights as they are, while the brush is down."""
+    def answer(self, **more: Any) -> AnswerUpdate:
+        """Return the weights as they are, while the brush is down. more: further fields."""
         about = {"stroke": self._stroke, "exact": False, "version": self.version}
-        return Message("answer", {**about, "mode": self.answering.mode, **more}, self.weights_array)
-
-    @property
-    def weights_array(self) -> dict[str, Doubles]:
-        """As messages have them."""
-        return {"weights": self.weights}
+        mode, weights = self.answering.mode, self.weights
+        return AnswerUpdate(**{**about, "mode": mode, "weights": weights, **more})
 
     def settled(
-        self,
-        moment: Moment,
-        solution: Solution | None,
-        *,
-        of_lights: Sequence[Mapping[str, Any]] = (),
-        **more: Any,
-    ) -> Message | None:
+        self, moment: Moment, solution: Solution | None, judged: Judgement | None = None
+    ) -> AnswerUpdate | None:
         """The exact answer to `moment`, if nothing has changed since.
 
-        of_lights, more: what is known of each light, and of the whole.
+        judged: what is known of it, once that is.
         """
         if moment.version != self.version:
             return None
         if solution is not None:
             self.answering.weights = solution.weights
-        else:
-            more |= self.unpainted
-        answer = answer_fields([view.basis for view in self.views], self.weights)
-        for light, known in zip(answer["lights"], of_lights, strict=bool(of_lights)):
-            light |= known
-        return self.answer(**{**self.about, **more, **answer, "exact": True})
+        found = self.findings
+        if judged is not None:
+            found = judged.completes(found)
+        known = {name: getattr(found, name) for name in protocol.Findings.__dataclass_fields__}
+        return self.answer(**self.about, **known, exact=True)
 
     @property
-    def unpainted(self) -> dict[str, Any]:
+    def findings(self) -> protocol.Findings:
+        """What is known of the answer at once."""
+        found = answer_findings([view.basis for view in self.views], self.weights)
+        return found if self.is_painted else replace(found, headline=self.unpainted)
+
+    @property
+    def unpainted(self) -> str:
         """What is said of the answer while nothing is painted."""
         is_white = self.answering.fit.colors == "white"
         # What was asked before the session began counts as well.
         is_other = not np.allclose(self.weights, self.answering.basis.present_weights)
         is_asked = bool(self.wishes.lights) or (is_other and not is_white)
-        return unpainted_fields(is_asked=is_asked, is_white=is_white)
+        return unpainted_headline(is_asked=is_asked, is_white=is_white)
 
     @property
     def about(self) -> dict[str, Any]:
-        """What can be undone, and what is asked: part of most messages."""
+        """What can be undone, and what is asked: the fields of `Standing`."""
         steps, position = self.store.steps, self.store.position
         fit = self.answering.fit
         return {
-            "history": {
-                "undo": [self._called(step) for step in steps[:position][-50:]],
-                "redo": [self._called(step) for step in steps[position:][:50]],
-                "count": position,
-            },
+            "history": protocol.HistoryInfo(
+                undo=tuple(self._called(step) for step in steps[:position][-50:]),
+                redo=tuple(self._called(step) for step in steps[position:][:50]),
+                count=position,
+            ),
             "asked": {name: dict(its) for name, its in self.wishes.lights.items()},
-            "ties": [list(names) for names in self.wishes.ties],
+            "ties": self.wishes.ties,
             "settings": dict(self.wishes.values),
-            "meant": {"space": fit.space, "hold": fit.hold, "colors": fit.colors},
+            "meant": protocol.ResolvedFit(fit.space, fit.hold, fit.colors),
         }
 
     def _called(self, step: Step) -> str:
@@ -421,15 +418,24 @@ class Session:
 
     def _patched(self, *where: tuple[int, Region]) -> list[Message]:
         """What the canvases hold there now: a message for each view, the first one's if nowhere."""
-        about: dict[str, Any] = {"version": self.version, "exact": False, "stroke": self._stroke}
-        about |= {"mode": self.answering.mode, "views": [view for view, _ in where], **self.about}
-        made = []
+        views = tuple(view for view, _ in where)
+        made: list[Message] = []
         for view, region in where or ((0, (0, 0, 0, 0)),):
             image, importance, _ = self.views[view].pixels(region)
-            fields = {"region": list(region), "view": view, **about}
-            arrays: dict[str, npt.NDArray[Any]] = {"image": image, "importance": importance}
-            arrays |= self.weights_array
-            made.append(Message("patch", fields, arrays))
+            patch = CanvasPatch(
+                region=region,
+                view=view,
+                views=views,
+                version=self.version,
+                stroke=self._stroke,
+                exact=False,
+                mode=self.answering.mode,
+                image=image,
+                importance=importance,
+                weights=self.weights,
+                **self.about,
+            )
+            made.append(patch)
         return made
 
 

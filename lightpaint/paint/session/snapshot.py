@@ -19,7 +19,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.paint.session.answer_messages import foreseen_fields, why_not_closer
+from lightpaint.paint.session.answer_messages import foreseen, why_not_closer
 from lightpaint.paint.session.picture_table import Picture, small_picture
 from lightpaint.paint.store.requests import Wishes
 from lightpaint.settings import Settings
@@ -112,9 +112,7 @@ class Moment:
         planes, transform = clean or self.bases[view], self.transform
         before, then = (small_picture(planes.mix(x), transform) for x in (weights, after))
         if solution is None:
-            return Foresight(
-                before, then, foreseen_fields(0.0, None, delta_e=(0, 0), is_at_cost=False)
-            )
+            return Foresight(before, then, *foreseen(0.0, None, delta_e=(0, 0), is_at_cost=False))
         judged = view if view in self.painted else self.painted[0]
         its = solution.views[self.painted.index(judged)]
         look, target = Looking.at(its.problem), its.problem.views.targets[0]
@@ -126,19 +124,18 @@ class Moment:
         seen = look.mean(look.missed(lights[0])), look.mean(look.missed(lights[1]))
         gained = seen[0] - seen[1]
         is_at_cost = rest is not None and rest.worst > NOTICED and rest.delta_e > gained
-        return Foresight(
-            before, then, foreseen_fields(closes, rest, delta_e=seen, is_at_cost=is_at_cost)
-        )
+        return Foresight(before, then, *foreseen(closes, rest, delta_e=seen, is_at_cost=is_at_cost))
 
 
 @dataclass(frozen=True)
 class Foresight:
     """What a change would do, before it is made.
 
-    before, after: (h, w, 3) uint8, small pictures of the answer as a display shows it. fields: what
-    a page is told of it.
+    before, after: (h, w, 3) uint8, small pictures of the answer as a display shows it. text: what
+    it would do. is_at_cost: whether it changes more than it brings.
     """
 
     before: Picture
     after: Picture
-    fields: dict[str, Any]
+    text: str
+    is_at_cost: bool

@@ -8,9 +8,9 @@ import numpy as np
 
 from lightpaint.basis.clean import CleanPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.colour.transform import ViewTransform
+from lightpaint.paint.protocol import ViewInfo
 from lightpaint.paint.session import picture_table as pictures
-from lightpaint.paint.session.answer_messages import light_fields
-from lightpaint.paint.session.canvas import Canvas, Canvases
+from lightpaint.paint.session.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture, Pictures
 from lightpaint.paint.store.steps import of_view
 
@@ -62,22 +62,12 @@ def _rough(planes: RoughPlanes, k: int) -> Picture:
     return as_halves(planes.plane(k), scale_of(planes.basis.images[k]))
 
 
-def fields_of_views(views: Canvases) -> dict[str, Any]:
-    """Size, lights and objects, as of the first view, and `views` with those of each."""
-    each = [_view_fields(view) for view in views]
-    lights = [
-        {**light_fields(light), "scale": scale}
-        for light, scale in zip(views[0].basis.lights, each[0]["scales"], strict=True)
-    ]
-    first = {"size": each[0]["size"], "objects": each[0]["objects"]}
-    return {**first, "lights": lights, "views": each}
-
-
-def _view_fields(view: Canvas) -> dict[str, Any]:
-    objects = view.basis.objects
-    return {
-        "name": view.name,
-        "size": list(view.size),
-        "objects": [] if objects is None else list(objects.names),
-        "scales": [scale_of(plane) for plane in view.basis.images],
-    }
+def view_info(view: Canvas) -> ViewInfo:
+    """Return what clients are told of a view."""
+    objects, (height, width) = view.basis.objects, view.size
+    return ViewInfo(
+        name=view.name,
+        size=(height, width),
+        objects=() if objects is None else tuple(objects.names),
+        scales=tuple(scale_of(plane) for plane in view.basis.images),
+    )

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from raw_message import RawMessage
 
-from lightpaint.paint.frames import Message, of_frame, said_of, to_frame
+from lightpaint.paint.frames import of_frame, said_of, to_frame
 from lightpaint.paint.protocol import VERSION
 
 
@@ -237,7 +238,7 @@ def test_frames_are_those_of_the_library(page: Any):
     np.testing.assert_array_equal(arrays["importance"], 1)
     # And back.
     weights = np.random.default_rng(0).random((3, 3))
-    message = Message("answer", {"stroke": 3, "name": "é"}, {"weights": weights, "b": image[0]})
+    message = RawMessage("answer", {"stroke": 3, "name": "é"}, {"weights": weights, "b": image[0]})
     sent = list(to_frame(message.content(7), message.buffers()))
     got = page.evaluate(
         """async (bytes) => {

@@ -1,19 +1,14 @@
-"""What a page may say to its session: typed messages, with arrays beside them.
+"""What clients of a session send: requests, with arrays beside them.
 
-`frames.py` says how they travel. The page numbers its messages (`seq`), and every one of them is
-answered by one that gives the number back (`reply`), errors included: the page keeps one stroke in
-flight, and the newest wins. Lights, views and objects are known by their place in what `state`
-lists. A region is rows and columns of a picture, `[top, bottom, left, right]`, the ends not
-included. Colours are linear Rec.709.
-
-Pictures are fetched, and not sent: `resources` in `state` and `renewed` say which there are, those
-of views but the first as `plane/3@1`.
+Clients number their messages (`seq`), and every one of them is answered by one that gives the
+number back (`reply`), errors included: a page keeps one stroke in flight, and the newest wins.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal, get_args
 
+from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.store.pixels import Region
 
 #: Of this protocol; a page of another one is told to load itself anew.
@@ -21,7 +16,7 @@ VERSION = 2
 
 
 @dataclass(frozen=True)
-class Hello:
+class Hello(Message, kind="hello"):
     """The first message of a page, and again after a dropped connection. Answered by `state`, or
     by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
     """
@@ -30,7 +25,7 @@ class Hello:
 
 
 @dataclass(frozen=True)
-class Paint:
+class Paint(Message, kind="paint"):
     """Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
     (rows, columns) float32. Answered by `answer`.
 
@@ -38,6 +33,11 @@ class Paint:
     picture with it: only then is the stroke kept. label: what undo calls it. view: of which picture
     it is.
     """
+
+    buffers_given: ClassVar[Mapping[str, str]] = {
+        "image": "(rows, columns, 3) float32",
+        "importance": "(rows, columns) float32",
+    }
 
     stroke: int
     region: Region
@@ -51,24 +51,24 @@ class Paint:
 
 
 @dataclass(frozen=True)
-class Drop:
+class Drop(Message, kind="drop"):
     """Forget the stroke that is not done. Answered by `patch`."""
 
     stroke: int
 
 
 @dataclass(frozen=True)
-class Undo:
+class Undo(Message, kind="undo"):
     """Take the last step back, of paint or of what is asked. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
-class Redo:
+class Redo(Message, kind="redo"):
     """Do again what was taken back. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
-class Ask:
+class Ask(Message, kind="ask"):
     """What is asked of one light from now on; nothing frees it. Answered by `answer`.
 
     asked: keys and values as in a lights file: lock, off, limits, color, kelvin, duv, primaries.
@@ -81,7 +81,7 @@ class Ask:
 
 
 @dataclass(frozen=True)
-class AskAll:
+class AskAll(Message, kind="ask_all"):
     """What is asked of several lights from now on, by name, as of `Ask`: one step. Answered by
     `answer`.
     """
@@ -90,14 +90,14 @@ class AskAll:
 
 
 @dataclass(frozen=True)
-class Tie:
+class Tie(Message, kind="tie"):
     """Which lights are on one dimmer: all such groups, of names. Answered by `answer`."""
 
     ties: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
-class Set:
+class Set(Message, kind="set"):
     """How the painting is answered, as of `Fit`. Answered by `answer`.
 
     values: of hold, space, colors, literal, prefer_current, sparse; null for what follows from
@@ -108,7 +108,7 @@ class Set:
 
 
 @dataclass(frozen=True)
-class Preview:
+class Preview(Message, kind="preview"):
     """What a change would do, before it is made. Answered by `started`, later by `previewed`, with
     small pictures of the answer now and then, `before` and `after` (h, w, 3) uint8.
 
@@ -124,21 +124,21 @@ class Preview:
 
 
 @dataclass(frozen=True)
-class SaveLook:
+class SaveLook(Message, kind="save_look"):
     """Keep painting and answer under a name. Answered by `looks`."""
 
     name: str
 
 
 @dataclass(frozen=True)
-class LoadLook:
+class LoadLook(Message, kind="load_look"):
     """Go on from a look; a step that can be undone. Answered by `patch`."""
 
     look: int
 
 
 @dataclass(frozen=True)
-class RenameLook:
+class RenameLook(Message, kind="rename_look"):
     """Answered by `looks`."""
 
     look: int
@@ -146,14 +146,14 @@ class RenameLook:
 
 
 @dataclass(frozen=True)
-class CopyLook:
+class CopyLook(Message, kind="copy_look"):
     """Answered by `looks`."""
 
     look: int
 
 
 @dataclass(frozen=True)
-class MixLooks:
+class MixLooks(Message, kind="mix_looks"):
     """Keep what lies between two looks: a look whose lights are held at the share `part` of the way
     from the first to the second. Answered by `looks`.
     """
@@ -165,14 +165,14 @@ class MixLooks:
 
 
 @dataclass(frozen=True)
-class DropLook:
+class DropLook(Message, kind="drop_look"):
     """Answered by `looks`."""
 
     look: int
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(Message, kind="export"):
     """Write results to the folder of the session, or stop that. Answered by `started`, later by
     `exported`, which names what was written; of one that was stopped, too.
 
@@ -184,7 +184,7 @@ class Export:
 
 
 @dataclass(frozen=True)
-class Verify:
+class Verify(Message, kind="verify"):
     """Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
     `stopped` once nothing is rendered any more.
     """
@@ -194,7 +194,7 @@ class Verify:
 
 
 @dataclass(frozen=True)
-class Explain:
+class Explain(Message, kind="explain"):
     """Why a view is not closer. Answered by `started`, later by `explained` and the picture
     `beyond`.
     """
@@ -203,12 +203,12 @@ class Explain:
 
 
 @dataclass(frozen=True)
-class TakeOver:
+class TakeOver(Message, kind="take_over"):
     """Go on here, and not on the page that has the session. Answered by `state`."""
 
 
 @dataclass(frozen=True)
-class Fetch:
+class Fetch(Message, kind="fetch"):
     """Where there is no HTTP: answered by `fetched`, with the picture as its array."""
 
     name: str
@@ -239,26 +239,5 @@ Said = (
     | Fetch
 )
 
-KINDS: Mapping[str, type[Any]] = {
-    "hello": Hello,
-    "paint": Paint,
-    "drop": Drop,
-    "undo": Undo,
-    "redo": Redo,
-    "ask": Ask,
-    "ask_all": AskAll,
-    "tie": Tie,
-    "set": Set,
-    "preview": Preview,
-    "save_look": SaveLook,
-    "load_look": LoadLook,
-    "rename_look": RenameLook,
-    "copy_look": CopyLook,
-    "mix_looks": MixLooks,
-    "drop_look": DropLook,
-    "export": Export,
-    "verify": Verify,
-    "explain": Explain,
-    "take_over": TakeOver,
-    "fetch": Fetch,
-}
+#: The same by kind.
+KINDS: Mapping[str, type[Any]] = {request.kind: request for request in get_args(Said)}

@@ -1,0 +1,693 @@
+// Made by `python -m lightpaint.paint.protocol.typescript` of the dataclasses.
+
+/** An array; float16 is the bits of halves in a Uint16Array.  */
+export interface Picture {
+  data: Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array;
+  shape: number[];
+}
+export type RGB = [number, number, number];
+/** Rows and columns of the picture, ends not included. */
+export type Region = [top: number, bottom: number, left: number, right: number];
+
+/**
+ * What does not change of a light.
+ *
+ * present: its emission before anything was painted. parameter, plugin: where the scene has it.
+ * form: how the scene writes its emission. members: emitters that it is a group of. group: name
+ * of that group; null for a single emitter. is_fixed: whether it is kept as it is. is_scalar:
+ * whether it has one number for all channels. scale: what its stored plane is multiplied by.
+ */
+export interface LightInfo {
+  name: string;
+  label: string;
+  unit: string;
+  parameter: string;
+  plugin: string;
+  form: string;
+  members: string[];
+  group: string | null;
+  present: RGB;
+  is_fixed: boolean;
+  is_scalar: boolean;
+  scale: number;
+}
+
+/**
+ * One picture that is painted.
+ *
+ * size: height and width in pixels. objects: names, in the order of the picture `objects`.
+ * scales: what the stored plane of each light is multiplied by.
+ */
+export interface ViewInfo {
+  name: string;
+  size: [number, number];
+  objects: string[];
+  scales: number[];
+}
+
+/**
+ * A look that is kept. stamp: when, in seconds since 1970. thumbnail: name of its picture.
+ */
+export interface LookInfo {
+  id: number;
+  name: string;
+  stamp: number | null;
+  weights: RGB[];
+  thumbnail: string;
+  is_proposal: boolean;
+}
+
+/**
+ * The view transform that the pictures are seen through, and its exposure in stops.
+ */
+export interface TransformInfo {
+  name: string;
+  stops: number;
+}
+
+/**
+ * The grid of the view transforms' tables: points on a side, lowest and highest log2 light.
+ */
+export interface TableInfo {
+  side: number;
+  low: number;
+  high: number;
+}
+
+/**
+ * Samples per pixel that have been rendered, and that are wanted.
+ */
+export interface SampleCount {
+  spp: number;
+  wanted: number;
+  done: boolean;
+}
+
+/**
+ * Labels of the last steps that can be taken back and done again; count: of all steps.
+ */
+export interface HistoryInfo {
+  undo: string[];
+  redo: string[];
+  count: number;
+}
+
+/**
+ * How the painting is answered where nobody has set it, as of `lightpaint.Fit`.
+ */
+export interface ResolvedFit {
+  space: string | null;
+  hold: number | null;
+  colors: string | null;
+}
+
+/**
+ * What keeps the lights from the paint and can be let go of.
+ *
+ * kind: of the constraint. names: lights of which it was asked. closes: share of what is missed
+ * that goes without it; null where it takes more than that. hold: the weaker hold to set.
+ */
+export interface Advice {
+  kind: string;
+  names: string[];
+  closes: number | null;
+  hold: number | null;
+}
+
+/**
+ * How close an answer is in one view. delta_e_asked: ΔE of the present look.
+ */
+export interface Closeness {
+  headline: string;
+  help: Advice | null;
+  delta_e: number;
+  delta_e_asked: number;
+  sentences: string[];
+}
+
+/**
+ * The answer for one light.
+ *
+ * stops: against its present emission; null where it is, or was, off. kelvin: null for what is no
+ * white. share: of the light in the picture. error: how sure it is, in words. held: whether a
+ * constraint holds it. unreached: whether no paint asks for it.
+ */
+export interface LightAnswer {
+  emission: RGB;
+  stops: number | null;
+  kelvin: number | null;
+  swatch: string;
+  is_on: boolean;
+  share: number;
+  error?: string;
+  held?: boolean;
+  unreached?: boolean;
+}
+
+/**
+ * What is known of an exact answer; the sentences come later than the lights.
+ *
+ * lights: in the order of the state. shares: of each light, by view, where there are several.
+ * of_views: how close each view is; null for views that are not painted.
+ */
+export interface Findings {
+  lights?: LightAnswer[];
+  shares?: number[][];
+  headline?: string;
+  help?: Advice;
+  delta_e?: number;
+  delta_e_asked?: number;
+  sentences?: string[];
+  of_views?: (Closeness | null)[];
+}
+
+/**
+ * What can be undone, and what is asked of the lights and of the answer.
+ *
+ * asked: by name of light, keys and values as in a lights file. ties: names on one dimmer.
+ * settings: what somebody has set. meant: what that comes to.
+ */
+export interface Standing {
+  history?: HistoryInfo;
+  asked?: Record<string, Record<string, any>>;
+  ties?: string[][];
+  settings?: Record<string, any>;
+  meant?: ResolvedFit;
+}
+
+/**
+ * All there is: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
+ * gets better. All lists of lights are in the order of `lights`.
+ *
+ * version: of this protocol. size: height and width of the first view, and `objects` its names.
+ * lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
+ * that grows when one is made anew. verified: the last render of each view. first: whether nothing
+ * was ever done. stroke: number of the last stroke that was heard of. command: that answers the
+ * exported paintings. is_back: the client had the session before, and nobody since. weights:
+ * (lights, 3) float64, the last answer.
+ */
+export interface SessionState {
+  kind: 'state';
+  reply?: number;
+  history?: HistoryInfo;
+  asked?: Record<string, Record<string, any>>;
+  ties?: string[][];
+  settings?: Record<string, any>;
+  meant?: ResolvedFit;
+  version: number;
+  scene: string;
+  folder: string;
+  can_render: boolean;
+  can_report: boolean;
+  size: [number, number];
+  objects: string[];
+  lights: LightInfo[];
+  views: ViewInfo[];
+  transforms: string[];
+  transform: TransformInfo;
+  lut: TableInfo;
+  resources: Record<string, number>;
+  looks: LookInfo[];
+  basis: SampleCount;
+  verified: Omit<VerificationResult, 'kind' | 'arrays'>[];
+  first: boolean;
+  stroke: number;
+  command: string;
+  answer: Findings;
+  is_back: boolean;
+  arrays: { weights: Picture };
+}
+
+/**
+ * There is no picture yet; `state` follows. text: why, if something went wrong.
+ */
+export interface SessionPending {
+  kind: 'waiting';
+  reply?: number;
+  version: number;
+  scene: string;
+  folder: string;
+  can_render: boolean;
+  can_report: boolean;
+  text: string;
+  progress: Omit<ProgressReport, 'kind' | 'arrays'> | null;
+  is_back: boolean;
+  arrays: {  };
+}
+
+/**
+ * The lights as they are now: the answer to what is painted or asked, and unasked once the
+ * exact answer is there, and again when more is known of it.
+ *
+ * version: grows with every change of the session. stroke: the last one that was heard of. exact:
+ * whether it is what `lightpaint solve` finds. mode: how it was found under the brush. weights:
+ * (lights, 3) float64.
+ */
+export interface AnswerUpdate {
+  kind: 'answer';
+  reply?: number;
+  lights?: LightAnswer[];
+  shares?: number[][];
+  headline?: string;
+  help?: Advice;
+  delta_e?: number;
+  delta_e_asked?: number;
+  sentences?: string[];
+  of_views?: (Closeness | null)[];
+  history?: HistoryInfo;
+  asked?: Record<string, Record<string, any>>;
+  ties?: string[][];
+  settings?: Record<string, any>;
+  meant?: ResolvedFit;
+  version: number;
+  stroke: number;
+  exact: boolean;
+  mode: string;
+  arrays: { weights: Picture };
+}
+
+/**
+ * What a canvas holds now, after undo and the like: one for each view that has changed, which
+ * `views` lists.
+ *
+ * image: (rows, columns, 3) float32. importance: (rows, columns) float32. weights: (lights, 3)
+ * float64.
+ */
+export interface CanvasPatch {
+  kind: 'patch';
+  reply?: number;
+  history?: HistoryInfo;
+  asked?: Record<string, Record<string, any>>;
+  ties?: string[][];
+  settings?: Record<string, any>;
+  meant?: ResolvedFit;
+  region: Region;
+  view: number;
+  views: number[];
+  version: number;
+  stroke: number;
+  exact: boolean;
+  mode: string;
+  arrays: { image: Picture; importance: Picture; weights: Picture };
+}
+
+/**
+ * Pictures that are there anew, and their numbers. Unasked.
+ */
+export interface PictureUpdate {
+  kind: 'renewed';
+  reply?: number;
+  resources: Record<string, number>;
+  arrays: {  };
+}
+
+/**
+ * A picture, as the array `data`: the answer to `fetch`.
+ */
+export interface PictureData {
+  kind: 'fetched';
+  reply?: number;
+  name: string;
+  arrays: { data: Picture };
+}
+
+/**
+ * The looks that are kept, and all pictures: the answer to what changes looks, and unasked when
+ * an observer has proposed one.
+ */
+export interface LookList {
+  kind: 'looks';
+  reply?: number;
+  looks: LookInfo[];
+  resources: Record<string, number>;
+  arrays: {  };
+}
+
+/**
+ * How far something is that takes long. Unasked.
+ *
+ * what: `export`, `basis`, or what the renderer calls it.
+ */
+export interface ProgressReport {
+  kind: 'progress';
+  reply?: number;
+  what: string;
+  done: number;
+  total: number;
+  unit: string;
+  arrays: {  };
+}
+
+/**
+ * Something that takes long has begun. what: the request, or `stop`.
+ */
+export interface TaskStarted {
+  kind: 'started';
+  reply?: number;
+  what: 'export' | 'verify' | 'explain' | 'preview' | 'stop';
+  arrays: {  };
+}
+
+/**
+ * Something that was stopped has come to its end. Unasked.
+ */
+export interface TaskStopped {
+  kind: 'stopped';
+  reply?: number;
+  what: 'verify';
+  arrays: {  };
+}
+
+/**
+ * Files that were written. Unasked.
+ *
+ * command: answers the exported paintings; "" where there is none. is_stopped: whether more were
+ * to come. is_unpainted: whether what needs a painting was left out.
+ */
+export interface ExportResult {
+  kind: 'exported';
+  reply?: number;
+  files: string[];
+  command: string;
+  is_stopped?: boolean;
+  is_unpainted?: boolean;
+  arrays: {  };
+}
+
+/**
+ * The render of the answer in a view has come: the picture `verified`. Unasked.
+ *
+ * is_old: whether somebody has painted on since.
+ */
+export interface VerificationResult {
+  kind: 'verified';
+  reply?: number;
+  agrees: boolean;
+  text: string;
+  view: number;
+  is_old: boolean;
+  arrays: {  };
+}
+
+/**
+ * Why a view is not closer; the picture `beyond` shows where. Unasked.
+ */
+export interface Explanation {
+  kind: 'explained';
+  reply?: number;
+  sentences: string[];
+  view: number;
+  is_old: boolean;
+  arrays: {  };
+}
+
+/**
+ * What a change would do. Unasked. number: of the preview. is_at_cost: whether it changes more
+ * than it brings. before, after: (h, w, 3) uint8.
+ */
+export interface PreviewResult {
+  kind: 'previewed';
+  reply?: number;
+  number: number;
+  view: number;
+  text: string;
+  is_at_cost: boolean;
+  is_old: boolean;
+  arrays: { before: Picture; after: Picture };
+}
+
+/**
+ * A sentence for people. Unasked. what: the task that it ends.
+ */
+export interface Notice {
+  kind: 'say';
+  reply?: number;
+  text: string;
+  tone: 'info' | 'warn';
+  what?: string;
+  arrays: {  };
+}
+
+/**
+ * Why a request was not done; nothing has changed.
+ */
+export interface Failure {
+  kind: 'failed';
+  reply?: number;
+  text: string;
+  tone?: 'info' | 'warn';
+  arrays: {  };
+}
+
+/**
+ * The client does not have the session, or no more: another has `taken` it, the painter has
+ * `ended`, or the client speaks another `version` of this protocol.
+ */
+export interface Closing {
+  kind: 'closed';
+  reply?: number;
+  reason: 'taken' | 'ended' | 'version';
+  text: string;
+  arrays: {  };
+}
+
+/**
+ * A request was done, and there is nothing to say of it.
+ */
+export interface Acknowledgement {
+  kind: 'done';
+  reply?: number;
+  arrays: {  };
+}
+
+/**
+ * The first message of a page, and again after a dropped connection. Answered by `state`, or
+ * by `waiting` while there is no picture yet; `state` then comes as soon as there is one.
+ */
+export interface Hello {
+  version: number;
+}
+
+/**
+ * Pixels under the brush; with arrays `image` (rows, columns, 3) float32 and `importance`
+ * (rows, columns) float32. Answered by `answer`.
+ *
+ * stroke: number of the stroke, which the page counts. done: whether the brush has left the
+ * picture with it: only then is the stroke kept. label: what undo calls it. view: of which picture
+ * it is.
+ */
+export interface Paint {
+  stroke: number;
+  region: Region;
+  done?: boolean;
+  label?: string;
+  view?: number;
+}
+
+/**
+ * Forget the stroke that is not done. Answered by `patch`.
+ */
+export interface Drop {
+  stroke: number;
+}
+
+/**
+ * Take the last step back, of paint or of what is asked. Answered by `patch`.
+ */
+export interface Undo {
+}
+
+/**
+ * Do again what was taken back. Answered by `patch`.
+ */
+export interface Redo {
+}
+
+/**
+ * What is asked of one light from now on; nothing frees it. Answered by `answer`.
+ *
+ * asked: keys and values as in a lights file: lock, off, limits, color, kelvin, duv, primaries.
+ * done: whether it is kept; false while a slider moves.
+ */
+export interface Ask {
+  light: number;
+  asked: Record<string, any>;
+  done?: boolean;
+}
+
+/**
+ * What is asked of several lights from now on, by name, as of `Ask`: one step. Answered by
+ * `answer`.
+ */
+export interface AskAll {
+  asked: Record<string, Record<string, any>>;
+}
+
+/**
+ * Which lights are on one dimmer: all such groups, of names. Answered by `answer`.
+ */
+export interface Tie {
+  ties: string[][];
+}
+
+/**
+ * How the painting is answered, as of `Fit`. Answered by `answer`.
+ *
+ * values: of hold, space, colors, literal, prefer_current, sparse; null for what follows from
+ * the painting.
+ */
+export interface Set {
+  values: Record<string, any>;
+}
+
+/**
+ * What a change would do, before it is made. Answered by `started`, later by `previewed`, with
+ * small pictures of the answer now and then, `before` and `after` (h, w, 3) uint8.
+ *
+ * number: of the preview, which the page counts; `previewed` gives it back. values, asked, ties:
+ * as of `Set`, `AskAll` and `Tie`; null for ties as they are. view: whose pictures they are.
+ */
+export interface Preview {
+  number: number;
+  values?: Record<string, any>;
+  asked?: Record<string, Record<string, any>>;
+  ties?: string[][] | null;
+  view?: number;
+}
+
+/**
+ * Keep painting and answer under a name. Answered by `looks`.
+ */
+export interface SaveLook {
+  name: string;
+}
+
+/**
+ * Go on from a look; a step that can be undone. Answered by `patch`.
+ */
+export interface LoadLook {
+  look: number;
+}
+
+/**
+ * Answered by `looks`.
+ */
+export interface RenameLook {
+  look: number;
+  name: string;
+}
+
+/**
+ * Answered by `looks`.
+ */
+export interface CopyLook {
+  look: number;
+}
+
+/**
+ * Keep what lies between two looks: a look whose lights are held at the share `part` of the way
+ * from the first to the second. Answered by `looks`.
+ */
+export interface MixLooks {
+  first: number;
+  second: number;
+  part: number;
+  name: string;
+}
+
+/**
+ * Answered by `looks`.
+ */
+export interface DropLook {
+  look: number;
+}
+
+/**
+ * Write results to the folder of the session, or stop that. Answered by `started`, later by
+ * `exported`, which names what was written; of one that was stopped, too.
+ *
+ * what: target: a painting of each painted view; picture: the answer in each view, as it is seen.
+ */
+export interface Export {
+  what: ('target' | 'picture' | 'lighting' | 'relit' | 'report')[];
+  run?: boolean;
+}
+
+/**
+ * Render the answer in a view, or stop that. Answered by `started`, later by `verified`, or by
+ * `stopped` once nothing is rendered any more.
+ */
+export interface Verify {
+  run?: boolean;
+  view?: number;
+}
+
+/**
+ * Why a view is not closer. Answered by `started`, later by `explained` and the picture
+ * `beyond`.
+ */
+export interface Explain {
+  view?: number;
+}
+
+/**
+ * Go on here, and not on the page that has the session. Answered by `state`.
+ */
+export interface TakeOver {
+}
+
+/**
+ * Where there is no HTTP: answered by `fetched`, with the picture as its array.
+ */
+export interface Fetch {
+  name: string;
+}
+
+/** What clients are told, by kind. */
+export interface Events {
+  state: SessionState;
+  waiting: SessionPending;
+  answer: AnswerUpdate;
+  patch: CanvasPatch;
+  renewed: PictureUpdate;
+  fetched: PictureData;
+  looks: LookList;
+  progress: ProgressReport;
+  started: TaskStarted;
+  stopped: TaskStopped;
+  exported: ExportResult;
+  verified: VerificationResult;
+  explained: Explanation;
+  previewed: PreviewResult;
+  say: Notice;
+  failed: Failure;
+  closed: Closing;
+  done: Acknowledgement;
+}
+
+/** Fields of what clients send, by kind. */
+export interface Requests {
+  hello: Hello;
+  paint: Paint;
+  drop: Drop;
+  undo: Undo;
+  redo: Redo;
+  ask: Ask;
+  ask_all: AskAll;
+  tie: Tie;
+  set: Set;
+  preview: Preview;
+  save_look: SaveLook;
+  load_look: LoadLook;
+  rename_look: RenameLook;
+  copy_look: CopyLook;
+  mix_looks: MixLooks;
+  drop_look: DropLook;
+  export: Export;
+  verify: Verify;
+  explain: Explain;
+  take_over: TakeOver;
+  fetch: Fetch;
+}
+
+export type AnyEvent = Events[keyof Events];

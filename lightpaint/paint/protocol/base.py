@@ -1,0 +1,90 @@
+"""The base of all messages: their fields as JSON has them, and their arrays as bytes."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+#: Element types of arrays in messages, and how their bytes are written.
+DTYPES = {"float16": "<f2", "float32": "<f4", "float64": "<f8", "int16": "<i2", "uint8": "|u1"}
+
+
+#: Of a field that a message leaves out while it is None.
+OPTIONAL = {"is_optional": True}
+
+
+class Message:
+    """One message: a frozen dataclass, whose arrays travel beside the JSON of its other fields.
+
+    Attributes:
+        kind: Names the message in its JSON.
+        buffers_given: Arrays that a client sends beside a message, and what each holds.
+    """
+
+    kind: ClassVar[str] = ""
+    buffers_given: ClassVar[Mapping[str, str]] = {}
+
+    def __init_subclass__(cls, *, kind: str = "", **more: Any) -> None:
+        super().__init_subclass__(**more)
+        cls.kind = kind or cls.kind
+
+    @property
+    def fields(self) -> dict[str, Any]:
+        """The fields but for arrays, as plain values of JSON."""
+        return {k: plain(v) for k, v in _given(self).items() if not isinstance(v, np.ndarray)}
+
+    @property
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """The arrays by name."""
+        return {k: v for k, v in _given(self).items() if isinstance(v, np.ndarray)}
+
+    def content(self, reply: int | None = None) -> dict[str, Any]:
+        """Return the JSON. reply: number of the message that this one answers."""
+        made: dict[str, Any] = {"kind": self.kind, **self.fields}
+        if reply is not None:
+            made["reply"] = reply
+        made["buffers"] = [
+            {"name": name, "dtype": _dtype(array), "shape": list(array.shape)}
+            for name, array in self.arrays.items()
+        ]
+        return made
+
+    def buffers(self) -> list[bytes]:
+        """Return the arrays as bytes, little endian, in order."""
+        return [
+            np.ascontiguousarray(array, DTYPES[_dtype(array)]).tobytes()
+            for array in self.arrays.values()
+        ]
+
+
+def plain(value: Any) -> Any:
+    """Return values of JSON for dataclasses, tuples and NumPy's numbers; NaN and Inf are null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {name: plain(one) for name, one in _given(value).items()}
+    if isinstance(value, Mapping):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _given(record: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass by name, without those that are left out."""
+    found = {one.name: (getattr(record, one.name), one.metadata) for one in fields(record)}
+    return {
+        name: value
+        for name, (value, about) in found.items()
+        if not (value is None and about.get("is_optional"))
+    }
+
+
+def _dtype(array: npt.NDArray[Any]) -> str:
+    name = array.dtype.name
+    return name if name in DTYPES else {"bool": "uint8"}.get(name, "float32")

@@ -1,0 +1,54 @@
+"""Messages of a session that is none: whole ones, with what a test does not care about made up."""
+
+from typing import Any
+
+import numpy as np
+
+from lightpaint.paint.protocol import (
+    VERSION,
+    AnswerUpdate,
+    Findings,
+    ProgressReport,
+    SampleCount,
+    SessionState,
+    TableInfo,
+    TransformInfo,
+    ViewInfo,
+)
+
+
+def fake_answer(**fields: Any) -> AnswerUpdate:
+    weights = np.ones((2, 3))
+    made = {"version": 0, "stroke": 0, "exact": False, "mode": "linear", "weights": weights}
+    return AnswerUpdate(**{**made, **fields})
+
+
+def fake_progress(what: str, done: int) -> ProgressReport:
+    return ProgressReport(what=what, done=done, total=1000, unit="passes")
+
+
+def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:
+    made = {
+        "version": VERSION,
+        "scene": "room",
+        "folder": "/shows/room",
+        "can_render": False,
+        "can_report": False,
+        "size": (2, 3),
+        "objects": (),
+        "lights": (),
+        "views": (ViewInfo("", (2, 3), (), ()),),
+        "transforms": ("srgb",),
+        "transform": TransformInfo("srgb", 0.0),
+        "lut": TableInfo(2, 0.0, 1.0),
+        "resources": resources,
+        "looks": (),
+        "basis": SampleCount(1, 1, True),
+        "verified": (),
+        "first": True,
+        "stroke": -1,
+        "command": "",
+        "answer": Findings(),
+        "weights": np.ones((0, 3)),
+    }
+    return SessionState(**{**made, **fields})
