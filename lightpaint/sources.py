@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -34,9 +34,26 @@ RENDERED = (*SAMPLED, "refine", "suggest", "verify_spp")
 NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
+class ReadOnce:
+    """A file by plain values, whose content is read when it is first asked for, and kept.
+
+    What was read stays in this process: a copy that is sent elsewhere reads the file there.
+    """
+
+    def unread(self) -> Self:
+        """Return the same file, of which nothing is read or kept yet."""
+        return type(self)(**vars_of(self))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars_of(self)
+
+    def __setstate__(self, fields: dict[str, Any]) -> None:
+        vars(self).update(fields)
+
+
 @keywords()
 @dataclass(frozen=True)
-class SceneFile:
+class SceneFile(ReadOnce):
     """A scene by its file, as `load_scene` takes it; loaded once, when it is first asked for.
 
     Attributes:
@@ -75,7 +92,7 @@ class SceneFile:
 
 @keywords()
 @dataclass(frozen=True)
-class Painting:
+class Painting(ReadOnce):
     """A painting by its file, as `read_target` takes it; read once.
 
     Attributes:
@@ -119,7 +136,7 @@ class Painting:
 
 
 @dataclass(frozen=True)
-class BasisFile:
+class BasisFile(ReadOnce):
     """A saved basis; read once."""
 
     path: str
@@ -131,7 +148,7 @@ class BasisFile:
 
 
 @dataclass(frozen=True)
-class GroupsFile:
+class GroupsFile(ReadOnce):
     """Light groups of another renderer, as `read_light_groups` takes them; read once."""
 
     path: str

@@ -69,8 +69,7 @@ def packed(errand: Errand, contents: Contents, *, run: str, is_shared: bool) -> 
         return tuple((file, contents.of(file)) for file in whole)
 
     files, carried = summed(errand.needs), summed(errand.carried)
-    # What it has read by now stays here.
-    return Parcel(errand.moved(str), files, carried, os.getcwd(), is_shared, run)
+    return Parcel(errand, files, carried, os.getcwd(), is_shared, run)
 
 
 class Store:

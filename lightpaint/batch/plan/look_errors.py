@@ -47,7 +47,7 @@ def look_over(entry: Entry, held: Held, mistakes: Mistakes) -> None:
         if "render" in entry.want:
             tried(partial(on_film, found, None, entry.final.resolution))
     if entry.basis is not None:
-        saved = held.saved(replace(entry.basis))
+        saved = held.saved(entry.basis.unread())
         found = tried(partial(content, saved))
         if found is not None:
             lights = found.basis.lights if isinstance(found, LightGroups) else found.lights

@@ -144,7 +144,7 @@ class _Planner:
         scenes = tuple(map(self.held.scene, entry.scenes))
         # Of saved bases no more than one is held, and by no look.
         self.held.only(bases_of(entry))
-        basis = None if entry.basis is None else self.held.saved(replace(entry.basis))
+        basis = None if entry.basis is None else self.held.saved(entry.basis.unread())
         if not entry.is_solved:
             return entry, *self._made(replace(entry, scenes=scenes, basis=basis))
         settings, asked = entry.settings, entry.constraints
@@ -171,7 +171,7 @@ class _Planner:
         asked: Constraints,
     ) -> Job:
         """The job of a look, which checks it; its painting is read anew, and let go of again."""
-        paintings = tuple(replace(painting) for painting in entry.paintings)
+        paintings = tuple(painting.unread() for painting in entry.paintings)
         settings = replace(settings, force=self._force, command=self._command)
         folder = self._folders[entry.name]
         return Job(tuple(scenes), paintings, folder, basis, asked, settings, entry.by_sensor)

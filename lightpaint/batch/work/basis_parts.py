@@ -1,6 +1,5 @@
 """Bases that an engine renders, in parts."""
 
-from dataclasses import replace
 from typing import Any
 
 from lightpaint.arrays import Floats
@@ -28,7 +27,7 @@ class InParts:
 
     def __init__(self, engine: Engine, film: Film) -> None:
         self._engine = engine
-        self._film = replace(film, scene=replace(film.scene))
+        self._film = film.unread()
 
     def __call__(
         self,

@@ -108,4 +108,4 @@ def _file_of(job: Job) -> Painting:
     """The painting, not read yet."""
     [painting] = job.targets
     assert isinstance(painting, Painting)
-    return replace(painting)
+    return painting.unread()

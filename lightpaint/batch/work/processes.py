@@ -66,8 +66,7 @@ class Processes:
         while waiting or running:
             try:
                 while waiting and len(running) < self.workers:
-                    # What it has read by now stays here.
-                    future = pool.submit(_work, waiting[0].moved(str))
+                    future = pool.submit(_work, waiting[0])
                     running[future], places[future] = waiting[0], free.pop()
                     self._listen.at_work(places[future], spoken(waiting[0]))
                     del waiting[0]

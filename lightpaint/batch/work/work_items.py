@@ -91,6 +91,10 @@ class Film:
             self, scene=moved_scene(self.scene, move), files=tuple(map(move, self.files))
         )
 
+    def unread(self) -> "Film":
+        """Return the same, of which nothing is loaded yet."""
+        return replace(self, scene=self.scene.unread())
+
     @property
     def key(self) -> str:
         """What two of the same have in common."""
@@ -158,7 +162,7 @@ class Wanted:
     resize: bool
 
     def moved(self, move: Move) -> "Wanted":
-        """The same by other paths, not read yet."""
+        """The same by other paths."""
         its = self.painting
         paths: dict[str, Any] = {
             name: value if (value := getattr(its, name)) is None else move(value)
@@ -236,7 +240,7 @@ class Passes:
 
 
 def moved_scene(scene: SceneFile, move: Move) -> SceneFile:
-    """The same scene by other paths, not loaded yet."""
+    """The same scene by other paths."""
     lights_file = scene.lights_file
     return replace(
         scene, path=move(scene.path), lights_file=None if lights_file is None else move(lights_file)

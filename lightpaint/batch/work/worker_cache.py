@@ -1,7 +1,6 @@
 """What a process has at hand while it works on a batch."""
 
 from collections.abc import Collection
-from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
@@ -75,7 +74,7 @@ class Held:
         """A painting at the size of its basis, read once."""
         key = repr((wanted, size))
         if key not in self._targets:
-            read = replace(wanted.painting).content
+            read = wanted.painting.unread().content
             self._targets[key] = read.fitted_to(size, resize=wanted.resize)
         return self._targets[key]
 
