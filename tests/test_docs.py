@@ -36,6 +36,21 @@ def test_files_that_are_named_are_there(document: Path):
     assert [x for x in sorted(named) if not any(file.endswith("/" + x) for file in FILES)] == []
 
 
+def test_architecture_is_a_start_of_a_few_pages() -> None:
+    """What stands in it is read whole by whoever changes something; reasons have their own page."""
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    assert len(text.split()) <= 1500
+
+
+def test_decisions_are_numbered_and_whole() -> None:
+    text = (ROOT / "docs" / "decisions.md").read_text()
+    records = re.split(r"^### ", text, flags=re.M)[1:]
+    numbers = [record.partition(".")[0] for record in records]
+    assert numbers == [str(n) for n in range(1, len(records) + 1)]
+    parts = [re.findall(r"^\*(\w+)\.\* \S", record, re.M) for record in records]
+    assert [x for x in parts if x != ["Context", "Decision", "Consequence"]] == []
+
+
 def test_rooms_that_are_named_are_there():
     text = (ROOT / "docs" / "architecture.md").read_text()
     rooms = set(re.findall(r"`([a-z_]+(?:/[a-z_]+)*)/`", text))
