@@ -9,6 +9,8 @@ import { VERSION, frame, pictureOf, unframe } from './protocol.js';
 
 /** @typedef {import("./protocol.js").Arrays} Arrays */
 /** @typedef {import("./protocol.js").Message} Message */
+/** @typedef {import("./messages.js").Requests} Requests */
+/** @typedef {import("./messages.js").Events} Events */
 /** @typedef {import("./protocol.js").Picture} Picture */
 
 /**
@@ -17,13 +19,17 @@ import { VERSION, frame, pictureOf, unframe } from './protocol.js';
  * page; and `silence` with {isSilent} where an answer is long in coming. `send` is answered by the reply, which may be
  * `failed`, and rejects where there is no connection. `fetch` is the newest picture of a name.
  * @typedef {object} Host
- * @property {(kind: string, fields?: Record<string, unknown>, arrays?: Arrays) =>
+ * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K], arrays?: Arrays) =>
  *   Promise<Message>} send
- * @property {(kind: string, hear: (message: any) => void) => void} on
+ * @property {<K extends keyof Heard>(kind: K, hear: (message: Heard[K]) => void) => void} on
  * @property {(name: string) => Promise<Picture>} fetch
  * @property {() => void} close
  * @property {() => Promise<void>} [gate] is waited for by what is said after strokes
  */
+
+/** What a page hears: what the session tells, and what its host knows of the connection.
+ * @typedef {Events & {connection: {kind: 'connection', state: 'open' | 'lost' | 'stale'},
+ *   silence: {kind: 'silence', isSilent: boolean}}} Heard */
 
 /** What does not wait for strokes that are on their way. */
 export const AT_ONCE = ['paint', 'drop', 'hello', 'take_over', 'fetch'];
@@ -168,9 +174,9 @@ export class SocketHost extends Hearers {
     this.asked.delete(reply);
   }
 
-  /** @param {string} kind @param {Record<string, unknown>} [fields] @param {Arrays} [arrays]
-   * @returns {Promise<Message>} */
-  async send(kind, fields = {}, arrays = {}) {
+  /** @template {keyof Requests} K @param {K} kind @param {Requests[K]} [fields]
+   * @param {Arrays} [arrays] @returns {Promise<Message>} */
+  async send(kind, fields, arrays = {}) {
     const isOpen = this.socket?.readyState === WebSocket.OPEN;
     if (isOpen && !AT_ONCE.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {

@@ -108,9 +108,10 @@ export class ModelHost extends Hearers {
     this.asked.clear();
   }
 
-  /** @param {string} kind @param {Record<string, unknown>} [fields] @param {Arrays} [arrays]
+  /** @template {keyof import("./messages.js").Requests} K @param {K} kind
+   * @param {import("./messages.js").Requests[K]} [fields] @param {Arrays} [arrays]
    * @returns {Promise<Message>} */
-  async send(kind, fields = {}, arrays = {}) {
+  async send(kind, fields, arrays = {}) {
     if (!AT_ONCE.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {
       if (this.isOver) return reject(new Error(ENDED));

@@ -1,5 +1,5 @@
 /**
- * What page and session say to each other, as bytes; the twin of paint/protocol.py.
+ * What page and session say to each other, as bytes; the twin of paint/frames.py; `messages.d.ts` has the types.
  *
  * A frame is: uint32 length of the JSON, little endian | JSON | padding to 8 bytes | buffers, each
  * padded. `buffers` in the JSON says what they are. Colours are linear Rec.709.
@@ -18,9 +18,7 @@ export const VERSION = 2;
  * @typedef {{kind: string, seq?: number, reply?: number, arrays: Arrays, [field: string]: any}}
  * Message */
 
-/** @typedef {{name: string, label: string, unit: string, parameter: string, plugin: string,
- *   form: string, members: string[], group: string | null, present: RGB, scale: number,
- *   is_fixed: boolean, is_scalar: boolean}} Light */
+/** @typedef {import("./messages.js").LightInfo} Light */
 /** @typedef {import("../../../viewer/drawing/lut.js").Shaper} Shaper */
 
 /** @typedef {{name: string, dtype: string, shape: number[]}} About */

@@ -183,7 +183,8 @@ export class Strokes {
     }
   }
 
-  /** @param {string} kind @param {Record<string, unknown>} fields @param {Arrays} arrays
+  /** @template {"paint" | "drop"} K @param {K} kind
+   * @param {import("./messages.js").Requests[K]} fields @param {Arrays} arrays
    * @param {Left | null} left what is answered with it */
   async send(kind, fields, arrays, left) {
     this.isBusy = true;

@@ -35,6 +35,8 @@ function KeysDialog({ close }) {
   </${Dialog}>`;
 }
 
+/** @type {{key: import("../engine/messages.js").Export["what"][number], label: string,
+ *   about: string}[]} */
 const FILES = [
   { key: 'target', label: 'Painting', about: 'painting.exr, for lightpaint solve' },
   { key: 'picture', label: 'Picture', about: 'answer.png: the answer, to be shown' },

@@ -3,7 +3,9 @@
  * Whoever mounts the painter brings both.
  */
 
-/** @typedef {[number, number, number]} RGB */
+/** @typedef {import("../engine/messages.js").RGB} RGB */
+/** @typedef {import("../engine/messages.js").Requests} Requests */
+/** @typedef {import("../engine/host.js").Heard} Heard */
 /** @typedef {{data: any, shape: number[]}} Picture */
 /** @typedef {{kind: string, reply?: number, arrays?: Record<string, Picture>, [field: string]: any}} Message */
 
@@ -12,9 +14,9 @@
  * `on` hears messages of a kind, asked for or not, and "connection" with
  * {state: "open" | "lost" | "stale"}, and "silence" with {isSilent}. `send` is answered by the reply.
  * @typedef {object} Host
- * @property {(kind: string, fields?: Record<string, any>, arrays?: Record<string, Picture>)
- *   => Promise<Message>} send
- * @property {(kind: string, hear: (message: Message) => void) => void} on
+ * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K],
+ *   arrays?: Record<string, Picture>) => Promise<Message>} send
+ * @property {<K extends keyof Heard>(kind: K, hear: (message: Heard[K]) => void) => void} on
  * @property {(name: string) => Promise<Picture>} fetch
  * @property {() => void} close
  */

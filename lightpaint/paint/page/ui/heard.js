@@ -3,6 +3,7 @@
 /** @typedef {import('./engine.js').Message} Message */
 /** @typedef {import('./engine.js').RGB} RGB */
 /** @typedef {import('./model.js').Ui} Ui */
+/** @typedef {import('../engine/messages.js').Events} Events */
 
 import { stateOfView } from '../engine/protocol.js';
 import { mixOf, unmixed } from './model.js';
@@ -19,7 +20,7 @@ export const ENDED = {
 /** When nothing is known to be under way. */
 export const IDLE = { ...ENDED.export, ...ENDED.verify, ...ENDED.explain, ...ENDED.preview };
 
-/** @param {any} message @returns {Partial<Ui>} */
+/** @param {Events["state"]} message @returns {Partial<Ui>} */
 export function stateOf(message, /** @type {import('./model.js').Ui} */ before) {
   const isBack = before.connection !== 'open' || before.closed !== null;
   const views = message.views ?? [];
@@ -67,7 +68,7 @@ function rendersOf(verified, view) {
   return { verifiedOf, verified: verifiedOf[view] ?? null };
 }
 
-/** Which looks there are. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+/** Which looks there are. @param {Events["looks"]} message @param {Ui} ui @returns {Partial<Ui>} */
 export function looksOf({ looks, resources }, ui) {
   return {
     looks,
@@ -156,7 +157,7 @@ export function viewOf(ui, view) {
   };
 }
 
-/** A render of a view has come. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+/** A render of a view has come. @param {Events["verified"]} message @param {Ui} ui @returns {Partial<Ui>} */
 export function verifiedOf(message, ui) {
   const { view = 0 } = message;
   const verified = render(message);
@@ -214,7 +215,7 @@ export function answerOf(message, ui) {
   return made;
 }
 
-/** @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+/** @param {Events["progress"]} message @param {Ui} ui @returns {Partial<Ui>} */
 export function progressOf({ what, done, total, unit }, ui) {
   const made = { what, done, total, unit };
   if (what === 'export') return { writing: timed(made, ui.writing), isWriting: true };

@@ -6,25 +6,20 @@ import { ofKelvin } from './colours.js';
 /** @typedef {import("./engine.js").Show} Show */
 /** @typedef {import("./engine.js").Tool} Tool */
 
-/** @typedef {{name: string, label: string, unit: string, parameter: string, plugin: string,
- *   form: string, members: string[], group: string | null, present: RGB, is_fixed: boolean,
- *   is_scalar: boolean, scale?: number}} Light */
-/** @typedef {{emission: RGB, stops: number | null, kelvin: number | null, swatch: string,
- *   share: number, error: string | null, held: boolean, unreached: boolean}} Lit */
-/** stamp: when it was kept, in seconds since 1970.
- * @typedef {{id: number, name: string, weights: RGB[], stamp: number, thumbnail: string}} Look */
+/** @typedef {import("../engine/messages.js").LightInfo} Light */
+/** @typedef {import("../engine/messages.js").LightAnswer} Lit */
+/** @typedef {import("../engine/messages.js").LookInfo} Look */
 /** @typedef {Record<string, any>} Asked */
-/** What keeps the lights from the paint and can be let go of: what it is, the lights of which it was
- * asked, which share of what is missed goes without it, and the weaker hold.
- * @typedef {{kind: string, names: string[], closes: number | null, hold: number | null}} Help */
+/** @typedef {import("../engine/messages.js").Advice} Help */
 /** A message that changes what is asked.
- * @typedef {{kind: "set" | "ask_all" | "tie", fields: Record<string, any>}} Change */
+ * @typedef {{[K in "set" | "ask_all" | "tie"]:
+ *   {kind: K, fields: import("../engine/messages.js").Requests[K]}}["set" | "ask_all" | "tie"]}
+ *   Change */
 /** What a change would do: what it is called, and what is known of it.
  * @typedef {{number: number, label: string, change: Change, text: string, isAtCost: boolean,
  *   before: import("./engine.js").Picture | null, after: import("./engine.js").Picture | null}}
  *   Preview */
-/** @typedef {{headline: string, help: Help | null, delta_e: number, delta_e_asked: number,
- *   sentences: string[]}} Seen */
+/** @typedef {import("../engine/messages.js").Closeness} Seen */
 /** since: when it was first heard of, in ms, and how much was done then; left_s: about how many
  * seconds are left, once that can be told.
  * @typedef {{what: string, done: number, total: number, unit: string,

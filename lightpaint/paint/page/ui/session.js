@@ -17,10 +17,13 @@ import { look } from './tools.js';
 
 /** @typedef {import("./engine.js").Host} Host */
 /** @typedef {import("./engine.js").Message} Message */
+/** @typedef {import("./engine.js").Requests} Requests */
+/** @typedef {import("./engine.js").Heard} Heard */
 /** @typedef {import("./engine.js").RGB} RGB */
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./model.js").Asked} Asked */
 
+/** @type {(keyof Heard)[]} */
 const HEARD = [
   'state',
   'waiting',
@@ -69,9 +72,10 @@ export class Session {
 
   /**
    * Say something; what cannot be done is said in a toast.
-   * @param {string} kind @param {Record<string, any>} [fields] @returns {Promise<Message | null>}
+   * @template {keyof Requests} K @param {K} kind @param {Requests[K]} [fields]
+   * @returns {Promise<Message | null>}
    */
-  async send(kind, fields = {}) {
+  async send(kind, fields) {
     try {
       const reply = await this.host.send(kind, fields);
       this.receive(reply, reply);
@@ -89,31 +93,31 @@ export class Session {
     if (this.done.has(origin)) return;
     this.done.add(origin);
     const told = /** @type {Record<string, (message: any) => Partial<Ui> | void>} */ ({
-      state: (/** @type {any} */ m) => stateOf(m, this.store.value),
-      waiting: (/** @type {any} */ m) => ({
+      state: (/** @type {Heard['state']} */ m) => stateOf(m, this.store.value),
+      waiting: (/** @type {Heard['waiting']} */ m) => ({
         ready: false,
         state: null,
         waiting: m.text ?? '',
         basis: m.progress ?? null,
         ...IDLE,
       }),
-      answer: (/** @type {any} */ m) => answerOf(m, this.store.value),
-      patch: (/** @type {any} */ m) => answerOf(m, this.store.value),
-      renewed: (/** @type {any} */ m) => ({
+      answer: (/** @type {Heard['answer']} */ m) => answerOf(m, this.store.value),
+      patch: (/** @type {Heard['patch']} */ m) => answerOf(m, this.store.value),
+      renewed: (/** @type {Heard['renewed']} */ m) => ({
         resources: { ...this.store.value.resources, ...m.resources },
       }),
-      progress: (/** @type {any} */ m) => progressOf(m, this.store.value),
-      stopped: (/** @type {any} */ m) => this.ended(m.what),
-      say: (/** @type {any} */ m) => this.say(m),
-      failed: (/** @type {any} */ m) => this.toast(m.text, m.tone ?? 'warn'),
-      looks: (/** @type {any} */ m) => looksOf(m, this.store.value),
-      exported: (/** @type {any} */ m) => this.exported(m),
-      verified: (/** @type {any} */ m) => verifiedOf(m, this.store.value),
-      explained: (/** @type {any} */ m) => explainedOf(m, this.store.value),
-      previewed: (/** @type {any} */ m) => previewedOf(m, this.store.value),
-      closed: (/** @type {any} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
-      connection: (/** @type {any} */ m) => ({ connection: m.state }),
-      silence: (/** @type {any} */ m) => ({ isSilent: m.isSilent }),
+      progress: (/** @type {Heard['progress']} */ m) => progressOf(m, this.store.value),
+      stopped: (/** @type {Heard['stopped']} */ m) => this.ended(m.what),
+      say: (/** @type {Heard['say']} */ m) => this.say(m),
+      failed: (/** @type {Heard['failed']} */ m) => this.toast(m.text, m.tone ?? 'warn'),
+      looks: (/** @type {Heard['looks']} */ m) => looksOf(m, this.store.value),
+      exported: (/** @type {Heard['exported']} */ m) => this.exported(m),
+      verified: (/** @type {Heard['verified']} */ m) => verifiedOf(m, this.store.value),
+      explained: (/** @type {Heard['explained']} */ m) => explainedOf(m, this.store.value),
+      previewed: (/** @type {Heard['previewed']} */ m) => previewedOf(m, this.store.value),
+      closed: (/** @type {Heard['closed']} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
+      connection: (/** @type {Heard['connection']} */ m) => ({ connection: m.state }),
+      silence: (/** @type {Heard['silence']} */ m) => ({ isSilent: m.isSilent }),
     })[message.kind]?.(message);
     for (const key of /** @type {const} */ (['asked', 'ties', 'settings', 'weights']))
       if (told?.[key]) Object.assign(this.said, { [key]: told[key] });
@@ -176,7 +180,7 @@ export class Session {
     return { exported: message, ...ENDED.export };
   }
 
-  /** Write files, or stop that. @param {string[]} what none to stop */
+  /** Write files, or stop that. @param {Requests["export"]["what"]} what none to stop */
   write(what) {
     if (what.length) this.store.set({ isWriting: true, exported: null });
     return this.send('export', { what, run: what.length > 0 });
@@ -310,7 +314,7 @@ export class Session {
     return this.change('set', { values: { [key]: value } });
   }
 
-  /** @param {string} kind @param {Record<string, any>} fields */
+  /** @template {"set" | "ask_all" | "tie"} K @param {K} kind @param {Requests[K]} fields */
   async change(kind, fields) {
     const reply = await this.send(kind, fields);
     if (reply?.kind === 'failed') this.goBack();
