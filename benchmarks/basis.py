@@ -27,8 +27,8 @@ from hall import write_hall
 from lightpaint import load_scene
 from lightpaint.basis.render.render import render_basis
 from lightpaint.basis.render.separate import BLACK, WHITE
-from lightpaint.scene.render import Stream, render_loaded
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, render_loaded
 
 GALLERY = Path(__file__).parent.parent / "scenes" / "gallery" / "scene.xml"
 HALL_SIZE = {"width": 480, "height": 270}

@@ -36,10 +36,10 @@ from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import Film
 from lightpaint.batch.work.worker_cache import Held
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import silent
-from lightpaint.scene.threads import limit_threads
-from lightpaint.sources import SceneFile
+from lightpaint.scene.runtime.kernel_threads import limit_threads
 
 GALLERY = Path(__file__).parent.parent / "scenes" / "gallery" / "scene.xml"
 

@@ -40,8 +40,8 @@ import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.colour.difference import delta_e
-from lightpaint.images.denoise import denoised
+from lightpaint.colour.color_difference import delta_e
+from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.analysis import held_back
 
 SCENES = Path(__file__).parent.parent / "scenes"

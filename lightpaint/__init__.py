@@ -37,16 +37,14 @@ if TYPE_CHECKING:
     from lightpaint.basis.lightgroups.read import LightGroups as LightGroups
     from lightpaint.basis.lightgroups.read import read_light_groups as read_light_groups
     from lightpaint.basis.render.render import render_basis as render_basis
-    from lightpaint.call import paint_with_light as paint_with_light
-    from lightpaint.colour.transform import TransformChoice as TransformChoice
-    from lightpaint.colour.transform import ViewTransform as ViewTransform
+    from lightpaint.colour.display.view_transform import TransformChoice as TransformChoice
+    from lightpaint.colour.display.view_transform import ViewTransform as ViewTransform
     from lightpaint.demo import Demo as Demo
     from lightpaint.demo import write_demo as write_demo
     from lightpaint.errors import LightpaintError as LightpaintError
     from lightpaint.images.estimate import Estimate as Estimate
-    from lightpaint.images.objects import Objects as Objects
-    from lightpaint.images.png import display_picture as display_picture
-    from lightpaint.job import Job as Job
+    from lightpaint.images.formats.png import display_picture as display_picture
+    from lightpaint.images.object_map import Objects as Objects
     from lightpaint.lighting.analysis.analyse import Analysis as Analysis
     from lightpaint.lighting.analysis.analyse import analyse as analyse
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
@@ -69,23 +67,25 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
-    from lightpaint.pipeline import run as run
+    from lightpaint.pipeline.call import paint_with_light as paint_with_light
+    from lightpaint.pipeline.job import Job as Job
+    from lightpaint.pipeline.pipeline import run as run
+    from lightpaint.pipeline.renders import render_template as render_template
+    from lightpaint.pipeline.renders import template_of_basis as template_of_basis
+    from lightpaint.pipeline.results import Look as Look
+    from lightpaint.pipeline.settings import Settings as Settings
+    from lightpaint.pipeline.sources import Painting as Painting
+    from lightpaint.pipeline.sources import SceneFile as SceneFile
     from lightpaint.placement.suggest import suggest_lights as suggest_lights
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
     from lightpaint.relit.verification import Verification as Verification
     from lightpaint.relit.verify import verify as verify
-    from lightpaint.renders import render_template as render_template
-    from lightpaint.renders import template_of_basis as template_of_basis
     from lightpaint.report.verdict import verdict as verdict
-    from lightpaint.results import Look as Look
+    from lightpaint.scene.runtime.variant import use_variant as use_variant
     from lightpaint.scene.scene import Scene as Scene
     from lightpaint.scene.scene import load_scene as load_scene
-    from lightpaint.scene.variant import use_variant as use_variant
-    from lightpaint.settings import Settings as Settings
-    from lightpaint.sources import Painting as Painting
-    from lightpaint.sources import SceneFile as SceneFile
     from lightpaint.target.read import read_target as read_target
     from lightpaint.target.target import Target as Target
 
@@ -99,33 +99,33 @@ _HOMES = {
     "Diagnosis": "lighting.analysis.diagnosis",
     "Estimate": "images.estimate",
     "Fit": "lighting.fit",
-    "Job": "job",
+    "Job": "pipeline.job",
     "LightGroups": "basis.lightgroups.read",
     "Lighting": "lighting.lighting",
     "LightpaintError": "errors",
-    "Look": "results",
-    "Objects": "images.objects",
-    "Painting": "sources",
+    "Look": "pipeline.results",
+    "Objects": "images.object_map",
+    "Painting": "pipeline.sources",
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
-    "SceneFile": "sources",
+    "SceneFile": "pipeline.sources",
     "Seen": "lighting.analysis.seen",
-    "Settings": "settings",
+    "Settings": "pipeline.settings",
     "Solution": "lighting.solution",
     "Suggestion": "placement.suggestion",
     "Target": "target.target",
-    "TransformChoice": "colour.transform",
+    "TransformChoice": "colour.display.view_transform",
     "Uncertainty": "lighting.analysis.uncertainty",
     "Verification": "relit.verification",
-    "ViewTransform": "colour.transform",
+    "ViewTransform": "colour.display.view_transform",
     "analyse": "lighting.analysis.analyse",
     "combine": "lighting.lighting",
     "correct_noise": "lighting.analysis.uncertainty",
     "diagnose": "lighting.analysis.diagnosis",
-    "display_picture": "images.png",
+    "display_picture": "images.formats.png",
     "error_bars": "lighting.analysis.uncertainty",
     "load_scene": "scene.scene",
-    "paint_with_light": "call",
+    "paint_with_light": "pipeline.call",
     "read_basis": "basis.file",
     "read_constraints": "lighting.constraints.file",
     "read_light_groups": "basis.lightgroups.read",
@@ -134,12 +134,12 @@ _HOMES = {
     "refine": "lighting.analysis.refine",
     "relight": "relit.relight",
     "render_basis": "basis.render.render",
-    "render_template": "renders",
-    "template_of_basis": "renders",
-    "run": "pipeline",
+    "render_template": "pipeline.renders",
+    "template_of_basis": "pipeline.renders",
+    "run": "pipeline.pipeline",
     "solve": "lighting.solve",
     "suggest_lights": "placement.suggest",
-    "use_variant": "scene.variant",
+    "use_variant": "scene.runtime.variant",
     "verdict": "report.verdict",
     "verify": "relit.verify",
     "what_is_seen": "lighting.analysis.seen",

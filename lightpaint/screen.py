@@ -87,4 +87,4 @@ class Shown:
         return cast(bytes | None, import_module(_DRAWN_BY).png_of(self))
 
 
-_DRAWN_BY = "lightpaint.report.notebook"
+_DRAWN_BY = "lightpaint.report.page.notebook_html"

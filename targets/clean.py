@@ -19,7 +19,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 import lightpaint as lp
-from lightpaint.scene.variant import use_variant
+from lightpaint.scene.runtime.variant import use_variant
 
 Floats = NDArray[np.float32]
 LAYERS = {"albedo": "RGB", "normal": "XYZ", "position": "XYZ"}

@@ -19,7 +19,7 @@ import numpy as np
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 
 #: Looks of every kind that needs no renderer.
 LOOKS = """

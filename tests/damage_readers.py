@@ -14,7 +14,7 @@ class Reader:
     def __init__(self, kind: str) -> None:
         self.kind = kind
         if kind == "scene":
-            from lightpaint.scene.variant import use_variant
+            from lightpaint.scene.runtime.variant import use_variant
 
             use_variant("scalar_rgb")
 
@@ -39,7 +39,7 @@ class Reader:
             return read_lighting(path)
         if self.kind == "lights":
             from lightpaint.lighting.constraints.file import read_constraints
-            from lightpaint.scene.lights_file import read_lights_file
+            from lightpaint.scene.lights.lights_file import read_lights_file
 
             file = read_lights_file(path)
             return file.lights, dict(file.groups), read_constraints(path)
@@ -159,7 +159,7 @@ def _second_opinion(path: Path, picture: Any) -> str:
     """
     import numpy as np
 
-    from lightpaint.images.bitmap import read_bitmap
+    from lightpaint.images.formats.bitmap import read_bitmap
     from lightpaint.images.picture import file_kind
 
     try:

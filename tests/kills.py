@@ -27,8 +27,8 @@ import numpy as np
 from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
-from lightpaint.images.exr import write_rgb
-from lightpaint.staging import JOURNAL, MARK, finish
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.storage.staging import JOURNAL, MARK, finish
 
 SIDE = """<sensor type="perspective" id="side"><transform name="to_world">
     <lookat origin="2 1 2" target="0 0.5 0" up="0 1 0"/></transform><film type="hdrfilm">

@@ -16,19 +16,19 @@ from serving import in_a_loop
 import lightpaint as lp
 from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.errors import BatchError, ConstraintError, LightingError, PaintError, SceneError
-from lightpaint.expected import MAX_LISTED, MAX_NAME, MAX_PRIMARIES
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import MAX_BYTES, read_lighting
 from lightpaint.paint.frames import said_of
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.server.session_clients import Line
+from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import wanted, while_wanted
-from lightpaint.records import strict_toml
-from lightpaint.scene.choice import choose_lights
-from lightpaint.scene.lights_file import read_lights_file
-from lightpaint.settings import Settings
+from lightpaint.scene.lights.light_choice import choose_lights
+from lightpaint.scene.lights.lights_file import read_lights_file
+from lightpaint.storage.json_records import strict_toml
 from lightpaint.threads import side_by_side
+from lightpaint.validation import MAX_LISTED, MAX_NAME, MAX_PRIMARIES
 
 MANY = ["#ff0000", "#00ff00"] * 1500
 

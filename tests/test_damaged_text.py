@@ -19,13 +19,13 @@ from damage_readers import Reader, contents, contents_of_json
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
 from lightpaint.files import MAX_TEXT
 from lightpaint.lighting.bound import Bound
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import Certificate, Lighting, LightSetting
-from lightpaint.scene.lights_file import read_lights_file
+from lightpaint.scene.lights.lights_file import read_lights_file
 from lightpaint.target.template import Template, read_template, write_template
 
 LIGHTS = b"""\

@@ -14,10 +14,10 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.cli import main
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
-from lightpaint.images.exr import write_rgb
-from lightpaint.images.png import write_png_16
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.images.formats.png import write_png_16
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.template import Template, write_template
 

@@ -12,13 +12,13 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.batch.cluster.cluster import LEAST_S, PATIENCE
-from lightpaint.cli.commands import template_lines
-from lightpaint.cli.parser import command_parser
+from lightpaint.cli.commands.rooms import template_lines
+from lightpaint.cli.options.parser import command_parser
 from lightpaint.lighting.constraints.whites import WHITES
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint.server.address import PORT
-from lightpaint.scene.alike import FEW
-from lightpaint.scene.quality import PRESETS
+from lightpaint.scene.lights.similar_emitters import FEW
+from lightpaint.scene.presets import PRESETS
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.template import PLAIN
 
@@ -195,7 +195,7 @@ def test_which_files_are_painted_over_is_said_alike():
 def test_the_corridor_is_quoted_as_it_stands():
     text = (ROOT / "docs" / "architecture.md").read_text()
     [quoted] = re.findall(r"```python\n((?:@\w+\(\)\n)?def run.*?)```", text, re.DOTALL)
-    module = ast.parse((ROOT / "lightpaint" / "pipeline.py").read_text())
+    module = ast.parse((ROOT / "lightpaint" / "pipeline/pipeline.py").read_text())
     [run] = (x for x in module.body if isinstance(x, ast.FunctionDef) and x.name == "run")
     del run.body[0]  # the docstring
     assert ast.dump(ast.parse(quoted).body[0]) == ast.dump(run)

@@ -11,8 +11,8 @@ import pytest
 from command import refused, run, succeed
 
 import lightpaint as lp
-from lightpaint.images.exr import Part, rgb_channels, write_parts
-from lightpaint.report.emitters import emitters_in_view
+from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
+from lightpaint.report.visible_emitters import emitters_in_view
 
 SIZE = (12, 10)
 TIMES = 350.0

@@ -14,7 +14,7 @@ from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 
 NAMES = sorted({*lp.__all__, *lp._EXTRAS} - {"__version__"})
 SECTION = re.compile(r"^(Args|Attributes|Returns|Raises|Examples):$", re.MULTILINE)

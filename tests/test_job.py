@@ -17,11 +17,11 @@ from lightpaint import Constraints, Job, Painting, SceneFile, Settings, paint_wi
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
-from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.pipeline.sources import BasisFile, GroupsFile
 from lightpaint.scene.scene import load_scene
-from lightpaint.sources import BasisFile, GroupsFile
 from lightpaint.target.target import Target
 
 SIDE = """<sensor type="perspective" id="side"><transform name="to_world">
@@ -212,7 +212,7 @@ def test_what_cannot_be_done_is_said_at_birth(how: Any, error: type[Exception], 
 def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
     room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("lightpaint.pipeline.obtain_basis", None)
+    monkeypatch.setattr("lightpaint.pipeline.pipeline.obtain_basis", None)
     scene = load_scene(room)
     side = load_scene(room, sensor="side")
     (height, width) = scene.size
@@ -313,7 +313,7 @@ def test_one_listener_hears_work_and_remarks(here: Path):
 def test_a_basis_that_was_obtained_serves_the_next_painting(
     room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    from lightpaint import pipeline
+    from lightpaint.pipeline import pipeline
 
     rendered: list[Any] = []
     once = pipeline.obtain_basis

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint import results
 from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, write_estimate
-from lightpaint.images.exr import Part, rgb_channels, write_parts
-from lightpaint.results import VIEW_KEY, verify_result
+from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
+from lightpaint.pipeline import results
+from lightpaint.pipeline.results import VIEW_KEY, verify_result
 
 IMAGE = np.ones((2, 3, 3), np.float32)
 

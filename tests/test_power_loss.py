@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from lightpaint import staging
 from lightpaint.batch.plan.journal import Journal, Line
 from lightpaint.files import write_text
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import LightSetting
 from lightpaint.paint.store.store import Store
-from lightpaint.staging import staged
+from lightpaint.storage import staging
+from lightpaint.storage.staging import staged
 
 
 class Disk:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.records import MAX_CHARACTERS, read_record, strict_json
+from lightpaint.storage.json_records import MAX_CHARACTERS, read_record, strict_json
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from renderer import LIGHTS, write_room
 import lightpaint as lp
 from lightpaint.basis.file import write_basis
 from lightpaint.errors import OutputError
-from lightpaint.images.exr import write_rgb
-from lightpaint.images.png import png_bytes
-from lightpaint.result_folder import RECORD
-from lightpaint.sources import BasisFile
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.images.formats.png import png_bytes
+from lightpaint.pipeline.result_folder import RECORD
+from lightpaint.pipeline.sources import BasisFile
 
 SOLVE = ("solve", "a.basis.exr")
 
@@ -196,7 +196,7 @@ def test_what_comes_to_the_folder_during_a_run_is_kept(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two of one name at once, as `xargs -P` starts them."""
-    from lightpaint import pipeline
+    from lightpaint.pipeline import pipeline
 
     job, other = (
         lp.Job((), (lp.Painting(f"{name}/evening.exr"),), Path("out"), BasisFile("a.basis.exr"))
@@ -341,7 +341,7 @@ def test_what_can_be_seen_after_a_run_can_be_rendered_and_relit(here: Path, room
 
 
 def test_views_that_are_not_painted_any_more_go(here: Path, make_basis: Any) -> None:
-    from lightpaint.result_folder import ResultFolder
+    from lightpaint.pipeline.result_folder import ResultFolder
 
     both = ResultFolder(Path("out"), (Path("out/a/x"), Path("out/b/x")), (), ("a", "b"))
     one = replace(both, files=(Path("out/a/x"),), answers=("a",))

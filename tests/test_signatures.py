@@ -17,7 +17,7 @@ PLACES = ("path", "folder")
 def _writers() -> Iterator[tuple[str, list[str]]]:
     """Name and positional parameters of every function that writes something."""
     # What the command line writes goes to the terminal.
-    for file in sorted(set(PACKAGE.rglob("*.py")) - set(PACKAGE.glob("cli/*.py"))):
+    for file in sorted(set(PACKAGE.rglob("*.py")) - set(PACKAGE.glob("cli/**/*.py"))):
         for node in ast.parse(file.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and node.name.startswith("write_"):
                 where = f"{file.relative_to(PACKAGE)}:{node.name}"

@@ -9,8 +9,8 @@ import pytest
 
 from lightpaint import Painting, SceneFile
 from lightpaint.batch.work.work_items import Film
-from lightpaint.images.exr import write_rgb
-from lightpaint.sources import BasisFile, GroupsFile
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.pipeline.sources import BasisFile, GroupsFile
 
 
 def _painted(path: Path, light: float) -> None:

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from lightpaint import staging, system
 from lightpaint.errors import OutputError
-from lightpaint.staging import JOURNAL, MARK, finish, staged
+from lightpaint.storage import linux_calls as system
+from lightpaint.storage import staging
+from lightpaint.storage.staging import JOURNAL, MARK, finish, staged
 
 EARLIER = {"a": "earlier", "deep/b": "earlier", "view/c": "earlier"}
 OTHERS = {"notes.txt": "mine", "deep/mine": "mine", "mine/too": "mine"}

@@ -13,8 +13,8 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.basis import cache
 from lightpaint.errors import TargetError
-from lightpaint.images.denoise import DENOISED_KEY
-from lightpaint.images.exr import read_parts
+from lightpaint.images.denoiser import DENOISED_KEY
+from lightpaint.images.formats.exr import read_parts
 from lightpaint.target.template import read_template
 
 #: A solve for the look itself.

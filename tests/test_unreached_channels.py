@@ -16,10 +16,10 @@ import pytest
 from command import succeed
 
 import lightpaint as lp
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
 from lightpaint.relit.export.exports import lights_table
-from lightpaint.report.notebook import html_of
+from lightpaint.report.page.notebook_html import html_of
 
 SIZE = (12, 10)
 BEFORE = (0.4, 0.3, 0.2)

@@ -14,12 +14,11 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
-from lightpaint.call import paint_with_light
 from lightpaint.cli import main
-from lightpaint.cli.spelling import solve_command
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.cli.commands.session_options import solve_command
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import BasisError, OutputError, TargetError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.uncertainty import error_bars
 from lightpaint.lighting.file import read_lighting
@@ -32,9 +31,10 @@ from lightpaint.paint.session_file import identity_of
 from lightpaint.paint.store.steps import SeenFrom
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
+from lightpaint.pipeline.call import paint_with_light
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import SceneFile
 from lightpaint.scene.scene import load_scene
-from lightpaint.settings import Settings
-from lightpaint.sources import SceneFile
 from lightpaint.target.target import Target
 
 CLOSE = """<sensor type="perspective" id="close"><float name="fov" value="40"/>

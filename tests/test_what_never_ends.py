@@ -19,7 +19,7 @@ from renderer import write_room
 from lightpaint import files
 from lightpaint.basis.file import write_basis
 from lightpaint.errors import SceneError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 
 #: Seconds that a refusal may take; Mitsuba starts in them.
 AT_ONCE = 60

@@ -11,14 +11,14 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, read_only
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.color import luminance
-from lightpaint.colour.exposure import choose_exposure
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.dataframes import CHANNELS, by_channel, pandas, xarray
 from lightpaint.errors import BasisError
-from lightpaint.images.denoise import Features
-from lightpaint.images.objects import Objects
+from lightpaint.images.denoiser import Features
+from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
-from lightpaint.scene.lights_file import Asked
+from lightpaint.scene.lights.lights_file import Asked
 from lightpaint.screen import Shown, some_names, some_of
-from lightpaint.tables import CHANNELS, by_channel, pandas, xarray
 from lightpaint.version import __version__
 
 #: Pixels of all lights that are brought to double precision at a time.

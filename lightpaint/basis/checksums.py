@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import BasisError
 from lightpaint.files import one_line
-from lightpaint.records import read_record, strict_json
+from lightpaint.storage.json_records import read_record, strict_json
 
 CHECKSUMS_KEY = "lightpaint.checksums"
 

@@ -23,8 +23,8 @@ from lightpaint.basis.basis import Basis, mix
 from lightpaint.basis.cache_folder import CLEAN, is_own
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
-from lightpaint.images.denoise import denoised, how_denoised, is_there
-from lightpaint.images.resample import resampled
+from lightpaint.images.denoiser import denoised, how_denoised, is_there
+from lightpaint.images.resampling import resampled
 from lightpaint.threads import side_by_side
 
 FORMAT, PARTS = "lightpaint-clean 1", ("halves", "scales", "present")

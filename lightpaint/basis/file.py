@@ -17,12 +17,12 @@ from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.files import file_length, one_line
-from lightpaint.images.denoise import Features
+from lightpaint.images.denoiser import Features
 from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.exr import Part, read_headers, read_parts, rgb_channels, write_parts
-from lightpaint.images.objects import Objects
+from lightpaint.images.formats.exr import Part, read_headers, read_parts, rgb_channels, write_parts
+from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
-from lightpaint.records import fields_of, read_record, strict_json
+from lightpaint.storage.json_records import fields_of, read_record, strict_json
 
 FORMAT = "lightpaint-basis 1"
 FORMAT_KEY = "lightpaint.format"

@@ -27,10 +27,10 @@ from lightpaint.basis.cache_folder import KNOWN, folder, is_own
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
-from lightpaint.records import read_record, strict_json
 from lightpaint.scene.checks.tokens import attributes, markup
-from lightpaint.scene.lights_file import Asked
+from lightpaint.scene.lights.lights_file import Asked
 from lightpaint.scene.scene import Scene
+from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-known 2"

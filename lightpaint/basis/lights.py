@@ -9,9 +9,9 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, read_only
 from lightpaint.errors import BasisError
-from lightpaint.expected import BRIGHTEST, MAX_NAME, is_amount
-from lightpaint.scene.lights_file import Asked
+from lightpaint.scene.lights.lights_file import Asked
 from lightpaint.screen import Listed, some_names
+from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
 
 @dataclass(frozen=True)

@@ -30,11 +30,11 @@ from lightpaint.batch.work.work import attempted, fields_of, final_render, is_fu
 from lightpaint.batch.work.work_items import Done, Film
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
-from lightpaint.pipeline import obtain
+from lightpaint.pipeline.pipeline import obtain
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
-from lightpaint.scene.quality import on_film, samples
-from lightpaint.settings import Settings
-from lightpaint.sources import SceneFile
+from lightpaint.scene.presets import on_film, samples
 
 
 def run_batch(

@@ -19,7 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         with hearing(came):
             with interruptible_between_pieces():
-                from lightpaint.cli.command import run_command
+                from lightpaint.cli.dispatcher import run_command
             code = run_command(arguments, came)
     except KeyboardInterrupt:
         import sys
@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:  # before there was a command to answer for it
         import sys
 
-        from lightpaint.cli.fault import report_fault
+        from lightpaint.cli.crash_report import report_fault
 
         given = list(sys.argv[1:] if arguments is None else arguments)
         code = report_fault("lightpaint", error, given)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from lightpaint.errors import BackendError
-from lightpaint.scene.llvm import INSTALL_LLVM, llvm_candidates
-from lightpaint.scene.variant import use_variant
+from lightpaint.scene.runtime.llvm import INSTALL_LLVM, llvm_candidates
+from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.version import __version__
 
 State = Literal["ok", "missing", "info"]

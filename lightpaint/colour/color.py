@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.display import decode_display, encode_display, to_8_bit
-from lightpaint.colour.locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
+from lightpaint.colour.display.srgb import decode_display, encode_display, to_8_bit
+from lightpaint.colour.planckian_locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 from lightpaint.errors import ColorError
 

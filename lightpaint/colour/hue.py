@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.color import cct_and_duv
-from lightpaint.colour.difference import lab
+from lightpaint.colour.color_difference import lab
 
 #: Distance from Planck's locus, and lowest temperature, of what is called white.
 WHITE_DUV, WARMEST = 0.015, 2100.0

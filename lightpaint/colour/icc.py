@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display import decode_display
+from lightpaint.colour.display.srgb import decode_display
 from lightpaint.colour.primaries import REC709, adaptation, rgb_to_xyz, to_rec709
 from lightpaint.errors import ImageError
 

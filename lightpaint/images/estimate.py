@@ -9,8 +9,8 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError
 from lightpaint.files import one_line
-from lightpaint.images.blocks import block_mean
-from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts
+from lightpaint.images.formats.exr import Part, read_parts, rgb_channels, write_parts
+from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
 from lightpaint.screen import shortly, some_names
 

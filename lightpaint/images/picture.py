@@ -9,15 +9,20 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import ImageError
 from lightpaint.files import one_line
-from lightpaint.images.bitmap import Bitmap, read_bitmap
-from lightpaint.images.decode import light_of_floats, light_of_integers, transform_of, unpremultiply
-from lightpaint.images.exr import Part, read_parts
-from lightpaint.images.exr_layers import ALPHA_NAMES, RGB_NAMES, Layer, choose_layer
-from lightpaint.images.kinds import head_of, kind_of, name_of
-from lightpaint.images.layered import LAYERED, layered_kind, read_merged
+from lightpaint.images.formats.bitmap import Bitmap, read_bitmap
+from lightpaint.images.formats.bitmap_decoder import (
+    light_of_floats,
+    light_of_integers,
+    transform_of,
+    unpremultiply,
+)
+from lightpaint.images.formats.exr import Part, read_parts
+from lightpaint.images.formats.exr_layers import ALPHA_NAMES, RGB_NAMES, Layer, choose_layer
+from lightpaint.images.formats.file_kinds import head_of, kind_of, name_of
+from lightpaint.images.formats.openraster import LAYERED, layered_kind, read_merged
 
 Mask = npt.NDArray[np.bool_]
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis, mix
-from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.blocks import block_sums, enlarged
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.lighting.lit_pixels import LitPixels
 from lightpaint.lighting.loss import Cut, Loss
 from lightpaint.lighting.normal_equations import NormalEquations

@@ -10,7 +10,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Slices
 from lightpaint.colour.color import luminance
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import box_mean
 
 #: How far around an emitter's pixel paint is looked at: a part of the picture's height, and pixels

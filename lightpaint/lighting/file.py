@@ -12,7 +12,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
-from lightpaint.records import fields_of, read_record, strict_json
+from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"

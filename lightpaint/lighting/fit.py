@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, TypeVar
 
-from lightpaint.colour.exposure import choose_exposure
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
-from lightpaint.expected import SWITCH, Check, a, check_fields, number, one_of
 from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.target.target import Target
+from lightpaint.validation import SWITCH, Check, a, check_fields, number, one_of
 
 #: What is compared with the painting: light, or what a display shows of it.
 Space = Literal["linear", "display"]

@@ -16,7 +16,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
-from lightpaint.colour.hull import (
+from lightpaint.colour.color_hull import (
     DIRECTIONS,
     ROUND_OFF,
     ColorHull,
@@ -24,7 +24,7 @@ from lightpaint.colour.hull import (
     reach_of,
     sides_of,
 )
-from lightpaint.colour.whites import white_range
+from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.constraints.whites import WHITES
 
 #: Part of the painted light beyond which what is painted says nothing: noise, edges of strokes.

@@ -13,14 +13,14 @@ from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis, mix
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
 from lightpaint.errors import LightingError, UnknownLightError
-from lightpaint.expected import BRIGHTEST
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.setting import ALL_REACHED, LightSetting
 from lightpaint.screen import Shown, some_names, some_of
-from lightpaint.tables import CHANNELS, by_channel, number, pandas, xarray
+from lightpaint.validation import BRIGHTEST
 
 
 @keywords()

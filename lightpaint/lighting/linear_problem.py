@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Self
 
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.lights import Lights
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.constraints.whites import white_where_free

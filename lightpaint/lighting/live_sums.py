@@ -8,8 +8,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.blocks import block_mean, block_sums, enlarged
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.pixel_blocks import block_mean, block_sums, enlarged
 from lightpaint.lighting.loss import STRIP
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.pixels import PaintedPixels, joined

@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.emitters import asks_no_less, dark_of, grow
 from lightpaint.lighting.live_sums import FILM, PaintedTiles, SmallFilm
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.emitters import asks_no_less, dark_of
 from lightpaint.lighting.fit import Emitters, Fit

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.blocks import block_sums
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.loss import STRIP, Cut, Loss, image_of, planes_of
 from lightpaint.lighting.pixels import PaintedPixels
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.loss import PixelLoss
 
 

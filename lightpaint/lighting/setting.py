@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import LightingError
-from lightpaint.expected import BRIGHTEST, MAX_NAME, is_amount
+from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
 #: A number of each channel, None where nothing tells; an interval of each.
 Errors = tuple[float | None, float | None, float | None]

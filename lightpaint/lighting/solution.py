@@ -9,6 +9,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
+from lightpaint.dataframes import CHANNELS, by_channel, xarray
 from lightpaint.keywords import keywords
 from lightpaint.lighting.certificate import Certificate
 from lightpaint.lighting.fit import Space
@@ -17,7 +18,6 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.reweighted import Reweighting
 from lightpaint.screen import Shown
-from lightpaint.tables import CHANNELS, by_channel, xarray
 
 
 @keywords()

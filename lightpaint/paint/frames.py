@@ -21,7 +21,7 @@ from lightpaint.errors import PaintError
 from lightpaint.files import one_line
 from lightpaint.paint.protocol import KINDS, Said
 from lightpaint.paint.protocol.base import DTYPES
-from lightpaint.records import read_record, strict_json
+from lightpaint.storage.json_records import read_record, strict_json
 
 #: Longest frame that is read, in bytes, and longest JSON in it.
 MAX_FRAME, MAX_TEXT = 2**28, 2**20

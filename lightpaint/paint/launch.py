@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.colour.transform import TransformChoice
+from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import SceneError
 from lightpaint.files import check_writable, file_length
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -26,15 +26,15 @@ from lightpaint.paint.store.requests import Wishes
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.scene.scene import Scene
-from lightpaint.settings import Settings
-from lightpaint.signals import interruptible_between_pieces
-from lightpaint.sources import (
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import (
     BasisFile,
     GroupsFile,
     SceneFile,
     check_nothing_idle,
 )
+from lightpaint.scene.scene import Scene
+from lightpaint.signals import interruptible_between_pieces
 
 #: The session in the folder of what is painted.
 SESSION = "session.db"

@@ -10,9 +10,9 @@ from lightpaint.basis import known
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.known import Known
 from lightpaint.errors import PaintError
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import SceneFile, vars_of
 from lightpaint.scene.scene import Scene
-from lightpaint.settings import Settings
-from lightpaint.sources import SceneFile, vars_of
 
 
 @dataclass
@@ -64,7 +64,7 @@ class Opening:
 
     def _loaded(self) -> Scene:
         # The renderer, and what goes with it, comes with the first scene.
-        from lightpaint.scene.quality import on_film
+        from lightpaint.scene.presets import on_film
 
         self._began_s, self._clock_s = time.time(), _clock_s()
         scene = on_film(self.file.content, self.settings.quality, self.settings.resolution)

@@ -8,7 +8,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes, clean_plane, keep_planes, kept_planes
-from lightpaint.images.denoise import denoised
+from lightpaint.images.denoiser import denoised
 from lightpaint.paint.session.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.store.steps import of_view

@@ -8,22 +8,22 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display import to_8_bit
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
-from lightpaint.images.denoise import denoised, how_denoised
-from lightpaint.images.png import png_bytes
-from lightpaint.job import Job
+from lightpaint.images.denoiser import denoised, how_denoised
+from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.paint.session.snapshot import Moment
 from lightpaint.paint.subject import Subject, painting_of, picture_of
-from lightpaint.pipeline import run
+from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verify import verify
-from lightpaint.report.looks import Looks
+from lightpaint.report.clean_pictures import Looks
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.own import write_painting

@@ -83,14 +83,14 @@ class Keeping:
 
     def _take(self, k: int, opening: Opening, scene: Scene) -> None:
         """Once the scene of view k is there, of which nothing was known."""
-        from lightpaint.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
+        from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 
         self._loaded[k] = scene
         if (identity := identity_of(self._subjects, self._loaded)) is not None:
             self._begin(identity)
         lasting = *remarks_of_scene(scene), *remarks_of_film(scene, opening.settings)
         self._tell((*lasting, *remarks_of_memory(scene)))
-        from lightpaint.scene.variant import use_variant
+        from lightpaint.scene.runtime.variant import use_variant
 
         # What is said of this machine may not be so the next time.
         opening.remarks = tuple(x for x in lasting if x != use_variant().note)

@@ -57,7 +57,7 @@ from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject, bases_of, transform_of
 from lightpaint.progress import while_wanted
-from lightpaint.scene.turns import MITSUBA
+from lightpaint.scene.runtime.render_lock import MITSUBA
 
 
 class OldError(Exception):

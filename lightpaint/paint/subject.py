@@ -10,15 +10,15 @@ from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.known import Known
 from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.lazy_scene import Opening
 from lightpaint.paint.store.requests import Wishes
+from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.quality import samples
+from lightpaint.scene.presets import samples
 from lightpaint.scene.scene import Scene
-from lightpaint.settings import Settings
 
 #: Samples per pixel after which a basis that is still being rendered is shown, and shown again.
 FIRST = (2, 8, 32, 128)
@@ -94,7 +94,7 @@ class Subject:
             yield kept
             return
         # What renders is not needed for a basis that is there.
-        from lightpaint.pipeline import obtain
+        from lightpaint.pipeline.pipeline import obtain
 
         scene, settings, wanted = self.loaded, self.settings, self.wanted or 1
         kept = cache.find(scene.identity, sensor_of(scene), settings.seed, scene.size)

@@ -11,7 +11,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis, mix
 from lightpaint.errors import SizeError
-from lightpaint.images.blocks import block_mean, whole_factor
+from lightpaint.images.pixel_blocks import block_mean, whole_factor
 from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products

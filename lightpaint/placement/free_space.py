@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Floats, Position
-from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, pass_seed
 
 #: Points of the picture from which places are looked for, and rays from each.
 POINTS, RAYS = 600, 24

@@ -15,7 +15,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
-from lightpaint.images.blocks import whole_factor
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.additions import Addition, find_additions
@@ -25,9 +25,9 @@ from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.xml_edit import tag
 from lightpaint.scene.film import reduction_to
-from lightpaint.scene.lights import free_names
-from lightpaint.scene.render import Stream, pass_seed
+from lightpaint.scene.lights.light import free_names
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, pass_seed
 
 #: Suggestions that are made where no number is given.
 SUGGESTED = 3

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from lightpaint.images.blocks import Size, whole_factor
+from lightpaint.images.pixel_blocks import Size, whole_factor
 from lightpaint.scene.scene import Scene
 
 #: Samples per pixel of a verification, at least: with fewer, a smaller film serves as well.

@@ -10,8 +10,8 @@ from lightpaint.errors import OutputError, SceneError
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.relit.relight import relit_files, scene_of, settings_of
 from lightpaint.relit.xml_edit import tag
-from lightpaint.scene.emission import Scaling
-from lightpaint.scene.emitters import Emitter
+from lightpaint.scene.lights.emission import Scaling
+from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene
 
 #: A folder that is not there, and stands for wherever the relit scene might be.

@@ -12,8 +12,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.relit.verification import (
     LIMIT,

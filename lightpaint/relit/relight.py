@@ -15,13 +15,13 @@ import numpy as np
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.relit.emission_xml import Changes, set_emission
 from lightpaint.relit.xml_edit import XmlFile, tag
-from lightpaint.scene.emission import Scaling
-from lightpaint.scene.emitters import Emitter
+from lightpaint.scene.lights.emission import Scaling
+from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names
 

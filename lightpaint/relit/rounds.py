@@ -11,8 +11,8 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.views import joint_estimate
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.relight import relight
-from lightpaint.scene.render import Stream, pass_seed, render, view_seed
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, pass_seed, render, view_seed
 
 
 def refine_by_rendering(

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.difference import delta_e
-from lightpaint.colour.exposure import choose_exposure
+from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.errors import SizeError
-from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.screen import Shown
 

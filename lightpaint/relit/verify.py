@@ -1,13 +1,13 @@
 """The independent render of the relit scene, held against the prediction."""
 
 from lightpaint.errors import SizeError
-from lightpaint.images.blocks import whole_factor
 from lightpaint.images.estimate import Estimate
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.verification import Verification, compare
-from lightpaint.scene.render import Stream, render
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, render
 
 
 @keywords()

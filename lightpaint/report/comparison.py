@@ -9,12 +9,11 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display import to_8_bit
-from lightpaint.images.blocks import block_mean, enlarged, whole_factor
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
 from lightpaint.lighting.analysis.seen import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.looks import Looks
-from lightpaint.report.pictures import (
+from lightpaint.report.answer_pictures import (
     Residual,
     diverging,
     residual_of,
@@ -23,6 +22,7 @@ from lightpaint.report.pictures import (
     target_picture,
     transform_of,
 )
+from lightpaint.report.clean_pictures import Looks
 from lightpaint.target.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read.

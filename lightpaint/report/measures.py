@@ -8,7 +8,7 @@ from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.html import SHOWN, SPARE
+from lightpaint.report.page.html import SHOWN, SPARE
 
 
 def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import SceneError
-from lightpaint.images.blocks import blocks_in, left_over, whole_factor
+from lightpaint.images.pixel_blocks import blocks_in, left_over, whole_factor
 from lightpaint.screen import some_names
 
 #: Pixels of a film and its samples per pixel beyond which each is a mistake.

@@ -7,7 +7,7 @@ its last bits from process to process.
 
 from typing import Any
 
-from lightpaint.scene.threads import adds_in_order, kernels
+from lightpaint.scene.runtime.kernel_threads import adds_in_order, kernels
 
 #: Most by which normals of a file are those that its faces have: written or computed otherwise.
 #: Round-off is a hundredth of it.

@@ -18,19 +18,19 @@ from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length
 from lightpaint.keywords import keywords
-from lightpaint.scene.checks.old import words_for_old_scenes
+from lightpaint.scene.checks.legacy import words_for_old_scenes
 from lightpaint.scene.checks.xml import MAX_XML
-from lightpaint.scene.choice import REST, choose_lights
-from lightpaint.scene.emission import EmitterSetting
-from lightpaint.scene.emitters import Emitter, check_emitters, find_emitters, point_emitter
 from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.integrator import Integrator, IntegratorChoice
-from lightpaint.scene.lights import Light, free_names, light_named, lights_of, settings_for
-from lightpaint.scene.lights_file import Asked, lights_file_beside, lights_file_for
-from lightpaint.scene.parsed import ParsedScene, mitsuba_errors, render_errors
-from lightpaint.scene.shapes import shape_names
-from lightpaint.scene.turns import MITSUBA
-from lightpaint.scene.variant import use_variant
+from lightpaint.scene.lights.emission import EmitterSetting
+from lightpaint.scene.lights.emitters import Emitter, check_emitters, find_emitters, point_emitter
+from lightpaint.scene.lights.light import Light, free_names, light_named, lights_of, settings_for
+from lightpaint.scene.lights.light_choice import REST, choose_lights
+from lightpaint.scene.lights.lights_file import Asked, lights_file_beside, lights_file_for
+from lightpaint.scene.runtime.render_lock import MITSUBA
+from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.scene_tree import ParsedScene, mitsuba_errors, render_errors
+from lightpaint.scene.shape_names import shape_names
 from lightpaint.screen import Listed, Shown, some_names, some_of
 
 _Made = TypeVar("_Made")

@@ -8,14 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.images.blocks import block_mean, block_pixels
-from lightpaint.images.denoise import Features
-from lightpaint.images.objects import NOTHING as NOTHING_SEEN
-from lightpaint.images.objects import Objects
+from lightpaint.images.denoiser import Features
+from lightpaint.images.object_map import NOTHING as NOTHING_SEEN
+from lightpaint.images.object_map import Objects
+from lightpaint.images.pixel_blocks import block_mean, block_pixels
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.render import Stream, largest_pass, pass_seed
+from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.turns import tracing
+from lightpaint.scene.scene_render import Stream, largest_pass, pass_seed
 
 #: Samples of a pixel, each by itself: an index of a shape must not be averaged.
 SAMPLES = 16

@@ -11,8 +11,8 @@ import numpy as np
 
 from lightpaint.arrays import Floats, largest
 from lightpaint.colour.color import luminance
-from lightpaint.colour.curves import BUILT_IN
-from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.colour.display.tone_curves import BUILT_IN
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.images.picture import Picture
 from lightpaint.target.painted import LOSSY, ROUNDING, compressed_like, lossy_difference
 

@@ -12,11 +12,11 @@ from typing import Literal
 
 import numpy as np
 
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import TargetError
-from lightpaint.images.exr import Part, rgb_channels, write_parts
+from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
 from lightpaint.images.picture import AT_LEAST
-from lightpaint.records import fields_of, read_record, strict_json
+from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.target.target import Target
 
 #: Text attribute of the EXR.

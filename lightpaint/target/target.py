@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.colour.color import luminance
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.blocks import block_mean, whole_factor
-from lightpaint.images.resample import resampled
+from lightpaint.images.pixel_blocks import block_mean, whole_factor
+from lightpaint.images.resampling import resampled
 from lightpaint.keywords import keywords
 from lightpaint.screen import Shown
 

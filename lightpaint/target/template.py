@@ -11,14 +11,14 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display import to_8_bit
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.files import one_line, read_text, write_bytes, write_text
-from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
-from lightpaint.images.png import TRANSFORM_KEY, png_bytes, write_png_16
-from lightpaint.records import fields_of, read_record, strict_json
-from lightpaint.staging import is_below, staged
+from lightpaint.images.formats.exr import Part, read_parts, write_parts, write_rgb
+from lightpaint.images.formats.png import TRANSFORM_KEY, png_bytes, write_png_16
+from lightpaint.storage.json_records import fields_of, read_record, strict_json
+from lightpaint.storage.staging import is_below, staged
 
 FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
 

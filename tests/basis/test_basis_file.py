@@ -25,8 +25,8 @@ from lightpaint.basis.file import (
 )
 from lightpaint.errors import BasisError, ImageError, SizeError
 from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
-from lightpaint.images.objects import Objects
+from lightpaint.images.formats.exr import Part, read_parts, write_parts, write_rgb
+from lightpaint.images.object_map import Objects
 
 SIZE = (6, 5)
 

@@ -20,10 +20,10 @@ from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import is_on_the_way
 from lightpaint.errors import LightpaintError, OutputError, SceneError
-from lightpaint.pipeline import obtain
+from lightpaint.pipeline.pipeline import obtain
+from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.settings import Settings
 
 #: What one is called that no program has written to its end.
 DAMAGED = "da" * 16
@@ -111,7 +111,7 @@ def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
 def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:
-    monkeypatch.setattr("lightpaint.scene.render.SAMPLES_PER_PASS", 4 * 4 * 24 * 20)
+    monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 4 * 24 * 20)
     path = write_room(
         tmp_path, integrator=f'<integrator type="{integrator}"/>', lights=LIGHTS["bulb"]
     )

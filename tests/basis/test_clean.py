@@ -16,7 +16,7 @@ from lightpaint.basis.clean import (
     kept_planes,
     scale_of,
 )
-from lightpaint.images.denoise import denoised, is_there
+from lightpaint.images.denoiser import denoised, is_there
 
 pytestmark = pytest.mark.skipif(not is_there(), reason="Open Image Denoise")
 

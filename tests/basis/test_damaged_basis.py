@@ -18,7 +18,7 @@ from lightpaint.basis.file import LIGHT_KEY, ORIGIN_KEY, read_basis, read_origin
 from lightpaint.basis.lightgroups.folder import MAX_FILES, is_light_groups
 from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.images.exr import Part, read_parts, write_parts, write_rgb
+from lightpaint.images.formats.exr import Part, read_parts, write_parts, write_rgb
 
 SIZE = (6, 5)
 

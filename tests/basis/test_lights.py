@@ -14,7 +14,7 @@ from lightpaint.lighting.linear import solve_linear
 from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.sums import Sums, problem_of_sums
-from lightpaint.scene.lights_file import Asked
+from lightpaint.scene.lights.lights_file import Asked
 
 
 def lamp(name: str, emission: float = 0.5, **about: bool) -> BasisLight:

@@ -30,7 +30,7 @@ from lightpaint.batch.work.processes import Processes
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import Done
 from lightpaint.errors import BatchError, OutputError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
 from lightpaint.progress import Interrupted, silent
 

@@ -26,9 +26,9 @@ from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import How, Outcome
-from lightpaint.images.exr import write_rgb
-from lightpaint.scene import render as render_module
-from lightpaint.scene.threads import limit_threads
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.scene import scene_render as render_module
+from lightpaint.scene.runtime.kernel_threads import limit_threads
 
 distributed = pytest.importorskip("distributed", reason="Dask's distributed")
 

@@ -17,8 +17,8 @@ from lightpaint.batch.gallery import summary
 from lightpaint.batch.gallery.gallery import gallery_page
 from lightpaint.batch.gallery.small_planes import keep_planes, planes_name, read_planes
 from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, Row
-from lightpaint.colour.display import to_8_bit
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import Lighting

@@ -10,7 +10,7 @@ from command import refused, run, succeed
 from light_groups import interleaved, pictures
 from renderer import write_room
 
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
 
 LOOKS = """

@@ -14,7 +14,7 @@ from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.errors import LightingError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 
 #: float64 through logarithms, cube roots and the inverse of a 3 x 3 matrix.
 PRECISION = 1e-9

@@ -14,12 +14,13 @@ from rich.cells import cell_len
 
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.cli import main, terminal
-from lightpaint.cli.answer import _what_holds, change
-from lightpaint.cli.options import BY_OPTION
-from lightpaint.cli.words import spoken
-from lightpaint.images.exr import write_rgb
-from lightpaint.images.png import png_bytes
+from lightpaint.cli import main
+from lightpaint.cli.commands.answer_text import _what_holds, change
+from lightpaint.cli.options.job_options import BY_OPTION
+from lightpaint.cli.output import terminal
+from lightpaint.cli.output.vocabulary import spoken
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.analysis.held_back import Loosening, Reason
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.setting import LightSetting

@@ -22,9 +22,9 @@ from lightpaint import paint_with_light
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import read_estimate
-from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
-from lightpaint.results import verify_result
-from lightpaint.scene.quality import PRESETS
+from lightpaint.images.formats.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
+from lightpaint.pipeline.results import verify_result
+from lightpaint.scene.presets import PRESETS
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 

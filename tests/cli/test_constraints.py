@@ -11,9 +11,9 @@ from command import refused, run, succeed
 from renderer import write_room
 
 from lightpaint import Constraints, paint_with_light, read_basis
-from lightpaint.cli.parser import command_parser
+from lightpaint.cli.options.parser import command_parser
 from lightpaint.colour.color import kelvin_to_rgb, luminance
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene.scene import load_scene
 
 FILE = """

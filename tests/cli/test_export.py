@@ -15,7 +15,7 @@ from command import refused, run, succeed
 from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
 from lightpaint.relit.export.colors import with_own_colors
 from lightpaint.scene.scene import load_scene

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from command import refused, run
 
-from lightpaint.cli import command
-from lightpaint.cli.fault import FAULT
-from lightpaint.scene.parsed import render_errors
+from lightpaint.cli import dispatcher as command
+from lightpaint.cli.crash_report import FAULT
+from lightpaint.scene.scene_tree import render_errors
 
 #: A camera that no particle hits: it loads, and Mitsuba throws in the middle of the render.
 SCENE = """<scene version="3.0.0">
@@ -75,7 +75,7 @@ def test_where_nothing_can_be_written_it_is_one_line_still(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fails(monkeypatch, ZeroDivisionError())
-    monkeypatch.setattr("lightpaint.cli.fault._folders", lambda: [Path("/dev/null/logs")])
+    monkeypatch.setattr("lightpaint.cli.crash_report._folders", lambda: [Path("/dev/null/logs")])
     done = run(tmp_path, "doctor")
     assert done.returncode == FAULT
     [line] = done.stderr.splitlines()

@@ -26,7 +26,7 @@ SPP = {"one pass": 2500, "separate renders": 250}
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
 import os, sys, time
-import lightpaint.basis.render.budget as budget, lightpaint.scene.render as render
+import lightpaint.basis.render.budget as budget, lightpaint.scene.scene_render as render
 from lightpaint.cli import main
 budget.KEEP_EVERY_S, render.SAMPLES_PER_PASS = 0, 2**15
 if "SLOWLY" in os.environ:
@@ -168,8 +168,8 @@ sys.exit(main())
 @pytest.mark.parametrize(
     ("module", "number"),
     [
-        ("lightpaint.cli.parser", signal.SIGINT),
-        ("lightpaint.cli.listing", signal.SIGTERM),
+        ("lightpaint.cli.options.parser", signal.SIGINT),
+        ("lightpaint.cli.commands.lights", signal.SIGTERM),
         ("numpy", signal.SIGINT),
         ("mitsuba", signal.SIGINT),
     ],
@@ -222,10 +222,10 @@ def test_killed_at_any_moment_leaves_a_readable_basis(
 ) -> None:
     """However far the writing of a part has come."""
     code = f"""
-import lightpaint.scene.render, lightpaint as lp, sys
+import lightpaint.scene.scene_render, lightpaint as lp, sys
 from lightpaint.basis.render.obtain import obtain_basis
 sys.modules["lightpaint.basis.render.budget"].KEEP_EVERY_S = 0
-lightpaint.scene.render.SAMPLES_PER_PASS = 2**17
+lightpaint.scene.scene_render.SAMPLES_PER_PASS = 2**17
 scene = lp.load_scene({str(CORNELL)!r})
 print("ready", flush=True)
 obtain_basis(scene, spp=100_000)

@@ -9,10 +9,10 @@ from command import refused, run
 from PIL import Image
 from renderer import LIGHTS, write_room
 
-from lightpaint import renders
-from lightpaint.images.png import png_says
-from lightpaint.renders import SHEET_KEY
-from lightpaint.scene.variant import use_variant
+from lightpaint.images.formats.png import png_says
+from lightpaint.pipeline import renders
+from lightpaint.pipeline.renders import SHEET_KEY
+from lightpaint.scene.runtime.variant import use_variant
 
 
 @pytest.fixture

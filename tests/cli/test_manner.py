@@ -12,9 +12,9 @@ from command import refused, run, succeed
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.file import write_basis
-from lightpaint.cli.parser import command_parser
-from lightpaint.cli.wanted import Wanted
-from lightpaint.images.exr import write_rgb
+from lightpaint.cli.options.parser import command_parser
+from lightpaint.cli.tolerances import Wanted
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.seen import Seen
 
 #: A name that steers a terminal, breaks lines, and would end a text of JSON.

@@ -13,13 +13,13 @@ from renderer import write_room
 
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
-from lightpaint.cli.options import basis_of, jobs_of, settings_of
-from lightpaint.cli.parser import command_parser
-from lightpaint.cli.words import spoken
+from lightpaint.cli.options.job_options import basis_of, jobs_of, settings_of
+from lightpaint.cli.options.parser import command_parser
+from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.sources import BasisFile, GroupsFile
+from lightpaint.pipeline.sources import BasisFile, GroupsFile
 from lightpaint.target.target import Target
 
 

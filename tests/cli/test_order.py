@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from command import refused
 
-from lightpaint.cli.parser import command_parser
+from lightpaint.cli.options.parser import command_parser
 
 
 def parsed(*line: str) -> dict[str, Any]:

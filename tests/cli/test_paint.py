@@ -26,9 +26,9 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from lightpaint.basis.file import write_basis
-from lightpaint.cli.options import painted_of, settings_of, values_of
-from lightpaint.cli.parser import command_parser
-from lightpaint.cli.spelling import solve_command
+from lightpaint.cli.commands.session_options import solve_command
+from lightpaint.cli.options.job_options import painted_of, settings_of, values_of
+from lightpaint.cli.options.parser import command_parser
 from lightpaint.paint.background_threads import Threads
 from lightpaint.paint.frames import of_frame, to_frame
 from lightpaint.paint.launch import subject_of, subjects_of
@@ -36,7 +36,7 @@ from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.store.requests import Wishes
 from lightpaint.paint.store.steps import Identity, Step
 from lightpaint.paint.store.store import Store
-from lightpaint.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 
 
 @pytest.fixture

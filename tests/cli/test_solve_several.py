@@ -7,7 +7,7 @@ import pytest
 from batches import write_batch
 from command import refused, run, succeed
 
-from lightpaint.cli.solve_options import VARIATIONS
+from lightpaint.cli.options.solve_options import VARIATIONS
 from lightpaint.lighting.file import read_lighting
 
 

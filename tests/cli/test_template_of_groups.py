@@ -11,8 +11,8 @@ from PIL import Image
 
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
-from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.exr import read_parts
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.formats.exr import read_parts
 from lightpaint.target.template import read_template
 
 SIZE = (48, 64)

@@ -13,8 +13,8 @@ from rich.markup import escape
 
 from lightpaint.basis import cache
 from lightpaint.basis.file import write_basis
-from lightpaint.cli import lines, terminal
-from lightpaint.images.exr import write_rgb
+from lightpaint.cli.output import lines, terminal
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.screen import some_names, visible
@@ -184,7 +184,7 @@ def test_a_line_of_stderr_has_an_end(capfd: pytest.CaptureFixture[str]) -> None:
 
 def test_a_fault_of_its_own_is_one_line_and_steers_nothing(tmp_path: Path) -> None:
     (tmp_path / "sitecustomize.py").write_text(
-        "import lightpaint.cli.upkeep as c\n"
+        "import lightpaint.cli.commands.maintenance as c\n"
         "def fails(**_): raise RuntimeError('\\x1b[2J told')\n"
         "c.doctor = fails\n"
     )

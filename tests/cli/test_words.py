@@ -11,13 +11,13 @@ import pytest
 
 import lightpaint
 from lightpaint.batch.run_options import How
-from lightpaint.cli.options import LOADING
-from lightpaint.cli.parser import command_parser
-from lightpaint.cli.words import _SAID, OPTIONS, SPELLINGS, spoken
+from lightpaint.cli.options.job_options import LOADING
+from lightpaint.cli.options.parser import command_parser
+from lightpaint.cli.output.vocabulary import _SAID, OPTIONS, SPELLINGS, spoken
 from lightpaint.paint.launch import paint_in_browser
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import NOT_IN_GROUPS
 from lightpaint.relit.forms import Source
-from lightpaint.settings import Settings
-from lightpaint.sources import NOT_IN_GROUPS
 from lightpaint.target.read import read_target
 
 PACKAGE = Path(lightpaint.__file__).parent
@@ -59,7 +59,9 @@ def _docstrings(file: Path) -> set[str]:
     return {text for text in found if text}
 
 
-LIBRARY = [file for file in sorted(PACKAGE.rglob("*.py")) if file.parent.name != "cli"]
+LIBRARY = [
+    file for file in sorted(PACKAGE.rglob("*.py")) if "cli" not in file.relative_to(PACKAGE).parts
+]
 
 
 @pytest.mark.parametrize("file", LIBRARY, ids=lambda x: str(x.relative_to(PACKAGE)))

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from lightpaint.colour.display import encode_display, to_8_bit
-from lightpaint.images.png import png_bytes, write_png
+from lightpaint.colour.display.srgb import encode_display, to_8_bit
+from lightpaint.images.formats.png import png_bytes, write_png
 
 
 @pytest.mark.parametrize(

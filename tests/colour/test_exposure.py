@@ -7,7 +7,7 @@ import pytest
 from conftest import BasisFactory
 
 from lightpaint.basis.basis import meter_exposure
-from lightpaint.colour.exposure import choose_exposure
+from lightpaint.colour.display.exposure import choose_exposure
 
 SIZE = (60, 80)
 

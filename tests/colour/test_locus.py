@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb
-from lightpaint.colour.locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
+from lightpaint.colour.planckian_locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
 from lightpaint.colour.primaries import REC709, SPACES, primaries_in, rgb_to_xyz
 from lightpaint.colour.science import colour_science
 

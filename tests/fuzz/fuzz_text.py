@@ -17,7 +17,7 @@ with atheris.instrument_imports(include=["lightpaint", "json", "tomllib"]):
     from lightpaint.errors import LightpaintError
     from lightpaint.lighting.constraints.file import read_constraints
     from lightpaint.lighting.file import read_lighting
-    from lightpaint.scene.lights_file import read_lights_file
+    from lightpaint.scene.lights.lights_file import read_lights_file
 
 PATH = Path(tempfile.mkdtemp()) / "text"
 

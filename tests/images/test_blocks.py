@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lightpaint.images.blocks import block_mean, block_sums
+from lightpaint.images.pixel_blocks import block_mean, block_sums
 
 
 @pytest.mark.parametrize("factor", [1, 2, 3, 5, 9])

@@ -11,7 +11,7 @@ from PIL import Image
 from renderer import write_room
 
 from lightpaint.basis.render.render import render_basis
-from lightpaint.images.denoise import (
+from lightpaint.images.denoiser import (
     DENOISED_KEY,
     LACKING,
     Features,

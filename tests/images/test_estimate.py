@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter
 
 from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, box_mean, read_estimate, write_estimate
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 
 
 def test_of_halves():

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from lightpaint.errors import ImageError, OutputError
-from lightpaint.images.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
+from lightpaint.images.formats.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
 
 # What a header's text may hold: anything but NUL, which ends it.
 TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=20)
@@ -147,7 +147,7 @@ def test_reading_without_a_terminal(tmp_path: Path, closed: str):
     code = """
 import os, sys
 from pathlib import Path
-from lightpaint.images.exr import read_headers, read_parts
+from lightpaint.images.formats.exr import read_headers, read_parts
 
 def standard():
     return [os.readlink(f"/proc/self/fd/{k}") if os.path.exists(f"/proc/self/fd/{k}") else None

@@ -16,12 +16,12 @@ import tifffile
 from picture_files import ADOBE, P3, SRGB, SRGB_CURVE, curv, icc, layered, para, png, psd
 from PIL import Image, ImageCms
 
-from lightpaint.colour.display import decode_display
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.srgb import decode_display
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import ImageError
-from lightpaint.images import layered as layered_module
+from lightpaint.images.formats import openraster as layered_module
+from lightpaint.images.formats.png import MAX_CHUNK, longest_png
 from lightpaint.images.picture import Picture, read_mask, read_picture
-from lightpaint.images.png import MAX_CHUNK, longest_png
 
 SIZE = (9, 7)
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting import approach, lit_pixels, pixels
 from lightpaint.lighting.approach import sample
 from lightpaint.lighting.constraints.constraints import Constraints

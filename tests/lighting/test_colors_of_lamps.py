@@ -9,8 +9,8 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.exposure import choose_exposure
-from lightpaint.colour.whites import white_range
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 
 ROOT = Path(__file__).parent.parent.parent

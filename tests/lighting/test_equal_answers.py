@@ -14,7 +14,7 @@ import pytest
 from command import spawn
 
 import lightpaint as lp
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.picture import read_picture
 from lightpaint.threads import linear_algebra
 

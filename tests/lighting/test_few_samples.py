@@ -15,7 +15,7 @@ import lightpaint as lp
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.exposure import choose_exposure
+from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.binning import binned_pixels, block_side
 from lightpaint.lighting.fit import meant_by

@@ -7,8 +7,8 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.hull import DIRECTIONS, chromaticity
-from lightpaint.colour.whites import white_range
+from lightpaint.colour.color_hull import DIRECTIONS, chromaticity
+from lightpaint.colour.white_range import white_range
 from lightpaint.lighting import problem as module
 from lightpaint.lighting.fit import meant_by
 from lightpaint.lighting.gamuts import PAINTED_MARGIN

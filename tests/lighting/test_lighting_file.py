@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.errors import LightingError
-from lightpaint.expected import BRIGHTEST
 from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.lighting import (
     Certificate,
     Lighting,
     LightSetting,
 )
+from lightpaint.validation import BRIGHTEST
 
 AMOUNTS = st.floats(min_value=0, allow_nan=False, allow_infinity=False)
 COLOURS = st.tuples(AMOUNTS, AMOUNTS, AMOUNTS)

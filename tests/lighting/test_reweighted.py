@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize, nnls
 
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import reweighted
 from lightpaint.lighting.analysis.diagnosis import diagnose

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.images.exr import Part, write_parts
+from lightpaint.images.formats.exr import Part, write_parts
 from lightpaint.paint import protocol
 from lightpaint.paint.notebook import widget_arguments as cells
 from lightpaint.paint.session.look_library import Looks
@@ -20,7 +20,7 @@ from lightpaint.paint.session.picture_table import Pictures
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 from lightpaint.target.own import write_painting
 
 SIZE = (18, 32)

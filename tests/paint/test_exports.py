@@ -9,12 +9,12 @@ from PIL import Image
 from renderer import write_room
 
 import lightpaint as lp
-from lightpaint.images.denoise import denoised
+from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.paint.launch import subject_of
 from lightpaint.paint.session_exports import picture, verified
-from lightpaint.settings import Settings
-from lightpaint.sources import SceneFile
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import SceneFile
 
 
 @pytest.mark.filterwarnings("ignore:.*samples.*")

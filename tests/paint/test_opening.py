@@ -16,16 +16,16 @@ import lightpaint as lp
 from lightpaint.basis import cache, known
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
-from lightpaint.images.denoise import Features
-from lightpaint.images.objects import Objects
+from lightpaint.images.denoiser import Features
+from lightpaint.images.object_map import Objects
 from lightpaint.paint.launch import subject_of
 from lightpaint.paint.lazy_scene import Opening
 from lightpaint.paint.session_file import identity_of
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject
-from lightpaint.settings import Settings
-from lightpaint.sources import SceneFile
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import SceneFile
 
 
 @pytest.fixture(autouse=True)
@@ -98,7 +98,7 @@ def test_a_known_scene_is_painted_without_being_loaded(
         raise AssertionError("the scene is loaded")
 
     with monkeypatch.context() as patch:
-        patch.setattr("lightpaint.sources.load_scene", loads)
+        patch.setattr("lightpaint.pipeline.sources.load_scene", loads)
         subject = opened(path)
         assert identity_of([subject]) == identity
         assert subject.wanted == basis.origin.spp

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.paint.session.picture_table import THUMBNAIL, small_picture
 
 

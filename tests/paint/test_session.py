@@ -14,7 +14,7 @@ from renderer import REPOSITORY
 import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.cli.spelling import options_of
+from lightpaint.cli.commands.session_options import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
@@ -24,7 +24,7 @@ from lightpaint.paint.store.pixels import Pixels
 from lightpaint.paint.store.requests import OF_ALL, OF_FIT, TITLES, Wishes
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 
 SIZE = (18, 32)
 

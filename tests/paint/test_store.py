@@ -20,7 +20,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sessions import IDENTITY, SIZE, Plain, big, content, look, patch, step, told
 
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint.session.look_library import Looks
 from lightpaint.paint.session.picture_table import Pictures
@@ -31,7 +31,7 @@ from lightpaint.paint.store.database import set_aside
 from lightpaint.paint.store.pixels import Pixels
 from lightpaint.paint.store.steps import Identity, KeptLook, Patch, SeenFrom, Step, painted_by
 from lightpaint.paint.store.store import MemoryStore, Store
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 
 ACTIONS = st.lists(
     st.tuples(st.just("append"), st.integers(0, 10**6))

@@ -14,7 +14,7 @@ from renderer import LIGHTS, PLASTIC, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
@@ -25,7 +25,7 @@ from lightpaint.placement.suggest import (
     suggest_lights,
 )
 from lightpaint.placement.suggestion import Suggestion
-from lightpaint.report.suggestion import spoken_suggestions, suggestion_section
+from lightpaint.report.page.suggestion_section import spoken_suggestions, suggestion_section
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.target.target import Target
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.images.blocks import whole_factor
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.relit.budget import FEWEST, verification_budget
 from lightpaint.scene.film import Film, reduced, reduction
 

@@ -9,12 +9,12 @@ from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 from lightpaint.basis.render.render import render_basis
 from lightpaint.basis.render.separate import WHITE
 from lightpaint.errors import SceneError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verify import verify
-from lightpaint.scene.emission import MULTIPLE, Scaling
+from lightpaint.scene.lights.emission import MULTIPLE, Scaling
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 

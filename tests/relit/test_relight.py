@@ -14,7 +14,7 @@ from command import succeed
 from renderer import CORNELL, LIGHTS, REPOSITORY, mitsuba_render, one_pass, write_room
 
 from lightpaint.errors import LightingError, OutputError, SceneError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.lighting import Lighting, LightSetting, combine
 from lightpaint.relit.patch import scene_patch
 from lightpaint.relit.relight import check_relightable, relight

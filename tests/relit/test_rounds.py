@@ -11,7 +11,7 @@ import lightpaint as lp
 from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.rounds import refine_by_rendering
-from lightpaint.scene.render import Stream, pass_seed
+from lightpaint.scene.scene_render import Stream, pass_seed
 
 SEEDS = 40
 #: A refinement renders the scene once more, so fewer of them.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.difference import delta_e
+from lightpaint.colour.color_difference import delta_e
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.relit.verification import LIMIT, compare

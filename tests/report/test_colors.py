@@ -12,10 +12,10 @@ from lightpaint.colour.hue import spoken_hue
 from lightpaint.lighting.analysis.color_choices import ColorChoice
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solve import solve
-from lightpaint.report.colors import closer_choice, colors_section, spoken_choice
-from lightpaint.report.meant import meaning_of, spoken_meaning
-from lightpaint.report.numbers import report_numbers
-from lightpaint.report.page import report_page
+from lightpaint.report.influences import meaning_of, spoken_meaning
+from lightpaint.report.page.color_section import closer_choice, colors_section, spoken_choice
+from lightpaint.report.page.page import report_page
+from lightpaint.report.report_json import report_numbers
 from lightpaint.target.target import Target
 
 WARM, NEUTRAL, COOL = (tuple(kelvin_to_rgb(k).tolist()) for k in (2700.0, 5000.0, 12000.0))

@@ -11,19 +11,17 @@ import pytest
 from PIL import Image, ImageDraw
 
 from lightpaint.colour.color import luminance
-from lightpaint.colour.display import encode_display, to_8_bit
-from lightpaint.colour.exposure import choose_exposure
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour.display.srgb import encode_display, to_8_bit
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
-from lightpaint.images.png import png_bytes
+from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.report import comparison
-from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
-from lightpaint.report.numbers import report_numbers
-from lightpaint.report.pictures import (
+from lightpaint.report.answer_pictures import (
     DIVERGING,
     coverage,
     diverging,
@@ -34,6 +32,8 @@ from lightpaint.report.pictures import (
     target_picture,
     unpainted_look,
 )
+from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
+from lightpaint.report.report_json import report_numbers
 from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
 

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.costs import without_constraints
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
-from lightpaint.report.constraints import constraints_section
+from lightpaint.report.page.constraint_section import constraints_section
 from lightpaint.target.target import Target
 
 SIZE = (10, 12)

@@ -15,8 +15,8 @@ import lightpaint as lp
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.problem import Problem
+from lightpaint.pipeline.results import Look
 from lightpaint.relit.verify import compare
-from lightpaint.results import Look
 from lightpaint.scene.scene import Scene
 
 MANY = 300
@@ -134,7 +134,7 @@ def test_to_be_shown_a_room_need_not_know_the_report():
     code = (
         "import sys, numpy as np, lightpaint as lp\n"
         "target = lp.Target.of(np.ones((4, 4, 3)))\n"
-        "assert 'lightpaint.report.notebook' not in sys.modules\n"
+        "assert 'lightpaint.report.page.notebook_html' not in sys.modules\n"
         "assert target._repr_png_().startswith(b'\\x89PNG')\n"
         "assert 'mitsuba' not in sys.modules and 'IPython' not in sys.modules\n"
     )

@@ -14,7 +14,7 @@ import pytest
 from lightpaint import threads
 from lightpaint.basis import basis as basis_module
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import solve as solve_module
 from lightpaint.lighting.analysis.analyse import analyse
@@ -23,9 +23,9 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solve import solve
+from lightpaint.pipeline.results import Look, write_report
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import compare
-from lightpaint.results import Look, write_report
 from lightpaint.target.target import Target
 
 SIZE = (24, 32)

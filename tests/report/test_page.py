@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lightpaint.colour.display import encode_display, to_8_bit
+from lightpaint.colour.display.srgb import encode_display, to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare
-from lightpaint.report.figures import data_uri, thumbnail
-from lightpaint.report.lights_table import hex_color
 from lightpaint.report.measures import energy_shares, noise_residual, relative_residual
-from lightpaint.report.page import report_page
+from lightpaint.report.page.figures import data_uri, thumbnail
+from lightpaint.report.page.lights_table import hex_color
+from lightpaint.report.page.page import report_page
 from lightpaint.target.target import Target
 
 SIZE = (24, 32)

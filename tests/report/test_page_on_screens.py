@@ -18,8 +18,8 @@ from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare
-from lightpaint.report.html import SHOWN
-from lightpaint.report.page import report_page
+from lightpaint.report.page.html import SHOWN
+from lightpaint.report.page.page import report_page
 from lightpaint.target.target import Target
 
 SIZE = (27, 48)

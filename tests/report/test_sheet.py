@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lightpaint.basis.basis import Basis
-from lightpaint.report import sheet as drawing
-from lightpaint.report.sheet import EDGE, GROUND, MOST, _grid, light_sheet
+from lightpaint.report import light_sheet as drawing
+from lightpaint.report.light_sheet import EDGE, GROUND, MOST, _grid, light_sheet
 
 
 def told(sheet: np.ndarray, basis: Basis) -> list[float]:

@@ -13,7 +13,7 @@ from conftest import BasisFactory
 
 from lightpaint.basis.file import write_basis
 from lightpaint.images.estimate import Estimate
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.analysis.elsewhere import Elsewhere
 from lightpaint.lighting.analysis.held_back import NAMED, Reason

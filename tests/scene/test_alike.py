@@ -10,13 +10,13 @@ from command import refused, run, succeed
 from renderer import LIGHTS, write_room
 
 from lightpaint.errors import SceneError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.file import read_lighting
-from lightpaint.remarks import remarks_of_scene
-from lightpaint.scene.alike import FEW, SAME, alike_groups
-from lightpaint.scene.choice import choose_lights
-from lightpaint.scene.emission import EmissionKind, Scaling
-from lightpaint.scene.emitters import Emitter, point_emitter
+from lightpaint.pipeline.remarks import remarks_of_scene
+from lightpaint.scene.lights.emission import EmissionKind, Scaling
+from lightpaint.scene.lights.emitters import Emitter, point_emitter
+from lightpaint.scene.lights.light_choice import choose_lights
+from lightpaint.scene.lights.similar_emitters import FEW, SAME, alike_groups
 from lightpaint.scene.scene import Scene, load_scene
 
 GLASS = '<bsdf type="twosided" id="glass"><bsdf type="diffuse" id="inner"/></bsdf>'

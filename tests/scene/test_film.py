@@ -11,16 +11,16 @@ from renderer import LIGHTS, write_room
 from lightpaint.basis.render.budget import Budget, Keeper
 from lightpaint.basis.render.render import _render_one_by_one, render_basis
 from lightpaint.errors import SceneError
-from lightpaint.images.blocks import block_mean, enlarged, whole_factor
+from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
+from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_target
+from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import silent
-from lightpaint.remarks import remarks_of_film, remarks_of_target
 from lightpaint.scene.film import Film, even_reductions, reduced, reduction, reduction_to
-from lightpaint.scene.quality import PRESETS, on_film, samples
-from lightpaint.scene.render import Stream, render
+from lightpaint.scene.presets import PRESETS, on_film, samples
+from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_surfaces
-from lightpaint.scene.variant import use_variant
-from lightpaint.settings import Settings
 from lightpaint.target.target import Target
 
 FULL_HD = Film(0, (1920, 1080), (1920, 1080), (0, 0))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
-from lightpaint.scene.lights import Light
+from lightpaint.scene.lights.light import Light
 from lightpaint.scene.scene import Scene, load_scene
 
 #: The renderer's numbers are float32.

@@ -13,7 +13,7 @@ from renderer import LIGHTS, write_room
 import lightpaint as lp
 from lightpaint.basis.file import read_origin
 from lightpaint.errors import SceneError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.relit.relight import relit_files
 from lightpaint.scene.integrator import IntegratorChoice

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lightpaint.scene.normals import settle_normals
-from lightpaint.scene.threads import limit_threads
-from lightpaint.scene.variant import use_variant
+from lightpaint.scene.runtime.kernel_threads import limit_threads
+from lightpaint.scene.runtime.variant import use_variant
 
 use_variant()
 

@@ -10,9 +10,9 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.arrays import Floats
-from lightpaint.scene.render import Stream, render
+from lightpaint.scene.runtime.render_lock import MITSUBA, PATIENCE_S, Turns
 from lightpaint.scene.scene import load_scene
-from lightpaint.scene.turns import MITSUBA, PATIENCE_S, Turns
+from lightpaint.scene.scene_render import Stream, render
 
 #: Seconds of a piece of work, and in which a thread surely comes to its turn.
 PIECE_S, SOON_S = 0.02, 10
@@ -84,7 +84,7 @@ def test_nobody_is_passed_over(work: Work):
 
 def test_who_is_at_leisure_comes_now_and_then(work: Work, monkeypatch: pytest.MonkeyPatch):
     """Somebody may render in a notebook one picture after the other."""
-    monkeypatch.setattr("lightpaint.scene.turns.PATIENCE_S", 5 * PIECE_S)
+    monkeypatch.setattr("lightpaint.scene.runtime.render_lock.PATIENCE_S", 5 * PIECE_S)
     is_done = threading.Event()
 
     def again() -> None:
@@ -103,7 +103,7 @@ def test_two_who_wait_agree_whose_turn_it_is(work: Work, monkeypatch: pytest.Mon
     """One looks just before the patience of who is at leisure ends, the other just after."""
     turns, idle = work.turns, threading.local()
     monkeypatch.setattr(
-        "lightpaint.scene.turns.monotonic",
+        "lightpaint.scene.runtime.render_lock.monotonic",
         lambda: (
             0.0 if not turns._idle else PATIENCE_S * (0.99 if hasattr(idle, "is_one") else 1.01)
         ),
@@ -160,7 +160,7 @@ def test_who_is_interrupted_while_waiting_keeps_nobody(work: Work, monkeypatch: 
 
 def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: pytest.MonkeyPatch):
     """Two scenes in two threads, one of them loaded anew between the passes of the other."""
-    monkeypatch.setattr("lightpaint.scene.render.SAMPLES_PER_PASS", 2**11)
+    monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 2**11)
     alone = lp.render_basis(small_room, spp=64)
     order: list[str] = []
     has_begun = threading.Event()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lightpaint.colour.transform import TransformChoice, ViewTransform
-from lightpaint.images.exr import write_rgb
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.picture import read_picture
 from lightpaint.target.over_look import view_of_look
 from lightpaint.target.read import read_over_look

@@ -8,11 +8,11 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from lightpaint.colour.display import decode_display
-from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.colour.display.srgb import decode_display
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError, ViewError
-from lightpaint.images.exr import Part, write_parts, write_rgb
-from lightpaint.images.png import write_png_16
+from lightpaint.images.formats.exr import Part, write_parts, write_rgb
+from lightpaint.images.formats.png import write_png_16
 from lightpaint.target.read import read_target
 from lightpaint.target.template import Template, write_look, write_template
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import ImageError, TargetError
 from lightpaint.target.template import Template, write_template
 

@@ -9,7 +9,7 @@ import OpenEXR
 import pytest
 
 from lightpaint.errors import ImageError, SizeError, TargetError
-from lightpaint.images.exr import Part, rgb_channels, write_parts
+from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
 from lightpaint.target.read import read_target
 
 SIZE = (6, 5)

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.display import encode_display
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.srgb import encode_display
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
-from lightpaint.images.exr import read_parts
+from lightpaint.images.formats.exr import read_parts
 from lightpaint.lighting.solve import solve
 from lightpaint.target.read import read_target
 from lightpaint.target.target import Target

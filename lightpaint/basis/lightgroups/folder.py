@@ -11,9 +11,9 @@ from pathlib import Path
 from lightpaint.basis.file import FORMAT_KEY
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.exr import OWN, read_channels, read_headers
-from lightpaint.images.exr_layers import KRITA_LAYERS
-from lightpaint.images.kinds import head_of, kind_of
+from lightpaint.images.formats.exr import OWN, read_channels, read_headers
+from lightpaint.images.formats.exr_layers import KRITA_LAYERS
+from lightpaint.images.formats.file_kinds import head_of, kind_of
 from lightpaint.screen import some_names
 
 #: Files that a folder of light groups may have: more are the frames of a film.

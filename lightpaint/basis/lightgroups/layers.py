@@ -16,8 +16,13 @@ from lightpaint.basis.lightgroups.folder import files_in
 from lightpaint.basis.lightgroups.naming import short_names
 from lightpaint.colour.primaries import are_same, converted, to_rec709
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.images.exr import Part, read_parts
-from lightpaint.images.exr_layers import ALPHA_NAMES, channel_named, colour_channels, primaries_of
+from lightpaint.images.formats.exr import Part, read_parts
+from lightpaint.images.formats.exr_layers import (
+    ALPHA_NAMES,
+    channel_named,
+    colour_channels,
+    primaries_of,
+)
 from lightpaint.screen import some_names
 
 

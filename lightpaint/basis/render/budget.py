@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
-from lightpaint.scene.render import largest_pass, plan_passes
+from lightpaint.scene.scene_render import largest_pass, plan_passes
 
 #: Seconds of work that a crash may cost.
 KEEP_EVERY_S = 30.0

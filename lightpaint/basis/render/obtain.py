@@ -7,7 +7,7 @@ from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import basis_lights, is_of, is_on_the_way, render_basis
 from lightpaint.errors import BasisError, SceneError
-from lightpaint.images.blocks import whole_factor
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names

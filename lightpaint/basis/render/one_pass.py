@@ -30,8 +30,8 @@ from lightpaint.basis.render.integrators import depth_limit, needs_a_bounce
 from lightpaint.basis.render.paths import Planes, camera_rays, trace
 from lightpaint.basis.render.sobol import SobolPairs
 from lightpaint.scene.integrator import Integrator
-from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, pass_seed
 
 
 class Tracer:

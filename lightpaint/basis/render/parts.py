@@ -28,10 +28,10 @@ from lightpaint.basis.render.render import (
 )
 from lightpaint.basis.render.separate import LightSums, emitters_seen, light_pass, plan_of_light
 from lightpaint.basis.render.sums import halves_of, mean_and_half_difference
-from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
+from lightpaint.scene.runtime.kernel_threads import kernels
+from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.threads import kernels
-from lightpaint.scene.turns import MITSUBA, tracing
+from lightpaint.scene.scene_render import SAMPLES_PER_PASS, plan_passes, view_seed
 
 #: Camera samples of a part: some seconds of one processor, which is what an accident costs.
 SAMPLES = SAMPLES_PER_PASS // 2

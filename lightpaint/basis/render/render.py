@@ -17,11 +17,11 @@ from lightpaint.basis.render.separate import (
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
-from lightpaint.scene.parsed import render_errors
-from lightpaint.scene.render import SAMPLES_PER_PASS, plan_passes, view_seed
+from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import SAMPLES_PER_PASS, plan_passes, view_seed
+from lightpaint.scene.scene_tree import render_errors
 from lightpaint.scene.surfaces import render_first_hits
-from lightpaint.scene.turns import MITSUBA, tracing
 
 #: Camera samples that choices of emitters are learned from before any counts.
 REHEARSAL = 2**18

@@ -14,11 +14,11 @@ import numpy.typing as npt
 from lightpaint.arrays import RGB, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.budget import SHORTER, Budget, Clock, Keeper, next_pair
-from lightpaint.images.blocks import block_mean
+from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.progress import Interrupted, Progress
-from lightpaint.scene.render import Stream, as_float32, pass_seed, plan_passes, render_pass
+from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.turns import MITSUBA, tracing
+from lightpaint.scene.scene_render import Stream, as_float32, pass_seed, plan_passes, render_pass
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 BLACK: RGB = (0.0, 0.0, 0.0)

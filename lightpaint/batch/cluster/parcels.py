@@ -16,10 +16,10 @@ from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import Done, Errand
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import first_line
-from lightpaint.records import strict_json
-from lightpaint.result_folder import RECORD, ResultFolder
+from lightpaint.pipeline.result_folder import RECORD, ResultFolder
 from lightpaint.screen import some_names
-from lightpaint.staging import is_below
+from lightpaint.storage.json_records import strict_json
+from lightpaint.storage.staging import is_below
 
 #: Bytes that are sent at a time.
 PIECE = 2**26

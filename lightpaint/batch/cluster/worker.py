@@ -16,7 +16,7 @@ from lightpaint.batch.work.work import do
 from lightpaint.batch.work.work_items import Done, spoken
 from lightpaint.batch.work.worker_cache import Held
 from lightpaint.progress import silent
-from lightpaint.scene.threads import limit_threads
+from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.version import __version__
 
 #: Of glibc's mallopt: what it sets, and bytes, as they come to by themselves where nobody sets any.

@@ -30,7 +30,7 @@ from lightpaint.batch.plan.plan import Plan
 from lightpaint.batch.work.task import Kind
 from lightpaint.errors import OutputError
 from lightpaint.files import write_bytes, write_text
-from lightpaint.images.png import png_bytes
+from lightpaint.images.formats.png import png_bytes
 from lightpaint.report.comparison import fitted
 from lightpaint.screen import visible
 from lightpaint.version import __version__

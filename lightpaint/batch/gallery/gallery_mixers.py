@@ -9,10 +9,10 @@ from typing import Any
 from lightpaint.batch.gallery.small_planes import SUFFIX, read_planes
 from lightpaint.batch.gallery.summary import Row
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.file import read_lighting
-from lightpaint.report.mixer import kelvins, told_file, told_transform
+from lightpaint.report.page.mixer import kelvins, told_file, told_transform
 
 #: Mixers of a page, at most: each may be two megabytes. Lights of one that have sliders.
 MOST_MIXERS, MOST_LIGHTS = 8, 40

@@ -19,9 +19,9 @@ from lightpaint.batch.work.work import fields_of
 from lightpaint.batch.work.worker_cache import Held
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, write_text
-from lightpaint.records import strict_json
-from lightpaint.report.mixer import planes_for_page, told_light
-from lightpaint.sources import content
+from lightpaint.pipeline.sources import content
+from lightpaint.report.page.mixer import planes_for_page, told_light
+from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 
 #: What their names end in.

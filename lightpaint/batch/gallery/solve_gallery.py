@@ -13,8 +13,8 @@ from lightpaint.batch.manifest.entries import Entry
 from lightpaint.batch.plan.journal import Line
 from lightpaint.batch.plan.plan import Plan, PlannedLook, Step
 from lightpaint.batch.work.task import Kind, Task
-from lightpaint.job import Job
-from lightpaint.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 
 
 def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> Entry:

@@ -18,18 +18,18 @@ from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.batch.plan.journal import Line
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.work.task import EXPORT, Kind
-from lightpaint.colour.display import to_8_bit
-from lightpaint.colour.exposure import choose_exposure
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, replacing
-from lightpaint.images.blocks import block_mean
-from lightpaint.images.denoise import denoised
+from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
+from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.file import read_lighting
-from lightpaint.records import strict_json
+from lightpaint.pipeline.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
-from lightpaint.result_folder import RECORD
+from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 
 FORMAT = "lightpaint-batch 1"

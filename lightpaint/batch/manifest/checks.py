@@ -13,11 +13,11 @@ from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import GroupsFile
 from lightpaint.relit.export.usd import check_usd
 from lightpaint.relit.forms import FORMS
 from lightpaint.screen import some_names
-from lightpaint.settings import Settings
-from lightpaint.sources import GroupsFile
 
 #: What is wanted of a look if nobody says; of a lighting that is there already, and of a frame.
 WANTED, SHOWN = ("solve", "predict", "verify", "report"), ("predict",)

@@ -22,12 +22,12 @@ from lightpaint.batch.manifest.checks import (
 from lightpaint.batch.manifest.keys import GIVEN, PAINTED, SOURCE, Final, Handover, Space
 from lightpaint.batch.manifest.manifest import Manifest, Table
 from lightpaint.batch.manifest.variations import SHIFTED
-from lightpaint.colour.transform import TransformChoice
+from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, GroupsFile, Painting, SceneFile
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, Painting, SceneFile
 
 #: Looks of one batch, at most.
 MOST_LOOKS = 10_000

@@ -7,9 +7,9 @@ from typing import Any
 
 from lightpaint.batch.manifest.keys import DEFAULTS, GIVEN, LOOK, SEQUENCE, SUBJECTS, Mistakes
 from lightpaint.errors import BatchError
-from lightpaint.expected import Check, a
 from lightpaint.files import one_line, read_text
-from lightpaint.records import strict_toml
+from lightpaint.storage.json_records import strict_toml
+from lightpaint.validation import Check, a
 
 #: Longest manifest that is read, in bytes; and its tables.
 MAX_BYTES = 2**22

@@ -14,7 +14,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import LightSetting
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 
 #: Words that ask for another solve, and for what.
 SOLVED = ("fewer lights", "white only", "held harder")

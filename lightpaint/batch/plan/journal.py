@@ -18,7 +18,7 @@ from lightpaint.batch.manifest.folder_names import JOURNAL, JOURNAL_PART
 from lightpaint.batch.work.task import Kind
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import read_bytes, write_text
-from lightpaint.records import read_record, strict_json
+from lightpaint.storage.json_records import read_record, strict_json
 
 #: Longest that is read, in bytes.
 MAX_BYTES = 2**28

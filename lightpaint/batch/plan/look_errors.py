@@ -14,8 +14,8 @@ from lightpaint.batch.work.worker_cache import Held
 from lightpaint.errors import ALONE, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduction import reduce_to
-from lightpaint.scene.quality import on_film
-from lightpaint.sources import check_nothing_idle, content
+from lightpaint.pipeline.sources import check_nothing_idle, content
+from lightpaint.scene.presets import on_film
 
 
 def look_over(entry: Entry, held: Held, mistakes: Mistakes) -> None:

@@ -24,17 +24,17 @@ from lightpaint.batch.work.task import EXPORT, answer_task, bases_of, export_tas
 from lightpaint.batch.work.worker_cache import Held
 from lightpaint.errors import ALONE, BatchError, LightpaintError
 from lightpaint.files import check_writable
-from lightpaint.job import Job
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.sums import why_not_by_sums
+from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.result_folder import is_as_written
+from lightpaint.pipeline.results import view_names
+from lightpaint.pipeline.settings import Settings
 from lightpaint.relit.relight import scene_of
-from lightpaint.result_folder import is_as_written
-from lightpaint.results import view_names
-from lightpaint.scene.quality import on_film, samples
+from lightpaint.scene.presets import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
-from lightpaint.settings import Settings
 
 
 def plan(

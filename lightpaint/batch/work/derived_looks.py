@@ -8,13 +8,13 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.manifest.variations import SHIFTED, SOLVED, shifted, varied
-from lightpaint.job import Job
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.result_folder import ResultFolder
+from lightpaint.pipeline.results import write_predicted
 from lightpaint.relit.export.exports import EXPORTS, write_exports
 from lightpaint.relit.relight import check_relightable, relight, settle
-from lightpaint.result_folder import ResultFolder
-from lightpaint.results import write_predicted
 from lightpaint.scene.scene import Scene
 
 

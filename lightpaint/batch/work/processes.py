@@ -15,7 +15,7 @@ from lightpaint.batch.work.work import do
 from lightpaint.batch.work.work_items import Done, Errand, spoken
 from lightpaint.batch.work.worker_cache import Held
 from lightpaint.progress import Listener, silent
-from lightpaint.scene.threads import limit_threads
+from lightpaint.scene.runtime.kernel_threads import limit_threads
 
 
 class Processes:

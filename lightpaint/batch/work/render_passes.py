@@ -5,9 +5,9 @@ from typing import Any
 
 from lightpaint.arrays import Doubles
 from lightpaint.batch.manifest.keys import Final
-from lightpaint.scene.render import Stream, pass_sum, passes_of
+from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.turns import tracing
+from lightpaint.scene.scene_render import Stream, pass_sum, passes_of
 
 
 class Frame:

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
-from lightpaint.job import Job
 from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.linear import solve_linear
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.lighting.sums import Sums, problem_of_sums, sums_of
+from lightpaint.pipeline.job import Job
 from lightpaint.relit.relight import relight, settle
 
 

@@ -11,9 +11,9 @@ from lightpaint.batch.manifest.keys import Final, Handover, Space
 from lightpaint.batch.manifest.variations import SHIFTED
 from lightpaint.batch.work.work_items import Move
 from lightpaint.errors import BatchError
-from lightpaint.records import read_record, strict_json
-from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, GroupsFile, SceneFile, to_json
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile, to_json
+from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
 

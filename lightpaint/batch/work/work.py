@@ -22,18 +22,18 @@ from lightpaint.batch.work.worker_cache import Held
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line, write_text
 from lightpaint.images.estimate import Estimate
-from lightpaint.job import Job
 from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.pipeline import run
+from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.pipeline import run
+from lightpaint.pipeline.renders import relight_look, relit_folder
+from lightpaint.pipeline.result_folder import ResultFolder
+from lightpaint.pipeline.results import view_names
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, content, from_json
 from lightpaint.progress import Listener
 from lightpaint.relit.forms import Source, names_of_forms, writers_of
-from lightpaint.renders import relight_look, relit_folder
-from lightpaint.result_folder import ResultFolder
-from lightpaint.results import view_names
 from lightpaint.scene.scene import Scene
-from lightpaint.settings import Settings
-from lightpaint.sources import BasisFile, GroupsFile, content, from_json
 
 #: What the system says of a disk that takes no more.
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}

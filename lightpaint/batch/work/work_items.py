@@ -11,8 +11,8 @@ from typing import Any, Literal, Protocol
 from lightpaint.basis.render.parts import Part
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.lighting.fit import Emitters
-from lightpaint.scene.quality import Quality
-from lightpaint.sources import Painting, SceneFile, vars_of
+from lightpaint.pipeline.sources import Painting, SceneFile, vars_of
+from lightpaint.scene.presets import Quality
 
 #: What becomes of a path where an errand is done elsewhere.
 Move = Callable[[str], str]

@@ -9,9 +9,9 @@ from lightpaint.batch.work.render_passes import Frame
 from lightpaint.batch.work.spool import read_lesson
 from lightpaint.batch.work.task import key_of_basis
 from lightpaint.batch.work.work_items import Film, PartOfBasis, Passes, SumsOfRows, Wanted
-from lightpaint.scene.quality import on_film
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.scene.presets import on_film
 from lightpaint.scene.scene import Scene
-from lightpaint.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.target.target import Target
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.difference import ciede2000
+from lightpaint.colour.color_difference import ciede2000
 from lightpaint.lighting.analysis.looking import Looking
 from lightpaint.lighting.analysis.on_object import NO_NAME
 

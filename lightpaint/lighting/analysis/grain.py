@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.images.blocks import enlarged
 from lightpaint.images.estimate import box_mean
+from lightpaint.images.pixel_blocks import enlarged
 
 _Kind = TypeVar("_Kind", bound=np.generic)
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.images.blocks import block_sums
+from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.analysis.constraint_kinds import ConstraintKind, ConstraintsByLight
 from lightpaint.lighting.analysis.elsewhere import Elsewhere, what_changes
 from lightpaint.lighting.analysis.looking import Looking

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.colour.difference import ciede2000, lab
-from lightpaint.colour.display import decode_display
-from lightpaint.colour.exposure import choose_exposure
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.color_difference import ciede2000, lab
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour.display.srgb import decode_display
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.painting import brighter_will_do, painted_light
 from lightpaint.lighting.problem import Problem
 

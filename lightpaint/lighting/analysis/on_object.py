@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.images.objects import Objects
+from lightpaint.images.object_map import Objects
 
 #: Part of the miss that must lie on an object, and of the picture that it may be, to be named.
 MOST, LARGE = 0.6, 0.5

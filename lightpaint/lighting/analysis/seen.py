@@ -12,9 +12,9 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.colour.color import luminance
-from lightpaint.colour.difference import ciede2000
+from lightpaint.colour.color_difference import ciede2000
 from lightpaint.images.estimate import Estimate
-from lightpaint.images.objects import Objects
+from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.constraint_kinds import ConstraintKind, ConstraintsByLight
 from lightpaint.lighting.analysis.diagnosis import (

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from lightpaint.arrays import RGB
-from lightpaint.colour.whites import WhiteRange
+from lightpaint.colour.white_range import WhiteRange
 from lightpaint.errors import ConstraintError
-from lightpaint.expected import MAX_LISTED
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.values import (
     Level,
@@ -29,6 +28,7 @@ from lightpaint.lighting.constraints.values import (
     whites_of,
 )
 from lightpaint.screen import some_of
+from lightpaint.validation import MAX_LISTED
 
 #: What may be asked of one light.
 LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries")

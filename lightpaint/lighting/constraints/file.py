@@ -9,7 +9,7 @@ from lightpaint.files import one_line
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.values import check_keys, strength_of
-from lightpaint.scene.lights_file import Asked, read_keys
+from lightpaint.scene.lights.lights_file import Asked, read_keys
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
 MAX_SAID = 1000

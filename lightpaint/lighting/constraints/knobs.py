@@ -9,8 +9,8 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance
-from lightpaint.colour.hull import ColorHull
-from lightpaint.colour.whites import WhiteRange
+from lightpaint.colour.color_hull import ColorHull
+from lightpaint.colour.white_range import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
 from lightpaint.lighting.constraints.limits import (

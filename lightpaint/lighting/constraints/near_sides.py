@@ -8,7 +8,7 @@ and goes on to the next one when it comes to its end.
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.colour.hull import ColorHull
+from lightpaint.colour.color_hull import ColorHull
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.on_locus import beyond_gamuts
 from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced

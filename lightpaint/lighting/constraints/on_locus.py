@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.colour.whites import WhiteRange
+from lightpaint.colour.white_range import WhiteRange
 from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction

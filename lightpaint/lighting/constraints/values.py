@@ -8,10 +8,10 @@ import numpy as np
 
 from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import hex_to_rgb, kelvin_to_rgb, luminance
-from lightpaint.colour.whites import WhiteRange, white_range
+from lightpaint.colour.white_range import WhiteRange, white_range
 from lightpaint.errors import ColorError, ConstraintError
-from lightpaint.expected import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount
 from lightpaint.files import one_line
+from lightpaint.validation import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount
 
 
 @dataclass(frozen=True)

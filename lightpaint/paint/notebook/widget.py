@@ -17,7 +17,7 @@ from threading import Event, RLock
 from typing import Any, Unpack
 from weakref import WeakValueDictionary
 
-from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analyse import analyse, with_findings
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -33,7 +33,7 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio
-from lightpaint.settings import SettingsByName
+from lightpaint.pipeline.settings import SettingsByName
 from lightpaint.target.own import write_painting
 from lightpaint.target.target import Target
 

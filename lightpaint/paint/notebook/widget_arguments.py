@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.colour.transform import TransformChoice, ViewTransform
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -24,10 +24,10 @@ from lightpaint.paint.store.database import AFRESH, ELSEWHERE
 from lightpaint.paint.store.pixels import Pixels
 from lightpaint.paint.store.requests import Wishes
 from lightpaint.paint.subject import Subject
-from lightpaint.scene.quality import on_film
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import check_nothing_idle
+from lightpaint.scene.presets import on_film
 from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.settings import Settings
-from lightpaint.sources import check_nothing_idle
 from lightpaint.target.target import Target
 
 #: What can be painted.

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.fit import resolve_fit
@@ -11,7 +11,7 @@ from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.live import Live
 from lightpaint.lighting.live_view import LiveView
 from lightpaint.paint.store.requests import Wishes
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 
 
 class Answering:

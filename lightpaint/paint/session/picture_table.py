@@ -8,9 +8,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.report.figures import resized, thumbnail
+from lightpaint.report.page.figures import resized, thumbnail
 
 #: Pixels of a thumbnail's longer side, about.
 THUMBNAIL = 192

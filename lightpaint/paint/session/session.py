@@ -20,7 +20,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError, NothingToUndoError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
@@ -35,7 +35,7 @@ from lightpaint.paint.store.pixels import Pixels, Region
 from lightpaint.paint.store.requests import TITLES, Wishes
 from lightpaint.paint.store.steps import Step
 from lightpaint.paint.store.store import Store
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 from lightpaint.target.target import Target
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.analysis.elsewhere import what_changes
 from lightpaint.lighting.analysis.looking import Looking
@@ -22,7 +22,7 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.paint.session.answer_messages import foreseen, why_not_closer
 from lightpaint.paint.session.picture_table import Picture, small_picture
 from lightpaint.paint.store.requests import Wishes
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 from lightpaint.target.target import Target
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis.clean import CleanPlanes, RoughPlanes, as_halves, scale_of
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.paint.protocol import ViewInfo
 from lightpaint.paint.session import picture_table as pictures
 from lightpaint.paint.session.canvas import Canvas

@@ -15,8 +15,8 @@ from pathlib import Path
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line, flush
 from lightpaint.paint.store.steps import Identity, SeenFrom
-from lightpaint.records import strict_json
 from lightpaint.screen import some_names
+from lightpaint.storage.json_records import strict_json
 
 #: "lpnt", by which files know what they are, and which tables there are.
 APPLICATION, VERSION = 0x6C706E74, 2

@@ -12,7 +12,7 @@ from lightpaint.files import first_line
 from lightpaint.paint.store.compression import packed, unpacked
 from lightpaint.paint.store.pixels import Pixels, Region
 from lightpaint.paint.store.steps import Patch
-from lightpaint.records import strict_json
+from lightpaint.storage.json_records import strict_json
 
 #: What looks are made of.
 DTYPES = ("float32", "float64", "float16", "uint8", "int16")

@@ -30,8 +30,8 @@ from lightpaint.paint.store.database import (
 from lightpaint.paint.store.lazy_arrays import DTYPES
 from lightpaint.paint.store.requests import Wishes
 from lightpaint.paint.store.steps import Identity, of_view
-from lightpaint.records import strict_json
 from lightpaint.screen import some_names
+from lightpaint.storage.json_records import strict_json
 
 #: What comes of a value that is another than was written.
 DAMAGES = (

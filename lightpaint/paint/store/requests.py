@@ -8,7 +8,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import PaintError
 from lightpaint.lighting.constraints.addressing import asked_of_each, tied_lights
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.settings import Settings
+from lightpaint.pipeline.settings import Settings
 
 #: What may be asked of the answer: of its fit, and of all lights together.
 OF_FIT, OF_ALL = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
 from lightpaint.paint.store.pixels import Pixels, Region, slices
-from lightpaint.records import read_record
+from lightpaint.storage.json_records import read_record
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,7 +46,7 @@ from lightpaint.paint.store.lazy_arrays import (
 )
 from lightpaint.paint.store.pixels import Pixels, Region
 from lightpaint.paint.store.steps import Identity, KeptLook, Patch, Step
-from lightpaint.records import strict_json
+from lightpaint.storage.json_records import strict_json
 
 #: What comes of a value that is another than was written.
 DAMAGES = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)

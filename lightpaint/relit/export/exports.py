@@ -13,7 +13,7 @@ import numpy as np
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.color import luminance
 from lightpaint.files import write_text
-from lightpaint.images.exr import Part, rgb_channels, write_parts
+from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
 from lightpaint.keywords import keywords
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.setting import LightSetting

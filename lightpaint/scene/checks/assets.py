@@ -10,7 +10,7 @@ from typing import Any
 
 from lightpaint.errors import ImageError, SceneError
 from lightpaint.files import file_length, one_line
-from lightpaint.images.exr import read_parts
+from lightpaint.images.formats.exr import read_parts
 from lightpaint.scene.checks.mesh import MeshError, check_ply, check_serialized
 
 #: Longest file that is read, in bytes.

@@ -1,4 +1,4 @@
-/** Pictures that images/compact.py made small. */
+/** Pictures that images/page_picture.py made small. */
 import { finite } from '../drawing/half.js';
 
 /** data: base64, deflated. @typedef {{data: string, scale: number, dropped: number,

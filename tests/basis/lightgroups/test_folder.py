@@ -12,7 +12,7 @@ from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import Estimate, write_estimate
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 
 LIGHTS = ["fill", "key", "rim"]
 

@@ -7,20 +7,20 @@ from pathlib import Path
 import pytest
 from renderer import same_basis, write_room
 
-import lightpaint.scene.render
+import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
-from lightpaint.scene.render import plan_passes
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene_render import plan_passes
 
 
 @pytest.fixture(autouse=True)
 def small_passes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Passes of four samples per pixel of the test room."""
-    monkeypatch.setattr(lightpaint.scene.render, "SAMPLES_PER_PASS", 4 * 24 * 20)
+    monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", 4 * 24 * 20)
 
 
 def test_what_is_left_to_do_goes_on_with_whole_passes() -> None:

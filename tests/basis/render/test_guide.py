@@ -12,8 +12,8 @@ from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.budget import Budget, Keeper
 from lightpaint.basis.render.render import _render_one_by_one, render_basis
 from lightpaint.progress import silent
+from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import load_scene
-from lightpaint.scene.variant import use_variant
 
 #: Two spots that each light one end of the floor, and a lamp behind the wall.
 SPOTS = "".join(

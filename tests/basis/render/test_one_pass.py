@@ -18,10 +18,10 @@ from lightpaint.basis.render.render import (
 )
 from lightpaint.basis.render.separate import BLACK, WHITE
 from lightpaint.errors import SceneError
+from lightpaint.pipeline.remarks import remarks_of_scene
 from lightpaint.progress import silent
-from lightpaint.remarks import remarks_of_scene
-from lightpaint.scene.render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes, render
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene_render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes, render
 
 INTEGRATORS = {
     "path": '<integrator type="path"><integer name="max_depth" value="5"/></integrator>',

@@ -22,8 +22,8 @@ from lightpaint.basis.render.parts import (
 )
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
+from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.scene.threads import limit_threads
 
 SPP = 32
 

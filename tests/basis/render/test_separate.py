@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, same_basis, write_room
 
-import lightpaint.scene.render
+import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.obtain import obtain_basis
@@ -19,8 +19,8 @@ from lightpaint.basis.render.render import ONE_PASS, SEPARATE, render_basis
 from lightpaint.basis.render.separate import BLACK, WHITE
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted
-from lightpaint.scene.render import Stream, pass_seed
 from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene_render import Stream, pass_seed
 
 SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="4"/></integrator>'
 THREE = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
@@ -29,7 +29,7 @@ THREE = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
 @pytest.fixture(autouse=True)
 def small_passes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Passes of four samples per pixel of the test room, and a cache of its own."""
-    monkeypatch.setattr(lightpaint.scene.render, "SAMPLES_PER_PASS", 4 * 4 * 24 * 20)
+    monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", 4 * 4 * 24 * 20)
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
 
 

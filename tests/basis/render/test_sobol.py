@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lightpaint.scene.variant import use_variant
+from lightpaint.scene.runtime.variant import use_variant
 
 
 def pairs(dimension: int, *, pixels: int = 1, first: int = 0, terms: int, stream: int = 0):

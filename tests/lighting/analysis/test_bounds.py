@@ -11,7 +11,7 @@ from least_squares import stacked
 from scipy.optimize import lsq_linear
 
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.whites import white_range
+from lightpaint.colour.white_range import white_range
 from lightpaint.errors import LightingError
 from lightpaint.lighting.analysis import held, release
 from lightpaint.lighting.analysis.diagnosis import diagnose

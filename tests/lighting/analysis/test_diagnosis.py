@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solve import solve

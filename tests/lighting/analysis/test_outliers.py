@@ -8,8 +8,8 @@ import pytest
 from lightpaint.lighting.analysis.peaks import PEAK, TWO_PATHS, WIDER, Peaks
 from lightpaint.lighting.analysis.uncertainty import error_bars, with_error_bars
 from lightpaint.lighting.solve import solve
-from lightpaint.report.lights_table import lights_table
-from lightpaint.report.notebook import html_of
+from lightpaint.report.page.lights_table import lights_table
+from lightpaint.report.page.notebook_html import html_of
 from lightpaint.report.sentences import UNTOLD_HERE, how_sure, spoken_errors, untold_lights
 from lightpaint.target.target import Target
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.difference import delta_e
-from lightpaint.colour.transform import ViewTransform
-from lightpaint.images.objects import Objects
+from lightpaint.colour.color_difference import delta_e
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis import held_back
 from lightpaint.lighting.analysis.analyse import analyse
 from lightpaint.lighting.analysis.elsewhere import what_changes

@@ -9,10 +9,10 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.errors import ConstraintError, SceneError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.constraints.file import read_constraints
 from lightpaint.lighting.problem import Problem
-from lightpaint.scene.lights_file import Asked, read_lights_file
+from lightpaint.scene.lights.lights_file import Asked, read_lights_file
 
 FILE = '[light.bulb]\nlock = "40%"\n[light.panel]\nkelvin = 3200\n'
 

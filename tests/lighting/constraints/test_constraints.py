@@ -11,7 +11,7 @@ from qp import least
 from scipy.optimize import lsq_linear, nnls
 
 from lightpaint.colour.color import cct_and_duv, hex_to_rgb, kelvin_to_rgb
-from lightpaint.colour.whites import white_range
+from lightpaint.colour.white_range import white_range
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import problems

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.colour.hull import ColorHull, reach_of
-from lightpaint.colour.whites import white_range
+from lightpaint.colour.color_hull import ColorHull, reach_of
+from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.constraints import near_sides
 from lightpaint.lighting.constraints.near_sides import solve_near_sides
 from lightpaint.lighting.constraints.on_locus import next_whites

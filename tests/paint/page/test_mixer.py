@@ -11,13 +11,13 @@ from interface import Finger
 
 import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.display import to_8_bit
-from lightpaint.colour.lattice import curve_of, lattice_of
-from lightpaint.images.compact import BRIGHTEST, DROPPED, compact, expanded
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.display.transform_table import curve_of, lattice_of
+from lightpaint.images.page_picture import BRIGHTEST, DROPPED, compact, expanded
 from lightpaint.lighting.lighting import Lighting
-from lightpaint.report.html import SHOWN
-from lightpaint.report.mixer import mixer_assets, mixer_html
-from lightpaint.report.page import report_page
+from lightpaint.report.page.html import SHOWN
+from lightpaint.report.page.mixer import mixer_assets, mixer_html
+from lightpaint.report.page.page import report_page
 
 SIZE = (36, 64)
 EVIL = "</script><script>document.title='x'</script>"
@@ -94,7 +94,7 @@ def codes(basis: lp.Basis, weights: Any, transform: lp.ViewTransform) -> Any:
 
 def shown_through(basis: lp.Basis) -> lp.ViewTransform:
     """The transform of the report of `report(basis)`."""
-    from lightpaint.report.pictures import transform_of
+    from lightpaint.report.answer_pictures import transform_of
 
     target, solution = solved(basis)
     return transform_of(target, basis, lp.combine(basis, solution.lighting).image)

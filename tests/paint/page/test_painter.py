@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.transform import ViewTransform
+from lightpaint.colour.display.view_transform import ViewTransform
 
 N, H, W = 3, 30, 40
 

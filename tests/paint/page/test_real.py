@@ -19,9 +19,9 @@ import pytest
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.cli.spelling import solve_command
-from lightpaint.colour.display import to_8_bit
-from lightpaint.images.objects import Objects
+from lightpaint.cli.commands.session_options import solve_command
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.uncertainty import correct_noise
 from lightpaint.paint.launch import subject_of
 from lightpaint.paint.server.server import Server
@@ -29,7 +29,7 @@ from lightpaint.paint.store.steps import of_view
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.sources import BasisFile
+from lightpaint.pipeline.sources import BasisFile
 
 H, W, N = 54, 96, 3
 

@@ -415,7 +415,7 @@ def test_no_renderer_is_imported(tmp_path: Path):
     code = (
         "import sys, lightpaint as lp\n"
         "from pathlib import Path\n"
-        "from lightpaint.cli.options import *\n"
+        "from lightpaint.cli.options.job_options import *\n"
         "from lightpaint.basis.lightgroups.read import read_light_groups\n"
         "from lightpaint.relit.export.exports import write_exports\n"
         "here = Path(sys.argv[1])\n"

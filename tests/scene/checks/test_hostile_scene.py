@@ -16,7 +16,7 @@ from damage import Case, damaged, outcomes, wrong
 from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError
-from lightpaint.images.exr import write_rgb
+from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene.scene import load_scene
 
 ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", wall=GLOSSY, lights=LIGHTS["bulb"])

@@ -11,7 +11,7 @@ from command import refused
 from renderer import GLOSSY, LIGHTS, PATH, ROOM
 
 from lightpaint.errors import SceneError
-from lightpaint.scene.plugins import IN_PYTHON
+from lightpaint.scene.runtime.plugins import IN_PYTHON
 from lightpaint.scene.scene import load_scene
 
 ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", wall=GLOSSY, lights=LIGHTS["bulb"])

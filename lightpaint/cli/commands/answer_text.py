@@ -1,0 +1,264 @@
+"""What `lightpaint solve` prints of an answer: for people, or with everything there is."""
+
+from dataclasses import fields
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from lightpaint.basis.lights import BasisLight
+from lightpaint.cli.options.job_options import BY_OPTION
+from lightpaint.cli.output import terminal
+from lightpaint.cli.output.tables import spoken_agreement
+from lightpaint.cli.output.vocabulary import spoken
+from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
+from lightpaint.lighting.analysis.constraint_kinds import KEYS
+from lightpaint.lighting.analysis.held_back import Reason
+from lightpaint.lighting.setting import LightSetting
+from lightpaint.pipeline.results import Look
+from lightpaint.pipeline.settings import Settings
+from lightpaint.report.answer_pictures import spoken_view
+from lightpaint.report.influences import spoken_meaning
+from lightpaint.report.measures import energy_shares
+from lightpaint.report.page.color_section import closer_choice
+from lightpaint.report.sentences import (
+    how_sure,
+    partly_reached,
+    spoken_cause,
+    spoken_errors,
+    spoken_percent,
+    unreached_channels,
+    untold_lights,
+    what_holds,
+    what_is_missed,
+)
+from lightpaint.screen import some_names, some_of
+
+Table = Literal["short", "full"]
+
+#: Lights that are all shown; of more, those that matter most.
+ALL, MOST = 16, 10
+
+#: Cells of a name in a table that fits 80 columns with a swatch before it.
+NAME = 30
+
+#: Of its present emission, what of a light nobody sees.
+OFF = 2.0**-10
+
+#: Distance from Planck's locus up to which a colour is called by its temperature.
+WHITE = 0.02
+
+
+def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
+    """Print how near the answer is, what the lights do, and what was asked beside the painting."""
+    terminal.tell(look.verdict)
+    for sentence in _sentences(look, table):
+        terminal.tell(spoken(sentence))
+    terminal.write("")
+    if table == "full":
+        _show_all(look)
+    else:
+        _show_short(look)
+    terminal.write("")
+    terminal.tell(spoken_meaning(look.solution, instead="--literal for none of this"))
+    certificate = look.solution.certificate
+    if curve := certificate.curve:
+        listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
+        terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
+    terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
+    if said := left_open(look):
+        terminal.say(said)
+    if not certificate.converged:
+        terminal.say(
+            f"the solve stopped after {max(certificate.sweeps)} sweeps at a KKT residual of "
+            f"{max(certificate.kkt_residual):.1e}"
+        )
+    if look.verification is not None and not look.verification.agrees:
+        terminal.say(f"WARNING: {spoken_agreement(look.verification)}")
+
+
+def _sentences(look: Look, table: Table) -> list[str]:
+    """What holds the lights most; in full, where all that is missed comes from, and how sure.
+
+    And if other colours come closer.
+    """
+    choice = closer_choice(look.analysis.color_choices)
+    closer = [f"Other colours come closer: --colors {choice}."] if choice else []
+    if table == "short":
+        is_told = not look.analysis.seen.is_close
+        return [*(_what_holds(look)[:1] if is_told else []), *closer]
+    told = [*what_is_missed(look.diagnosis, look.analysis.seen, holds=_what_holds(look)), *closer]
+    if look.uncertainty is not None:
+        told.append(how_sure(look.basis, look.solution, look.uncertainty))
+    return told
+
+
+def _what_holds(look: Look) -> list[str]:
+    """Say what keeps the lights from the paint, the main reason first, each with its option."""
+    if not look.analysis.seen.reasons:
+        return what_holds(look.diagnosis)
+    told = [_spoken_cause(look, reason) for reason in look.analysis.seen.reasons]
+    return [sentence for sentence in told if sentence][:2]
+
+
+def _spoken_cause(look: Look, reason: Reason) -> str:
+    """One of them; of what the command line asks of lights, what to leave out."""
+    said = spoken_cause(reason, weaker="--hold")
+    keys = KEYS.get(reason.kind, ())
+    options = [
+        f"--{'limit' if key == 'limits' else key} {name}"
+        for name, wish, where in look.solution.problem.constraints.lights
+        for key in keys
+        if key in wish
+        and key != "duv"
+        and where.startswith(BY_OPTION)
+        and any(name == light or fnmatchcase(light, name) for light in reason.names)
+    ]
+    if not options:
+        return said
+    return f"{said.removesuffix('.')}: leave out {some_names(options, joint=' and ')}."
+
+
+def spoken_settings(settings: Settings) -> str:
+    """What is used, said or by default: `space display, hold 1, ...`."""
+    told = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    transform = told.pop("transform")
+    told |= {"view": transform and spoken_view(transform), "command": None}
+    # What is left out is worth a word, and not what is always there.
+    said = {name: value for name, value in told.items() if value not in (None, "")}
+    said = {name: value for name, value in said.items() if name not in ("verify", "report")}
+    return ", ".join(f"{name} {value}" for name, value in said.items() if value is not False)
+
+
+def left_open(look: Look) -> str:
+    """One line: the lights that the painting says nothing of, or nothing of each; "" for none."""
+    unreached = look.solution.certificate.unreached
+    dark = [name for name in unreached if not look.basis.image(name).any()]
+    told = []
+    if dark:
+        told.append(f"the picture holds nothing of {some_names(dark)}: kept as it is")
+    if seen := [name for name in unreached if name not in dark]:
+        told.append(f"no painted pixel sees {some_names(seen)}: kept as it is")
+    told += partly_reached(look.lighting)
+    told += [ambiguity.sentence for ambiguity in look.analysis.ambiguities]
+    return f"the painting leaves lights open: {some_of(told, joint='; ')}" if told else ""
+
+
+def _show_short(look: Look) -> None:
+    """Print a row for each light that matters, in 80 columns, and what the others do."""
+    lights, present = look.lighting.lights, look.basis.lights
+    shares = energy_shares(look.basis, look.lighting)
+    errors = spoken_errors(look.uncertainty, len(shares))
+    shown = _that_matter(look)
+    table, swatches = terminal.table("light", "stops", "colour", "±", "share"), []
+    for k in shown:
+        changed = change(present[k], lights[k])
+        is_off = changed == "off"
+        swatches.append(None if is_off else _color(look, lights[k]))
+        table.row(
+            lights[k].name + "*" * lights[k].is_active,
+            changed,
+            "" if is_off else _spoken_color(look, lights[k]),
+            errors[k],
+            f"{100 * shares[k]:.1f} %",
+            room=NAME,
+        )
+    terminal.print_table(table, swatches)
+    if said := untold_lights(look.lighting):
+        terminal.tell(said)
+    if rest := sorted(set(range(len(lights))) - set(shown)):
+        terminal.tell(_spoken_rest(look, rest))
+    if any(lights[k].is_active for k in shown):
+        terminal.write("* held by what is asked of it (--table full says what)")
+
+
+def _that_matter(look: Look) -> list[int]:
+    """Indices of the lights that do most to the picture, or changed most of it, in their order."""
+    weights = look.solution.weights
+    if len(weights) <= ALL:
+        return list(range(len(weights)))
+    moved = np.abs(weights - look.basis.present_weights)
+    power = (moved + weights) * look.basis.totals @ LUMINANCE
+    return sorted(np.argsort(-power, kind="stable")[:MOST].tolist())
+
+
+def _spoken_rest(look: Look, rest: list[int]) -> str:
+    """How many more lights there are, what became of them, and what they do together."""
+    changes = [change(look.basis.lights[k], look.lighting.lights[k]) for k in rest]
+    counts = {
+        "off": changes.count("off"),
+        "switched on": changes.count("on"),
+        "kept": changes.count("kept"),
+        "brighter": sum(x.startswith("+") for x in changes),
+        "dimmer": sum(x.startswith("−") for x in changes),
+        "as they were": changes.count("0.0"),
+    }
+    told = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    share = energy_shares(look.basis, look.lighting)[rest].sum()
+    return f"and {len(rest)} more ({told}): together {spoken_percent(float(share))} of the picture"
+
+
+def change(light: BasisLight, setting: LightSetting) -> str:
+    """From the present to the new light in stops of luminance, `on` or `off`."""
+    if light.is_fixed or not any(setting.reached):
+        return "kept"
+    before, after = (float(luminance(np.array(x.emission))) for x in (light, setting))
+    if after <= OFF * before:
+        return "off"
+    if before == 0:
+        return "on"
+    stops = f"{np.log2(after / before):+.1f}"
+    return "0.0" if stops in ("+0.0", "-0.0") else stops.replace("-", "−")
+
+
+def _color(look: Look, light: LightSetting) -> str | None:
+    """Of a swatch; of a light whose own colour is not known, that of its factor."""
+    if light.is_fixed or light.is_partly_reached:
+        return None
+    return look.lighting.photometry(light).hex or rgb_to_hex(np.array(light.emission))
+
+
+def _spoken_color(look: Look, light: LightSetting) -> str:
+    """`2700 K` of what is nearly white, else `#ff2010`."""
+    seen = look.lighting.photometry(light)
+    if light.is_fixed or seen.hex is None:
+        return ""
+    is_white = seen.kelvin is not None and seen.duv is not None and abs(seen.duv) <= WHITE
+    return f"{seen.kelvin:.0f} K" if is_white else seen.hex
+
+
+def _show_all(look: Look) -> None:
+    """Print a row for each light: before, solved, how sure, and what it does to the picture."""
+    shares = energy_shares(look.basis, look.lighting)
+    held = any(light.constraint for light in look.lighting.lights)
+    headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
+    amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
+    asked = ["asked (* holds it)"] if held else []
+    table = terminal.table(*headings, *amounts, *asked)
+    errors = spoken_errors(look.uncertainty, len(shares))
+    for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
+        seen = look.lighting.photometry(light)
+        table.row(
+            light.name,
+            light.plugin,
+            "" if light.is_fixed else terminal.numbers(now.emission),
+            "kept" if light.is_fixed else _solved(light),
+            errors[k],
+            "" if light.is_fixed else light.unit,
+            f"{100 * shares[k]:.1f} %",
+            "" if light.is_fixed else seen.color,
+            *seen.amounts[: len(amounts)],
+            *([light.constraint + "*" * light.is_active] if held else []),
+        )
+    terminal.print_table(table)
+
+
+def _solved(light: LightSetting) -> str:
+    if not any(light.emission):
+        return "off"
+    solved = terminal.numbers(light.emission)
+    if all(light.reached):
+        return solved
+    kept = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
+    return f"{solved} ({kept})"

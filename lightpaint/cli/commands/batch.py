@@ -1,0 +1,176 @@
+"""What `lightpaint batch` does: plans, runs and prints."""
+
+import shlex
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from lightpaint.batch.gallery.gallery import spoken_counts
+from lightpaint.batch.gallery.summary import Row, summary_document
+from lightpaint.batch.manifest.folder_names import FILES
+from lightpaint.batch.manifest.starter_manifest import write_first
+from lightpaint.batch.plan.cost_estimate import estimate
+from lightpaint.batch.plan.openjd import LOOK, write_openjd
+from lightpaint.batch.plan.plan import Plan, PlannedLook
+from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.run import run_batch
+from lightpaint.batch.run_options import How
+from lightpaint.batch.run_options import Outcome as BatchOutcome
+from lightpaint.batch.work.work_items import Done
+from lightpaint.cli.output import documents, terminal
+from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.errors import BatchError, OutputError
+from lightpaint.files import called
+from lightpaint.screen import some_of, visible
+
+#: Looks that are listed at the end; of more only those that are not done.
+LISTED = 40
+
+
+def batch(
+    *,
+    paths: list[str],
+    output: Path | None,
+    is_first: bool,
+    is_dry: bool,
+    form: str | None,
+    only: str | None,
+    how: How,
+    force: bool,
+    log: Path | None,
+) -> Outcome:
+    """`lightpaint batch looks.toml -o DIR`, or `--init SCENE PAINTING...`"""
+    if is_first:
+        made = output or Path("looks.toml")
+        write_first(made, paths[0], paths[1:], force=force)
+        terminal.write(f"{made}: {len(paths) - 1} looks; what runs them is")
+        terminal.write(f"lightpaint batch {shlex.quote(str(made))}")
+        return Outcome(lambda: {"manifest": str(made), "looks": len(paths) - 1})
+    if form is not None and len(paths) != 2:
+        raise BatchError("where is the job to go? give looks.toml --export openjd DIR")
+    if form is None and len(paths) > 1:
+        raise BatchError(f"{len(paths)} manifests: give one, or --init SCENE PAINTING...")
+    folder = output or Path(called(Path(paths[0])))
+    # The same in all reports, however often it was stopped, and from wherever it is done.
+    manifest, into = (str(Path(x).absolute()) for x in (paths[0], folder))
+    command = shlex.join(["lightpaint", "batch", manifest, "-o", into])
+    planned = plan(paths[0], folder, force=force, command=command).only(only)
+    if is_dry:
+        return _dry(planned)
+    if form is not None:
+        return _exported(planned, Path(paths[1]), force=force)
+    of_looks = (x for look in planned.chosen_looks for x in look.remarks)
+    remarks = list(dict.fromkeys((*planned.remarks, *of_looks)))
+    for remark in remarks[:LISTED]:
+        terminal.say(remark)
+    if len(remarks) > LISTED:
+        terminal.say(f"and {len(remarks) - LISTED} more remarks, each when its look is done")
+    listen = terminal.Listener()
+    note = _log(log)
+    note(f"{command}: {len(planned.chosen_looks)} looks")
+
+    def told(look: PlannedLook, done: Done) -> None:
+        name, left = f"{look.entry.name}: {done.kind}", run_left(done)
+        if done.failure:
+            note(f"{name} failed: {done.failure}")
+            return
+        note(f"{name} done in {done.spent_s:.2f} s")
+        listen.say(f"{name} done in {done.spent_s:.1f} s{left}")
+
+    def run_left(done: Done) -> str:
+        return "" if done.left_s is None else f", {spoken_time(done.left_s)} left"
+
+    with listen:
+        outcome = run_batch(planned, how, listen, told=told)
+    note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
+    return _told(planned, outcome)
+
+
+def _exported(planned: Plan, folder: Path, *, force: bool) -> Outcome:
+    """A job for a farm, and how it is run here."""
+    path = write_openjd(folder, planned, only=("--only", LOOK, "--apart"), force=force)
+    terminal.write(f"{path}: {len(planned.chosen_looks)} looks; what runs them here is")
+    terminal.write(f"openjd run {shlex.quote(str(path))}")
+    return Outcome(lambda: documents.files_document(folder, [path]))
+
+
+def _told(planned: Plan, outcome: BatchOutcome) -> Outcome:
+    """What a run came to, for people and programs."""
+    _show(planned, outcome.rows)
+    folder = planned.folder
+    for name, why in list(outcome.failed.items())[:LISTED]:
+        terminal.complain("batch", f"{name}: {why}")
+    if len(outcome.failed) > LISTED:
+        terminal.complain("batch", f"and {len(outcome.failed) - LISTED} more, in summary.csv")
+    if outcome.skipped:
+        terminal.say(f"{len(outcome.skipped)} looks were done earlier, and are as they were")
+    if outcome.waiting:
+        terminal.complain("batch", f"stopped: {some_of(outcome.waiting)} not begun")
+    if outcome.rows:
+        terminal.write(f"{folder / FILES[0]}: {spoken_counts(outcome.rows)}")
+    return Outcome(
+        lambda: {
+            "folder": str(folder),
+            "files": [str(folder / name) for name in FILES if outcome.rows],
+            **summary_document(outcome.rows),
+        },
+        1 if outcome.failed or outcome.waiting else 0,
+    )
+
+
+def _show(planned: Plan, rows: list[Row]) -> None:
+    """A row for each look; of very many for those that are not done."""
+    shown = rows if len(rows) <= LISTED else [row for row in rows if row.state != "done"][:LISTED]
+    if not shown:
+        return
+    table = terminal.table("look", "state", "ΔE", "render", "folder")
+    for row in shown:
+        agrees = "" if row.agrees is None else "agrees" if row.agrees else "disagrees"
+        missed = "" if row.delta_e is None else f"{row.delta_e:.1f}"
+        table.row(row.look, row.state, missed, agrees, str(planned.folder / row.folder))
+    terminal.print_table(table)
+
+
+def _dry(planned: Plan) -> Outcome:
+    """What would be done, and what that takes; nothing is."""
+    table, looks = terminal.table("look", "what", "of"), []
+    for look in planned.chosen_looks:
+        what = look.failure or ("done earlier" if look.is_done else ", ".join(look.entry.want))
+        of = ", ".join([*(x.path for x in look.entry.paintings), *look.entry.of])
+        table.row(look.entry.name, visible(what), of or look.entry.lighting)
+        looks.append({"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want})
+    terminal.print_table(table)
+    needed = estimate(planned)
+    terminal.write(
+        f"bases {spoken_time(needed.bases_s)} unless they are kept, looks "
+        f"{spoken_time(needed.looks_s)}, by one process on two cores; "
+        f"{needed.memory / 1e9:.1f} GB of memory"
+    )
+    failed = [look.entry.name for look in planned.chosen_looks if look.failure]
+    if failed:
+        terminal.complain("batch", f"cannot be done: {some_of(failed)}")
+    return Outcome(lambda: {"looks": looks, **vars(needed)}, 1 if failed else 0)
+
+
+def spoken_time(seconds: float) -> str:
+    """`0:07`, `12:30`, `3:05:00`."""
+    whole = round(seconds)
+    hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def _log(path: Path | None) -> Callable[[str], Any]:
+    """Adds a line with its time to the log, if there is one."""
+
+    def note(text: str) -> None:
+        if path is None:
+            return
+        time = datetime.now(UTC).isoformat(timespec="seconds")
+        try:
+            with path.open("a", encoding="utf-8") as file:
+                file.write(f"{time} {visible(text)}\n")
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+
+    return note

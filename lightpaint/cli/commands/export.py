@@ -1,0 +1,44 @@
+"""What `lightpaint export` does: an answer in the forms that other programs take."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lightpaint.cli.output import documents, terminal
+from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.errors import OutputError
+from lightpaint.files import check_files, check_writable, write_text
+from lightpaint.lighting.file import read_lighting
+from lightpaint.pipeline.sources import GroupsFile, SceneFile, content
+from lightpaint.relit.forms import Source, names_of_forms, writers_of
+from lightpaint.storage.staging import finish
+
+
+def export(
+    *,
+    lighting: Path,
+    to: Sequence[str],
+    scene: SceneFile | None,
+    groups: GroupsFile | None,
+    stage: Path | None,
+    output: Path | None,
+    force: bool,
+) -> Outcome:
+    """`lightpaint export lighting.json --to FORM,FORM -o DIR`"""
+    finish(lighting.parent)
+    answer, folder = read_lighting(lighting), output or lighting.parent
+    source, listen = Source(content(scene), content(groups), stage), terminal.Listener()
+    names = names_of_forms(to, source)
+    writers, remark = writers_of(names, answer, source, folder, listen)
+    made = {folder / name: make for name, make in writers.items()}
+    check_files(list(made), [lighting, *source.files])
+    check_writable(folder)
+    if not force and (there := [file for file in made if file.exists()]):
+        raise OutputError(f"{there[0]} is there: name another folder (folder=...), or force=True")
+    texts = {file: make() for file, make in made.items()}
+    for file, text in texts.items():
+        write_text(file, text)
+        terminal.write(str(file))
+    if remark:
+        listen.say(remark)
+    files = list(made)
+    return Outcome(lambda: documents.files_document(folder, files, lighting=str(lighting)))

@@ -1,0 +1,64 @@
+"""What is kept and what works here: `lightpaint cache` and `lightpaint doctor`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lightpaint.basis import cache as bases
+from lightpaint.basis.cache_folder import folder
+from lightpaint.cli.doctor import examine
+from lightpaint.cli.output import documents, tables, terminal
+from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.errors import BasisError
+from lightpaint.screen import some_names
+
+
+def cache(*, action: str, names: Sequence[str]) -> Outcome:
+    """`lightpaint cache [list | drop NAME... | clear]`"""
+    if action != "drop" and names:
+        raise BasisError(f"cache {action} takes no name: cache drop {names[0]} does")
+    if action == "list":
+        kept, about = bases.entries(), {"folder": str(folder()), "largest": bases.LARGEST}
+        tables.show_kept(kept)
+        size = sum(entry.size for entry in kept) / 1e6
+        terminal.write(f"kept in {folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB")
+        listed = [documents.kept_document(entry) for entry in reversed(kept)]
+        return Outcome(lambda: {**about, "kept": listed})
+    dropped = bases.entries() if action == "clear" else _kept_by_names(names)
+    freed = bases.drop(dropped)
+    if action == "clear":
+        freed += bases.sweep()
+    if action == "drop":
+        tables.show_kept(dropped)
+    terminal.write(f"{len(dropped)} deleted from {folder()}: {freed / 1e6:.1f} MB are free")
+    gone = [documents.kept_document(entry) for entry in dropped]
+    return Outcome(lambda: {"folder": str(folder()), "dropped": gone, "freed": freed})
+
+
+def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
+    """The bases that are meant, each once. Raises BasisError for a name of none."""
+    if not names:
+        raise BasisError(
+            "cache drop needs the name of a scene or of a file, as cache list shows it"
+        )
+    found: dict[Path, bases.Entry] = {}
+    for name in names:
+        if not (its := bases.named(name)):
+            scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
+            there = some_names(sorted(scenes)) or "none"
+            raise BasisError(f"no basis of {name!r} is kept in {folder()}: it has {there}")
+        found |= {entry.path: entry for entry in its}
+    return list(found.values())
+
+
+def doctor(*, variant: str | None) -> Outcome:
+    """`lightpaint doctor`"""
+    findings = examine(variant)
+    for finding in findings:
+        mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
+        terminal.write(f"{finding.what:18s} {mark:8s} {finding.found}")
+    missing = [finding for finding in findings if finding.state == "missing"]
+    for finding in missing:
+        if finding.remedy:
+            terminal.write(f"to mend {finding.what}: {finding.remedy}")
+    terminal.write("something is missing" if missing else "everything needed is here")
+    return Outcome(lambda: documents.doctor_document(findings), 2 if missing else 0)

@@ -1,0 +1,126 @@
+"""`lightpaint paint`: opens the painter in a browser, and says where it is."""
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING
+
+from lightpaint.cli.output import lines, terminal
+from lightpaint.cli.output.output_mode import Outcome, manner
+from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.errors import OutputError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.paint.server.address import Reach
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
+
+if TYPE_CHECKING:
+    from lightpaint.paint.server.server import Server
+    from lightpaint.paint.store.requests import Wishes
+
+#: What it means that others can.
+RISK = (
+    "whoever has its address, with the token, can paint here and have results written to {folder}, "
+    "and what is sent can be read on the way"
+)
+
+#: Who can reach the painter, said where an address was chosen.
+REACH = {
+    Reach.MACHINE: "programs of this machine, and nobody else, can reach the painter at {name}",
+    Reach.ADDRESS: "other machines can reach the painter at {name}; " + RISK,
+    Reach.ALL: "other machines can reach the painter at every address of this one; " + RISK,
+}
+
+
+def paint(
+    *,
+    sources: Sequence[SceneFile | BasisFile | GroupsFile],
+    folder: Path,
+    settings: Settings,
+    constraints: Constraints,
+    choice: TransformChoice,
+    options: tuple[str, ...],
+    new: bool,
+    host: str | None,
+    port: int | None,
+    with_browser: bool,
+) -> Outcome:
+    """`lightpaint paint SCENE|BASIS|LIGHTS`, of one view or of several."""
+    # The server and the session file bring much that no other command needs.
+    from lightpaint.paint.launch import paint_in_browser, subjects_of
+    from lightpaint.paint.server.server import check_installed
+
+    check_installed()
+    from lightpaint.cli.commands.session_options import solve_command
+    from lightpaint.cli.output.vocabulary import from_any_folder
+
+    def command(paintings: Mapping[str, str], wishes: "Wishes") -> str:
+        return from_any_folder(solve_command(sources[0].path, paintings, options, wishes))
+
+    subjects = subjects_of(
+        sources,
+        folder,
+        settings=settings,
+        constraints=constraints,
+        choice=choice,
+        # A basis has one view only for `solve`.
+        **({} if len(sources) > 1 and isinstance(sources[0], BasisFile) else {"command": command}),
+    )
+    subject = subjects[0]
+    if subject.groups is not None:
+        for remark in subject.groups.remarks:
+            terminal.say(remark)
+    addresses = []
+
+    def told() -> dict[str, str]:
+        return {"folder": str(folder), "scene": subject.name}
+
+    def opened(server: "Server") -> None:
+        addresses.append(server.url)
+        if host is not None:
+            about = REACH[server.address.reach].format(name=server.address.name, folder=folder)
+            is_open = server.address.reach is not Reach.MACHINE
+            (partial(terminal.complain, "paint") if is_open else terminal.say)(about)
+        said = f"painting {subject.name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
+        (lines.err if manner().as_json else terminal.write)(said)
+        if with_browser and _has_browser():
+            # Some browsers keep who starts them waiting.
+            given = (server.url_once(),)
+            Thread(target=_show, args=given, name="browser", daemon=True).start()
+
+    try:
+        paint_in_browser(
+            subjects, opened, new=new, host=host, port=port, say=lambda text: _say(text)
+        )
+    except KeyboardInterrupt:
+        if not addresses:  # it had not begun
+            raise
+        terminal.say(f"the painter has ended; what was painted is kept in {folder}")
+    except OutputError as error:  # also where an interrupt has ended it
+        terminal.complain("paint", str(error))
+        return Outcome(told, 2)
+    return Outcome(told)
+
+
+def _say(text: str) -> None:
+    """What the server says; a mistake of lightpaint's own has many lines."""
+    for line in text.rstrip().split("\n"):
+        terminal.say(line)
+
+
+def _show(url: str) -> None:
+    import webbrowser
+
+    webbrowser.open(url)
+
+
+def _has_browser() -> bool:
+    """Whether there is one that does not take over the terminal."""
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or os.environ.get("BROWSER")
+    ):
+        return False
+    return True

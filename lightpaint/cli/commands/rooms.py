@@ -1,0 +1,267 @@
+"""What the plain sub-commands do: calls of the corridor, and what came out told."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import write_basis
+from lightpaint.cli.commands.lights import note_scene
+from lightpaint.cli.commands.solve import solve
+from lightpaint.cli.options.job_options import folders_of, is_folder
+from lightpaint.cli.output import documents, tables, terminal
+from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.cli.output.vocabulary import from_any_folder
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.demo import write_demo
+from lightpaint.errors import OutputError
+from lightpaint.files import check_files, check_name, check_writable
+from lightpaint.lighting.file import read_lighting
+from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.pipeline import obtain
+from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
+from lightpaint.pipeline.renders import (
+    look_of_basis,
+    relight_look,
+    relit_folder,
+    render_look,
+    render_template,
+    template_of_basis,
+)
+from lightpaint.pipeline.result_folder import ResultFolder
+from lightpaint.pipeline.results import result_folders, verify_result
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import (
+    BasisFile,
+    GroupsFile,
+    Painting,
+    SceneFile,
+    check_nothing_idle,
+)
+from lightpaint.relit.relight import scene_of
+from lightpaint.scene.presets import on_film, samples
+from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.scene import Scene
+from lightpaint.storage.staging import finish
+from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
+
+
+def basis(*, scene: SceneFile, output: Path, settings: Settings) -> Outcome:
+    """`lightpaint basis SCENE -o F.basis.exr`"""
+    if output.suffix.lower() != ".exr":
+        raise OutputError(f"{output} must end in .exr, the format that is written")
+    check_writable(output.parent)
+    loaded = on_film(scene.content, settings.quality, settings.resolution)
+    note_scene(loaded)
+    check_files([output], loaded.read_files)
+    with terminal.Listener() as listen:
+        of_film = remarks_of_film(loaded, settings)
+        for remark in (*remarks_of_scene(loaded), *of_film, *remarks_of_memory(loaded)):
+            listen.say(remark)
+        made = obtain(loaded, settings, listen)
+    write_basis(output, made)
+    kept = " and what is kept" if made.is_fixed.any() else ""
+    count = int((~made.is_fixed).sum())
+    terminal.write(f"{output}: {count} lights{kept}, {made.origin.spp} samples per pixel")
+    return Outcome(lambda: documents.basis_document(output, made))
+
+
+def template(
+    *,
+    source: SceneFile | BasisFile | GroupsFile,
+    output: Path,
+    transform: ViewTransform | None,
+    settings: Settings,
+    force: bool,
+) -> Outcome:
+    """`lightpaint template SCENE|BASIS|LIGHTS -o DIR`"""
+    _check_template(output, force=force)
+    if not isinstance(source, SceneFile):
+        return _template_of_basis(source, output, transform, settings)
+    loaded = on_film(source.content, settings.quality, settings.resolution)
+    note_scene(loaded)
+    check_files(_replaced(output), loaded.read_files)
+    for remark in remarks_of_film(loaded, settings):
+        terminal.say(remark)
+    how: dict[str, Any] = {
+        "transform": transform,
+        "spp": samples(settings.quality, spp=settings.spp, time_s=settings.time_s),
+        "time_s": settings.time_s,
+        "seed": settings.seed,
+        "use_cache": settings.use_cache,
+    }
+    with terminal.Listener() as listen:
+        for remark in remarks_of_scene(loaded, is_rendered=False):
+            listen.say(remark)
+        if is_folder(output):
+            files = render_template(loaded, output, progress=listen, **how)
+        else:
+            files = [output, render_look(loaded, output, progress=listen, **how)]
+    return _shown_template(output, files)
+
+
+def _template_of_basis(
+    source: BasisFile | GroupsFile,
+    output: Path,
+    transform: ViewTransform | None,
+    settings: Settings,
+) -> Outcome:
+    """A template of what is rendered already."""
+    check_nothing_idle(settings, source)
+    found = source.content
+    made = found if isinstance(found, Basis) else found.basis
+    check_files(_replaced(output), [Path(source.path)] if isinstance(found, Basis) else found.files)
+    if not isinstance(found, Basis):
+        for remark in found.remarks:
+            terminal.say(remark)
+    if is_folder(output):
+        files = template_of_basis(made, output, transform=transform)
+    else:
+        files = [output, look_of_basis(made, output, transform=transform)]
+    return _shown_template(output, files, is_denoised=made.knows_noise)
+
+
+def _shown_template(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> Outcome:
+    """Return lines that say what to do with the files of a template."""
+    is_tree = is_folder(output)
+    picture = output / SHOWN if is_tree else output.with_suffix(".png")
+    linear = output / LIGHT if is_tree else output
+    for line in template_lines(output, files, is_denoised=is_denoised):
+        terminal.write(line)
+    folder = output if is_tree else output.parent
+    shown = {"picture": str(picture), "light": str(linear)}
+    return Outcome(lambda: documents.files_document(folder, files, **shown))
+
+
+def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> list[str]:
+    """Return what is said of the files of a template, those to paint over first."""
+    is_tree = is_folder(output)
+    picture = output / SHOWN if is_tree else output.with_suffix(".png")
+    told = "; it is denoised" if is_denoised else ""
+    lines = [f"{picture}: paint over it, in any program, and save the painting beside it{told}"]
+    if CLEAN in {file.name for file in files}:
+        lines.append(
+            f"{output / CLEAN}: the same in linear light, to paint over in programs that know EXR"
+        )
+    its = "as it was rendered, with its grain" if is_denoised else "the same in linear light"
+    lines.append(f"{output / LIGHT if is_tree else output}: {its}")
+    if is_tree and (output / MATTES) in {file.parent for file in files}:
+        lines.append(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
+    elif is_tree:
+        lines.append(f"{output}/{LIGHTS}: what lights do")
+    return lines
+
+
+def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
+    """`lightpaint demo -o DIR`"""
+    made = write_demo(folder)
+    options = [f"--spp {settings.spp}"] if settings.spp else []
+    options += [f"-m {variant}"] if variant else []
+    files = shlex.join(map(str, (made.scene, made.painting, "-o", made.answer)))
+    command = " ".join(("lightpaint solve", files, *options))
+    terminal.say(f"a gallery, and a painting of it at evening, are in {folder}; what runs is")
+    terminal.say(command)
+    scene = SceneFile(str(made.scene), variant=variant)
+    settings = replace(settings, command=from_any_folder(command))
+    painting = Painting(str(made.painting))
+    solved = solve(jobs=[Job((scene,), (painting,), made.answer, settings=settings)])
+    terminal.write("")
+    terminal.write(f"Open {made.answer / 'report.html'} in a browser. Then paint your own:")
+    terminal.write(f"lightpaint template {shlex.quote(str(made.scene))}")
+    about = {"scene": str(made.scene), "painting": str(made.painting), "command": command}
+    return replace(solved, told=lambda: about | solved.told())
+
+
+def relight(
+    *, scene: SceneFile, lightings: Sequence[Path], output: Path | None, settings: Settings
+) -> Outcome:
+    """`lightpaint relight SCENE lighting.json...`"""
+    for path in lightings:
+        finish(path.parent)
+    answers = [read_lighting(path) for path in lightings]
+    names = [a.target or path.stem for a, path in zip(answers, lightings, strict=True)]
+    folders = folders_of(output, names)
+    loaded = _loaded(scene)
+    results = [
+        relit_folder(loaded, path, folder, force=settings.force)
+        for path, folder in zip(lightings, folders, strict=True)
+    ]
+    for place in results:
+        place.check()
+    for lighting, place in zip(answers, results, strict=True):
+        folder = place.folder
+        if lighting.scene_identity not in ("", scene_of(loaded, lighting).identity):
+            terminal.say(f"{folder}: the lighting was solved for another state of the scene")
+        with terminal.Listener() as listen:
+            how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
+            relight_look({"": loaded}, lighting, place, progress=listen, **how)
+            listen.note(f"{folder} relit and rendered")
+        terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
+    return Outcome(lambda: {"results": [_relit(*x) for x in zip(lightings, results, strict=True)]})
+
+
+def _relit(lighting: Path, place: ResultFolder) -> dict[str, Any]:
+    """What there is of a lighting that was relit, for programs."""
+    files = [file for file in place.files if file.is_file()]
+    return documents.files_document(place.folder, files, lighting=str(lighting))
+
+
+def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) -> Outcome:
+    """`lightpaint verify DIR...`"""
+    use_variant(variant)
+    results = []
+    for folder in (view for given in folders for view in result_folders(given)):
+        with terminal.Listener() as listen:
+            how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
+            result = verify_result(folder, progress=listen, **how)
+            listen.note(f"{folder} rendered and compared")
+        terminal.write(f"{folder}: {tables.spoken_agreement(result)}")
+        results.append((folder, result))
+    agrees = all(result.agrees for _, result in results)
+    return Outcome(
+        lambda: {
+            "agrees": agrees,
+            "results": [documents.verified_document(*result) for result in results],
+        },
+        0 if agrees else 1,
+    )
+
+
+def _check_template(output: Path, *, force: bool) -> None:
+    """Raise OutputError for a place that a template cannot or should not go to."""
+    is_tree = is_folder(output)
+    check_name(output)
+    check_files(_replaced(output), ())
+    for file in _replaced(output):
+        if file.exists() and not force:
+            raise OutputError(
+                f"{file} exists and may have been painted on: choose another name with -o, or "
+                "pass --force"
+            )
+    if output.suffix.lower() in (".png", ".tif", ".tiff", ".jpg", ".jpeg"):
+        raise OutputError(
+            f"{output} is no folder: name one with -o, or a file that ends in .exr (a PNG comes "
+            "along)"
+        )
+    if is_tree and output.is_file():
+        raise OutputError(f"{output} is a file: name a folder with -o, or a file that ends in .exr")
+    check_writable(output if is_tree else output.parent)
+
+
+def _replaced(output: Path) -> list[Path]:
+    """What a template at `output` may take the place of."""
+    if not is_folder(output):
+        return [output, output.with_suffix(".png")]
+    finish(output)
+    return files_in_the_way(output)
+
+
+def _loaded(scene: SceneFile) -> Scene:
+    """The scene, of whose lights only the sum counts."""
+    loaded = scene.content
+    note_scene(loaded)
+    if note := use_variant().note:
+        terminal.say(note)
+    return loaded

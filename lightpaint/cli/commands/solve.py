@@ -1,0 +1,85 @@
+"""What `lightpaint solve` does: one painting or several, their variations, a gallery of all."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
+from lightpaint.cli.output import documents, tables, terminal
+from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.cli.tolerances import Wanted
+from lightpaint.errors import ALONE
+from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.pipeline import run
+from lightpaint.pipeline.results import Look
+from lightpaint.relit.export.exports import EXPORTS
+from lightpaint.screen import some_of
+
+if TYPE_CHECKING:
+    from lightpaint.cli.solve_variations import Several
+
+#: Of an answer of which nothing is asked.
+ANY = Wanted()
+
+
+def solve(
+    *,
+    jobs: Sequence[Job],
+    table: Table = "short",
+    wanted: Wanted = ANY,
+    several: "Several | None" = None,
+) -> Outcome:
+    """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`
+
+    several: what they are to each other, where there are several.
+    """
+    listen, results, shortfalls, obtained = terminal.Listener(), [], [], None
+    # Those of all before the first is run, which says its own again: once is enough.
+    for remark in (remark for job in jobs for remark in job.remarks):
+        listen.say(remark)
+    for job in jobs:
+        listen.note(f"files read; {spoken_settings(job.fit)}")
+        try:
+            with listen:
+                looks = run(job, listen, bases=None if obtained is None else list(obtained))
+            # Several paintings of one scene share its basis.
+            obtained = [look.basis for look in looks]
+            if several is not None:
+                several.is_done(job, looks[0].lighting, obtained)
+        except ALONE as error:
+            if several is None or not several.goes_on(job, error):
+                raise
+            continue
+        _show(job, looks, table)
+        for view, look in zip(job.views, looks, strict=True):
+            results.append((job, view, look))
+            shortfalls += [f"{view.folder} {x}" for x in wanted.shortfalls(look.analysis.seen)]
+    if several is not None:
+        several.show(obtained or [])
+    if jobs and not jobs[0].scenes and jobs[0].groups is None:
+        terminal.say("solved from a saved basis: no render was made; lightpaint relight makes one")
+    if shortfalls:
+        terminal.complain("solve", some_of(shortfalls, joint="; "))
+    made = [] if several is None else several.shifted
+
+    def told() -> dict[str, Any]:
+        found = {"results": [documents.result_document(*x, wanted) for x in results]}
+        return found | ({"variations": made} if made else {})
+
+    return Outcome(
+        told,
+        1 if shortfalls or (several is not None and several.failed) else 0,
+    )
+
+
+def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
+    """What one job came to."""
+    for view, look in zip(job.views, looks, strict=True):
+        if job.by_sensor:
+            terminal.write("")
+            terminal.write(f"{look.basis.origin.sensor}:")
+        show_look(look, view.folder, table=table)
+        if look.suggestions is not None:
+            tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
+    if job.groups is not None:
+        there = ", ".join(name for name in EXPORTS if (job.folder / name).is_file())
+        terminal.write(f"for other programs: {there}")

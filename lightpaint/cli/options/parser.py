@@ -1,0 +1,332 @@
+"""What the command line understands: one sub-command per room, and their options."""
+
+import argparse
+from collections.abc import Callable
+
+from lightpaint.cli.options import arguments
+from lightpaint.cli.options.argument_order import CommandParser, Parser
+from lightpaint.cli.options.option_groups import (
+    add_budget,
+    add_cache,
+    add_force,
+    add_lights,
+    add_manner,
+    add_output,
+    add_sampling,
+    add_scene,
+    add_server,
+    add_spp,
+    add_unit,
+    add_variant,
+    add_view,
+    add_view_transform,
+)
+from lightpaint.cli.options.solve_options import (
+    add_constraints,
+    add_fit,
+    add_method,
+    add_paintings,
+    add_pattern,
+    add_several,
+    add_variations,
+    add_verification,
+    add_wanted,
+)
+from lightpaint.version import __version__
+
+#: What a script asks.
+EXIT_CODES = (
+    "Exit codes: 0 done; 1 done, but not as asked (verify disagrees, --max-miss, --min-fit); "
+    "2 an error that you can mend, in one line; 70 a fault of lightpaint's own; "
+    "130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
+)
+
+
+def command_parser() -> argparse.ArgumentParser:
+    """The parser of all commands."""
+    parser = Parser(
+        prog="lightpaint",
+        description="Paint how a scene should look; get the lighting that comes closest.",
+    )
+    parser.add_argument("--version", action="version", version=f"lightpaint {__version__}")
+    commands = parser.add_subparsers(
+        dest="command", metavar="COMMAND", required=True, parser_class=CommandParser
+    )
+    for name, (about, add_options) in _COMMANDS.items():
+        said = about[0].upper() + about[1:] + "."
+        its = commands.add_parser(name, help=about, description=said, epilog=EXIT_CODES)
+        add_options(its)
+        add_manner(its)
+    return parser
+
+
+def _lights(parser: argparse.ArgumentParser) -> None:
+    add_scene(parser)
+    add_lights(parser)
+    add_unit(parser)
+    where = parser.add_mutually_exclusive_group()
+    add_output(where, "F.png", "what each light does alone, as a picture (default: lights.png)")
+    where.add_argument(
+        "--no-sheet", action="store_true", help="only list them; --json does that, too, without -o"
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace a picture of something else (default: refuse)"
+    )
+
+
+def _basis(parser: argparse.ArgumentParser) -> None:
+    add_scene(parser)
+    add_lights(parser)
+    add_budget(parser)
+    add_cache(parser)
+    add_output(parser, "F.basis.exr", "file to write (default: <scene>.basis.exr)")
+
+
+def _template(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "scene",
+        metavar="SCENE|BASIS|LIGHTS",
+        nargs="?",
+        help="scene XML, a *.basis.exr, or light groups of another renderer: an EXR or a folder of "
+        "them, which --lights may name as well",
+    )
+    add_view(parser)
+    add_lights(parser)
+    add_pattern(parser)
+    add_budget(parser)
+    add_cache(parser)
+    add_view_transform(parser, "srgb", "one that shows something; 0 where --view is given")
+    add_output(
+        parser, "DIR|F.exr", "folder to write, or only an EXR and a PNG (default: template/)"
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="replace an existing file (default: refuse)"
+    )
+
+
+def _demo(parser: argparse.ArgumentParser) -> None:
+    add_output(parser, "DIR", "folder for scene, painting and result (default: lightpaint-demo/)")
+    add_spp(parser, "the scene's")
+    add_variant(parser)
+
+
+def _solve(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "source",
+        metavar="SCENE|BASIS|LIGHTS",
+        help="scene XML, a *.basis.exr, or light groups of another "
+        "renderer: an EXR or a folder of them",
+    )
+    add_paintings(parser)
+    add_output(parser, "DIR", "result folder (default: named after the target)")
+    add_force(parser)
+    parser.add_argument(
+        "--table",
+        choices=("short", "full"),
+        default="short",
+        help="short: in stops and colours, of many lights those that matter; full: all lights, "
+        "with their radiometry, and how sure they are (default: %(default)s)",
+    )
+    add_several(parser)
+    add_variations(parser)
+    add_method(parser)
+    add_verification(parser)
+    add_wanted(parser)
+    add_unit(parser)
+    add_lights(parser)
+    add_pattern(parser)
+    add_constraints(parser)
+    add_budget(parser)
+    add_cache(parser)
+    add_view(parser)
+
+
+def _paint(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "sources",
+        metavar="SCENE|BASIS|LIGHTS",
+        nargs="*",
+        help="scene XML, a *.basis.exr (or several, of the views of one scene), or light groups of "
+        "another renderer, which --lights may name, too",
+    )
+    add_output(
+        parser,
+        "DIR",
+        "folder for session and exports (default: named after the scene)",
+    )
+    add_server(parser)
+    add_fit(parser)
+    add_view_transform(parser, "srgb", "one that shows something; 0 where --view is given")
+    add_lights(parser)
+    add_pattern(parser)
+    add_constraints(parser)
+    add_budget(parser)
+    add_cache(parser)
+    add_view(parser, several=True)
+    # Options are kept for the command that answers what is exported.
+    parser.set_defaults(targets=[], masks=None, views=[], parser=parser)
+
+
+def _batch(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "paths",
+        metavar="looks.toml",
+        nargs="+",
+        help="manifest of looks; with --init a scene, then paintings",
+    )
+    add_output(
+        parser,
+        "DIR",
+        "folder for all looks (default: named after the manifest); with --init the file to write "
+        "(default: looks.toml)",
+    )
+    parser.add_argument(
+        "--init", action="store_true", help="write a first manifest, and do nothing else"
+    )
+    parser.add_argument(
+        "--dry-run",
+        action="store_true",
+        help="only check it, and say what would be done, with time and memory",
+    )
+    parser.add_argument("--only", metavar="PATTERN", help="only looks of such names, like 'dusk-*'")
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "--keep-going",
+        dest="keep_going",
+        action="store_true",
+        default=True,
+        help="a look that fails stops no other (default)",
+    )
+    group.add_argument(
+        "--stop-early",
+        dest="keep_going",
+        action="store_false",
+        help="begin nothing more once a look has failed",
+    )
+    parser.add_argument(
+        "--retry",
+        type=arguments.at_least(0, most=100),
+        default=0,
+        metavar="N",
+        help="try what fails so often again (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--workers",
+        type=arguments.at_least(1, most=1024),
+        default=1,
+        metavar="N",
+        help="processes that share the looks; 1 for this one alone (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="have workers of a Dask cluster do the work, bases in parts among it, by the address "
+        "of its scheduler, like tcp://scheduler:8786",
+    )
+    parser.add_argument(
+        "--shared-fs",
+        dest="shared_fs",
+        action="store_true",
+        help="with --cluster: workers see all files under the same paths, so that none is sent",
+    )
+    parser.add_argument(
+        "--task-limit",
+        dest="task_limit_s",
+        type=arguments.number(" of seconds"),
+        metavar="SECONDS",
+        help="with --cluster: a worker that takes longer over something counts as hung, and "
+        "another does it (default: 20 times what it is expected to take, at least 300)",
+    )
+    parser.add_argument(
+        "--apart",
+        action="store_true",
+        help="with --only: share the folder with others that do other looks at the same time; the "
+        "next run without it writes the gallery",
+    )
+    parser.add_argument(
+        "--export",
+        choices=("openjd",),
+        help="do nothing, but write an Open Job Description template for a farm to the folder that "
+        "is named behind the manifest",
+    )
+    parser.add_argument("--log", metavar="FILE", help="add a line with its time for each step")
+    add_force(parser)
+
+
+def _export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("lighting", metavar="lighting.json", help="as solve left it")
+    parser.add_argument(
+        "--to",
+        type=arguments.names_of,
+        action="extend",
+        required=True,
+        metavar="csv,json,mitsuba,usd,blender,nuke",
+        help="one or several. csv, json: fixtures with colour, kelvin, lumen and DMX; mitsuba: a "
+        "patch of the scene's XML; usd: a layer that overrides lights of a stage; blender: Python "
+        "that sets lights by their names; nuke: a script that multiplies light groups",
+    )
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--scene", metavar="SCENE.xml", help="scene that it was solved for")
+    what.add_argument(
+        "--lights",
+        dest="groups",
+        metavar="FILE.exr",
+        help="light groups of another renderer that it was solved from, or a folder of them",
+    )
+    add_pattern(parser)
+    parser.add_argument(
+        "--stage",
+        metavar="FILE.usd",
+        help="of usd: the stage whose lights, by the names they have in the scene, are overridden "
+        "(default: prims below /lights)",
+    )
+    add_view(parser)
+    add_output(parser, "DIR", "folder for the files (default: that of lighting.json)")
+    add_force(parser)
+
+
+def _relight(parser: argparse.ArgumentParser) -> None:
+    add_scene(parser)
+    parser.add_argument("lightings", metavar="lighting.json", nargs="+", help="as solve left them")
+    add_sampling(parser)
+    add_output(parser, "DIR", "result folder (default: named after the lighting's target)")
+    add_force(parser)
+
+
+def _verify(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folders", metavar="DIR", nargs="+", help="result folder of solve")
+    add_sampling(parser, default="the basis's")
+    add_variant(parser)
+
+
+def _cache(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "action",
+        nargs="?",
+        choices=("list", "drop", "clear"),
+        default="list",
+        help="list them, drop those of NAME, or clear all (default: %(default)s)",
+    )
+    parser.add_argument(
+        "names",
+        metavar="NAME",
+        nargs="*",
+        help="scene, or file, of the bases to drop, as list shows them; may be a pattern, 'hall*'",
+    )
+
+
+#: What each does, and how its options are added.
+_COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
+    "demo": ("solve for a painting that comes along, to see what this is", _demo),
+    "lights": ("list the lights of a scene", _lights),
+    "basis": ("render the image of each light alone", _basis),
+    "template": ("render the current look, to paint over", _template),
+    "solve": ("find the lighting that comes closest to a painting", _solve),
+    "paint": ("paint in the browser, and see the lighting that comes closest at once", _paint),
+    "batch": ("find many looks from one manifest, and go on where it was stopped", _batch),
+    "export": ("write a lighting for other programs, fixtures and consoles", _export),
+    "relight": ("write lightings into the scene and render it", _relight),
+    "verify": ("render results anew and compare with the prediction", _verify),
+    "cache": ("list or delete the bases kept from earlier runs", _cache),
+    "doctor": ("say what works here and what to install", add_variant),
+}

@@ -1,0 +1,1 @@
+"""What the terminal shows: tables, JSON documents, progress, and the words for them."""

@@ -1,0 +1,132 @@
+"""What commands say to programs: the documents of `--json` (docs/solving.md)."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis
+from lightpaint.cli.doctor import Finding
+from lightpaint.cli.output.tables import photometry_of
+from lightpaint.cli.tolerances import Wanted
+from lightpaint.pipeline.job import Job, PaintedView
+from lightpaint.pipeline.result_folder import RECORD
+from lightpaint.pipeline.results import Look
+from lightpaint.relit.verification import Verification
+from lightpaint.report.report_json import finite, verification_numbers
+from lightpaint.scene.lights.emission import MULTIPLE
+from lightpaint.scene.lights.light import WHOLE_EMISSION, Light
+from lightpaint.scene.scene import Scene
+
+
+def lights_document(scene: Scene, cd_per_unit: float | None) -> dict[str, Any]:
+    """Of `lights`."""
+    scale = {} if cd_per_unit is None else {"cd_per_unit": cd_per_unit}
+    listed = [described(light, cd_per_unit) for light in scene.lights]
+    return {"scene": str(scene.path), **scale, "lights": listed}
+
+
+def described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
+    """A light, and the emitters in it, for other programs."""
+    members = [
+        {
+            "name": member.name,
+            "plugin": member.plugin,
+            "parameter": member.kind.parameter if member.kind is not None else WHOLE_EMISSION,
+            "unit": member.kind.unit if member.kind is not None else MULTIPLE,
+            "emission": list(member.emission),
+            "form": member.form,
+            "sampling_weight": member.sampling_weight,
+            "photometry": photometry_of(member, cd_per_unit).fields(),
+        }
+        for member in light.members
+    ]
+    about = {
+        "name": light.name,
+        "plugin": light.plugin,
+        "parameter": light.parameter,
+        "unit": light.unit,
+        "emission": list(light.emission),
+        "form": light.form,
+        "is_fixed": light.is_fixed,
+        "photometry": photometry_of(light, cd_per_unit).fields(),
+        "members": members,
+    }
+    if len(members) == 1:
+        about["sampling_weight"] = light.members[0].sampling_weight
+    return about
+
+
+def basis_document(file: Path, basis: Basis) -> dict[str, Any]:
+    """Of `basis`."""
+    height, width = basis.size
+    return {
+        "file": str(file),
+        "scene": basis.origin.scene,
+        "sensor": basis.origin.sensor,
+        "lights": [light.name for light in basis.lights if not light.is_fixed],
+        "kept": [light.name for light in basis.lights if light.is_fixed],
+        "size": [width, height],
+        "spp": basis.origin.spp,
+        "seed": basis.origin.seed,
+        "method": basis.origin.method,
+    }
+
+
+def result_document(job: Job, view: PaintedView, look: Look, wanted: Wanted) -> dict[str, Any]:
+    """Of one view in `solve`: what its report.json and lighting.json say, and where they are."""
+    others = {its.folder for its in job.views} - {view.folder, job.folder}
+    files = [*job.results.files, job.folder / RECORD]
+    return {
+        "target": look.target.name,
+        "sensor": look.basis.origin.sensor,
+        "folder": str(job.folder),
+        "view": str(view.folder),
+        "files": [str(x) for x in files if x.is_file() and x.parent not in others],
+        "verdict": look.verdict,
+        "is_close": look.analysis.seen.is_close,
+        **wanted.document(look.analysis.seen),
+        "report": _in_file(view.folder / "report.json"),
+        "lighting": _in_file(job.folder / "lighting.json"),
+    }
+
+
+def _in_file(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def files_document(folder: Path, files: Sequence[Path], **others: Any) -> dict[str, Any]:
+    """Files that were written, and the folder that they are in."""
+    return {**others, "folder": str(folder), "files": [str(file) for file in files]}
+
+
+def verified_document(folder: Path, result: Verification) -> dict[str, Any]:
+    """Of one folder in `verify`, as report.json has it."""
+    return {"folder": str(folder), **dict(finite(verification_numbers(result)))}
+
+
+def kept_document(entry: cache.Entry) -> dict[str, Any]:
+    """Of one basis in the cache; what cannot be read of it is absent."""
+    told: dict[str, Any] = {"file": str(entry.path), "bytes": entry.size}
+    if (known := entry.origin) is not None and entry.image_size is not None:
+        height, width = entry.image_size
+        told |= {"scene": known.scene, "sensor": known.sensor, "size": [width, height]}
+        told |= {"lights": entry.lights, "spp": known.spp, "seed": known.seed}
+    return told
+
+
+def doctor_document(findings: Sequence[Finding]) -> dict[str, Any]:
+    """Of `doctor`."""
+    return {
+        "ok": all(finding.state != "missing" for finding in findings),
+        "findings": [
+            {
+                "what": finding.what,
+                "state": finding.state,
+                "found": finding.found,
+                **({"remedy": finding.remedy} if finding.remedy else {}),
+            }
+            for finding in findings
+        ],
+    }

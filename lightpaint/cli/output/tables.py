@@ -1,0 +1,118 @@
+"""What commands print of scenes, bases and suggestions: tables, and sentences below them."""
+
+from collections.abc import Sequence
+
+from lightpaint.basis.cache import Entry
+from lightpaint.cli.output import terminal
+from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.verification import Verification
+from lightpaint.report.page.suggestion_section import spoken_position, spoken_suggestions
+from lightpaint.report.sentences import (
+    spoken_percent,
+)
+from lightpaint.report.verdict import agreement
+from lightpaint.scene.lights.emission import MULTIPLE
+from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.light import Light
+from lightpaint.scene.scene import Scene
+
+
+def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
+    """Print the lights of a scene as they are, groups with their members."""
+    headings = ("light", "plugin", "emission R G B", "unit", "size or place", "sampling", "colour")
+    # Lumen and candela only where somebody has said what a number stands for.
+    amounts = () if cd_per_unit is None else ("luminous", "flux")
+    table = terminal.table(*headings, *amounts)
+    for light in scene.lights:
+        single = light.member_names == (light.name,) and not light.is_fixed
+        if not single:
+            what = "kept as it is" if light.is_fixed else terminal.numbers(light.emission)
+            unit = "" if light.is_fixed else light.unit
+            count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
+            whole = photometry_of(light, cd_per_unit)
+            table.row(
+                light.name,
+                light.plugin,
+                what,
+                unit,
+                count,
+                "",
+                "" if light.is_fixed else whole.color,
+                *whole.amounts[: len(amounts)],
+            )
+        # Of many that nobody has named one row says all.
+        for member in () if light.is_found else light.members:
+            its = photometry_of(member, cd_per_unit)
+            table.row(
+                member.name if single else f"  {member.name}",
+                member.plugin,
+                terminal.numbers(member.emission),
+                member.kind.unit if member.kind is not None else MULTIPLE,
+                member.form,
+                f"{member.sampling_weight:g}",
+                its.color,
+                *its.amounts[: len(amounts)],
+            )
+    terminal.print_table(table)
+
+
+def photometry_of(light: Light | Emitter, cd_per_unit: float | None) -> Photometry:
+    """Of a light or one of its emitters, as the scene has it."""
+    unit, flux = MULTIPLE, None
+    if isinstance(light, Light):
+        unit, flux = light.unit, light.unit_flux
+    elif light.kind is not None:
+        unit = light.kind.unit
+        flux = None if light.unit_flux is None else (light.unit_flux,) * 3
+    return photometry(light.emission, unit=unit, unit_flux=flux, cd_per_unit=cd_per_unit)
+
+
+def show_kept(entries: Sequence[Entry]) -> None:
+    """Print a row for each basis in the cache, the last used first."""
+    table = terminal.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
+    for entry in reversed(entries):
+        known, about = entry.origin, ["?"] * 6
+        if known is not None and entry.image_size is not None:
+            height, width = entry.image_size
+            about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
+            about += [str(known.spp), str(known.seed)]
+        table.row(*about, f"{entry.size / 1e6:.0f}", entry.path.name)
+    terminal.print_table(table)
+
+
+def spoken_agreement(result: Verification) -> str:
+    """Whether render and prediction agree, with numbers."""
+    return (
+        f"{agreement(result)}; RMSE {result.rmse:.2g} (noise {result.noise_rmse:.2g}), "
+        f"ΔE {result.delta_e_mean:.1f}"
+    )
+
+
+def show_suggestions(
+    suggestions: Sequence[Suggestion], *, cd_per_unit: float | None = None
+) -> None:
+    """Print the lights that would help, and their XML."""
+    terminal.write("")
+    terminal.write(spoken_suggestions(suggestions))
+    if not suggestions:
+        return
+    headings = ("suggested light", "at", "intensity R G B", "unit", "takes away", "left", "colour")
+    amounts = () if cd_per_unit is None else ("luminous", "flux")
+    table = terminal.table(*headings, *amounts)
+    for light in suggestions:
+        seen = light.photometry(cd_per_unit)
+        table.row(
+            light.name,
+            spoken_position(light),
+            terminal.numbers(light.emission),
+            "W/sr",
+            spoken_percent(light.gain_share),
+            spoken_percent(light.missed_share),
+            seen.color,
+            *seen.amounts[: len(amounts)],
+        )
+    terminal.print_table(table)
+    terminal.write("to be pasted into <scene>, and solved again:")
+    for light in suggestions:
+        terminal.write_lines(light.xml)

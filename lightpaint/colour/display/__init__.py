@@ -1,0 +1,1 @@
+"""From linear light to what a display is sent: exposure, view transforms, sRGB."""

@@ -1,0 +1,29 @@
+"""View transforms as tables, for programs that have no code of theirs: the painter's page."""
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.display.view_transform import ViewTransform
+
+
+def lattice_of(transform: ViewTransform, side: int, low: float, high: float) -> Floats:
+    """(side, side, side, 3) float32 display values, axes r, g, b over log2 of light.
+
+    low, high: stops that the ends of an axis stand for; the first point is all light below.
+    """
+    axis = _axis(side, low, high)
+    light = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    shown = transform.encode(light.reshape(1, -1, 3))
+    return np.asarray(shown.reshape(side, side, side, 3), np.float32)
+
+
+def curve_of(transform: ViewTransform, side: int, low: float, high: float) -> Floats:
+    """(side,) float32, the diagonal of `lattice_of`: all of it where channels do not mix."""
+    grey = np.repeat(_axis(side, low, high)[:, None], 3, axis=1)
+    return np.asarray(transform.encode(grey)[:, 0], np.float32)
+
+
+def _axis(side: int, low: float, high: float) -> Floats:
+    axis = 2.0 ** np.linspace(low, high, side)
+    axis[0] = 0.0
+    return axis

@@ -1,0 +1,137 @@
+"""Ranges of white: the part of Planck's locus between two temperatures, in short straight pieces.
+
+The locus is curved, and the straight line between two whites far apart lies off it, towards pink:
+half way between 2200 K and 9000 K by 0.015 in Duv. Between two that are `STEP` apart nobody sees
+or measures that.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from math import ceil
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.colour.color import kelvin_to_rgb, luminance
+from lightpaint.colour.planckian_locus import uv_of
+from lightpaint.colour.primaries import REC709, rgb_to_xyz
+
+#: Mireds between two neighbours, at most. The chord is less than 3e-5 off the locus, and what
+#: is white at both ends differs by less than two steps that an eye tells apart.
+STEP = 8.0
+
+
+@dataclass(frozen=True)
+class WhiteRange:
+    """The whites between two temperatures.
+
+    low, high: in kelvin. duv: by how much greener than Planck's locus all of them are, in CIE 1960
+    (u, v).
+    """
+
+    low: float
+    high: float
+    duv: float = 0.0
+
+    @cached_property
+    def mireds(self) -> Doubles:
+        """(k,), those of its whites, from the warmest to the coolest; both ends are among them."""
+        warm, cool = 1e6 / self.low, 1e6 / self.high
+        return np.linspace(warm, cool, 1 + max(1, ceil((warm - cool) / STEP)))
+
+    @cached_property
+    def colors(self) -> Doubles:
+        """(k, 3), linear Rec.709 of luminance 1. Below 1901 K without the negative blue."""
+        kelvin = [self.low, *(1e6 / self.mireds[1:-1]).tolist(), self.high]
+        return np.array([kelvin_to_rgb(float(x), self.duv) for x in kelvin])
+
+    @property
+    def last(self) -> int:
+        """The place of the coolest white."""
+        return len(self.mireds) - 1
+
+    @cached_property
+    def _uv(self) -> Doubles:
+        return uv_of(self.colors @ rgb_to_xyz(REC709).T)
+
+    @cached_property
+    def _tristimulus(self) -> Doubles:
+        """(k,), X + 15 Y + 3 Z: by this much mixes of light weigh in (u, v)."""
+        return np.asarray(self.colors @ rgb_to_xyz(REC709).T @ np.array([1.0, 15.0, 3.0]))
+
+    def places(self, rgb: Floats) -> Doubles:
+        """Return places of the nearest whites in CIE 1960 (u, v), (n,): k + t between k and k + 1.
+
+        rgb: (n, 3), linear, >= 0. What is black is nearest to the middle.
+        """
+        rgb = np.asarray(rgb, np.float64)
+        lit = rgb.max(axis=1) > 0
+        uv = uv_of(np.where(lit[:, None], rgb, 1.0) @ rgb_to_xyz(REC709).T)
+        way = np.diff(self._uv, axis=0)
+        beside = uv[:, None] - self._uv[:-1]
+        part = np.clip((beside * way).sum(axis=2) / np.square(way).sum(axis=1), 0, 1)
+        apart = np.square(beside - part[..., None] * way).sum(axis=2)
+        k = np.argmin(apart, axis=1)
+        # From a part of the way in (u, v) to a part of the light.
+        t = np.take_along_axis(part, k[:, None], axis=1)[:, 0]
+        one, other = (1 - t) / self._tristimulus[k], t / self._tristimulus[k + 1]
+        return np.where(lit, k + other / (one + other), self.last / 2)
+
+    def at(self, places: Doubles) -> Doubles:
+        """Return the whites at such places, (n,), as linear colours (n, 3) of luminance 1."""
+        k = np.minimum(places.astype(np.intp), self.last - 1)
+        part = (places - k)[:, None]
+        return np.asarray((1 - part) * self.colors[k] + part * self.colors[k + 1])
+
+    def nearest(self, rgb: Floats) -> Doubles:
+        """Return the whites nearest to colours (n, 3), linear, as bright as these are."""
+        return np.asarray(np.asarray(luminance(rgb))[:, None] * self.at(self.places(rgb)))
+
+    def greener(self, rgb: Floats) -> Doubles:
+        """Return by how much colours (n, 3) are greener than the nearest white, (n,), in Duv.
+
+        Below 0 they are pinker. What is black is neither.
+        """
+        rgb = np.asarray(rgb, np.float64)
+        lit = rgb.max(axis=1) > 0
+        places = self.places(rgb)
+        k = np.minimum(places.astype(np.intp), self.last - 1)
+        # Towards cooler whites the locus runs with green on its right.
+        along = np.diff(self._uv, axis=0)[k]
+        across = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+        to_xyz = rgb_to_xyz(REC709).T
+        apart = uv_of(np.where(lit[:, None], rgb, 1.0) @ to_xyz) - uv_of(self.at(places) @ to_xyz)
+        return np.where(lit, (apart * across).sum(axis=1), 0.0)
+
+    def window(self, place: float, width: int) -> tuple[int, int]:
+        """Return the first and last white of `width` pieces about a place, within the range."""
+        width = min(width, self.last)
+        first = min(max(round(place - width / 2), 0), self.last - width)
+        return first, first + width
+
+    def tangent(self, window: tuple[int, int], reach: float) -> Doubles:
+        """Draw the straight line of a window out by `reach` mireds, within the range.
+
+        Return its ends, (2, 3) linear, of luminance 1 and never negative.
+        """
+        first, last = window
+        a, b = self.colors[first], self.colors[last]
+        per_mired = (b - a) / (self.mireds[first] - self.mireds[last])
+        back = min(reach, float(self.mireds[0] - self.mireds[first]))
+        ahead = min(reach, float(self.mireds[last] - self.mireds[-1]))
+        return np.stack([_drawn(a, -back * per_mired), _drawn(b, ahead * per_mired)])
+
+
+@lru_cache(64)
+def white_range(low: float, high: float, duv: float = 0.0) -> WhiteRange:
+    """Return the range, whose whites are found once. Raises ColorError as `kelvin_to_rgb` does."""
+    made = WhiteRange(low, high, duv)
+    made.colors.setflags(write=False)
+    return made
+
+
+def _drawn(color: Doubles, way: Doubles) -> Doubles:
+    """Return a colour (3,) moved by `way`, (3,), or as much of it as leaves no channel below 0."""
+    with np.errstate(divide="ignore"):
+        room = np.where(way < 0, color / np.where(way < 0, -way, 1), np.inf)
+    return np.asarray(np.maximum(color + min(1.0, float(room.min())) * way, 0))

@@ -1,0 +1,1 @@
+"""Files of pictures: OpenEXR, PNG, TIFF, PSD and layered ones, read and written."""

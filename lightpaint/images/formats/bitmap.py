@@ -1,0 +1,190 @@
+"""PNG, TIFF, JPEG and PSD: a picture's numbers as they are stored, and what they mean.
+
+Decoding is OpenImageIO's, over the formats' own libraries. It is given no file that declares more
+pixels than MAX_PIXELS. What it would read as something else than it is (CMYK, Lab, several pages,
+a Photoshop file without its merged picture) is refused here.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.colour.icc import Profile, read_icc
+from lightpaint.errors import ImageError
+from lightpaint.files import first_line
+from lightpaint.images.formats.png import PNG_HEAD, longest_png, read_png_head
+from lightpaint.images.formats.psd import check_psd
+from lightpaint.images.formats.silence import silenced
+from lightpaint.images.formats.tiff import check_tiff
+
+#: Above this many pixels nothing is decoded: 8192x4096, for which decoding takes some 1 GB.
+MAX_PIXELS = 2**25
+
+#: Longest file that is opened, in bytes.
+MAX_FILE = 2**31
+
+#: TIFF's PhotometricInterpretation: what its numbers may be, and what else they are called.
+TIFF_COLOURS = {0: "grey", 1: "grey", 2: "RGB", 3: "palette", 6: "YCbCr"}
+TIFF_OTHERS = {4: "a mask", 5: "CMYK", 8: "Lab", 9: "Lab", 10: "Lab", 32844: "LogLuv"}
+
+
+@dataclass(frozen=True)
+class Bitmap:
+    """A picture of numbers.
+
+    kind: `png`, `tiff`, `jpeg` or `psd`. values: (h, w, 3) uint8, uint16, float16 or float32;
+    grey is repeated. alpha: (h, w) of the same type, None if there is none or all is opaque.
+    premultiplied: whether `values` are multiplied by it. codes: largest integer there can be;
+    None for floats. profile: what the numbers mean; None is sRGB. lossy: whether compression
+    changed them. shown: the view transform that the file says it was made with, as `name stops`.
+    """
+
+    kind: str
+    values: npt.NDArray[Any]
+    alpha: npt.NDArray[Any] | None
+    premultiplied: bool
+    codes: int | None
+    profile: Profile | None
+    lossy: bool
+    shown: str | None = None
+
+
+def read_bitmap(path: Path, kind: str) -> Bitmap:
+    """The picture in a file of this kind, upright. Raises ImageError, without naming the file."""
+    if path.stat().st_size > MAX_FILE:
+        raise ImageError("is too long to be a picture")
+    shown: str | None = None
+    profile: Profile | None = None
+    transparency = True
+    if kind == "png":
+        with path.open("rb") as file:
+            longest = longest_png(file.read(PNG_HEAD))
+        if path.stat().st_size > longest:
+            raise ImageError(
+                f"is {path.stat().st_size} bytes long, and no PNG of its size has more than "
+                f"{longest}: save it again"
+            )
+        shown, profile = read_png_head(path)
+    elif kind == "psd":
+        transparency = check_psd(path, most=MAX_PIXELS)
+    elif kind == "tiff":
+        check_tiff(path)
+    with silenced():
+        spec, pixels = _decoded(path, kind)
+    if kind == "tiff":
+        _check_tiff(spec)
+    if kind == "jpeg" and spec.getattribute("jpeg:ColorSpace") == "CMYK":
+        raise ImageError("holds CMYK: convert it to RGB and export it again")
+    icc = spec.getattribute("ICCProfile")
+    if icc is not None:
+        profile = read_icc(np.asarray(icc, np.uint8).tobytes())
+    pixels = _upright(pixels, int(spec.get_int_attribute("Orientation", 1)))
+    alpha = _alpha(spec, pixels)
+    if alpha is not None and not transparency:
+        raise ImageError(
+            "has a channel beside its colours that is not transparency: delete it, or export a PNG"
+        )
+    integer = np.issubdtype(pixels.dtype, np.integer)
+    return Bitmap(
+        kind,
+        _rgb(spec, pixels),
+        alpha,
+        premultiplied=alpha is not None
+        and kind == "tiff"
+        and not spec.get_int_attribute("oiio:UnassociatedAlpha", 0),
+        codes=_largest(pixels.dtype) if integer else None,
+        profile=profile,
+        lossy=kind == "jpeg" or spec.get_int_attribute("tiff:Compression", 1) in (6, 7, 34887),
+        shown=shown,
+    )
+
+
+def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
+    import OpenImageIO
+
+    OpenImageIO.geterror()  # what is left of an earlier one
+    plain = OpenImageIO.ImageSpec()
+    plain["oiio:UnassociatedAlpha"] = 1  # or it multiplies display values by alpha
+    file = OpenImageIO.ImageInput.open(str(path), plain)
+    if file is None:
+        raise ImageError(f"is damaged: {first_line(OpenImageIO.geterror(), of=path)}")
+    try:
+        if file.format_name() != kind:
+            raise ImageError(f"is damaged: it begins like {kind.upper()} and is none")
+        spec = file.spec()
+        _check_size(spec)
+        pixels = file.read_image(0, 0, 0, spec.nchannels, spec.format)
+        error = file.geterror()
+        if pixels is None or error:
+            raise ImageError(f"is damaged or cut off: {first_line(error, of=path)}")
+        if kind == "tiff":
+            _check_pages(file, spec)
+    finally:
+        file.close()
+    return spec, np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)
+
+
+def _check_size(spec: Any) -> None:
+    if min(spec.width, spec.height) < 1 or spec.width * spec.height > MAX_PIXELS:
+        raise ImageError(
+            f"declares {spec.width}x{spec.height} pixels: expected at most "
+            f"{MAX_PIXELS / 1e6:.0f} million"
+        )
+    if spec.nchannels > 8 or spec.depth > 1 or spec.deep:
+        raise ImageError(f"has {spec.nchannels} channels: expected grey or RGB, with alpha or not")
+    if str(spec.format) not in ("uint8", "uint16", "half", "float"):
+        raise ImageError(f"holds numbers of type {spec.format}: export it with 8 or 16 bits")
+
+
+def _check_pages(file: Any, first: Any) -> None:
+    """Refuse a second page of the same size: a layer, which must not be lost in silence."""
+    size = first.width, first.height
+    for page in range(1, 64):
+        if not file.seek_subimage(page, 0):
+            file.geterror()
+            return
+        other = file.spec()
+        is_small = other.get_int_attribute("tiff:subfiletype", 0) & 1
+        if (other.width, other.height) == size and not is_small:
+            raise ImageError("has several pages or layers: flatten it and export it again")
+
+
+def _check_tiff(spec: Any) -> None:
+    colours = spec.get_int_attribute("tiff:PhotometricInterpretation", 2)
+    if colours not in TIFF_COLOURS:
+        named = TIFF_OTHERS.get(colours, f"colours of kind {colours}")
+        raise ImageError(f"holds {named}: convert it to RGB and export it again")
+    if (TIFF_COLOURS[colours] == "grey") != (spec.channelnames[0] == "Y"):
+        raise ImageError(f"is damaged: {spec.nchannels} channels of {TIFF_COLOURS[colours]}")
+
+
+def _rgb(spec: Any, pixels: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    if spec.channelnames[0] == "R" and spec.nchannels >= 3:
+        return np.ascontiguousarray(pixels[..., :3])
+    return np.repeat(pixels[..., :1], 3, axis=-1)
+
+
+def _alpha(spec: Any, pixels: npt.NDArray[Any]) -> npt.NDArray[Any] | None:
+    if spec.alpha_channel < 0:
+        return None
+    alpha = pixels[..., spec.alpha_channel]
+    opaque = 1 if np.issubdtype(alpha.dtype, np.floating) else _largest(alpha.dtype)
+    return None if (alpha == opaque).all() else alpha.copy()
+
+
+def _largest(dtype: np.dtype[Any]) -> int:
+    return int(np.iinfo(dtype).max)
+
+
+def _upright(pixels: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
+    """Turned and mirrored as EXIF's Orientation says."""
+    if orientation in (5, 6, 7, 8):
+        pixels = pixels.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    return pixels

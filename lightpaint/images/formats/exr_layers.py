@@ -1,0 +1,213 @@
+"""The colour layers of an EXR file, whatever they are made of, as linear Rec.709."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.primaries import (
+    REC709,
+    SPACES,
+    converted,
+    is_rec709,
+    primaries_in,
+    rgb_to_xyz,
+    to_rec709,
+)
+from lightpaint.errors import ImageError
+from lightpaint.images.formats.exr import Part
+from lightpaint.screen import some_names
+
+#: Attribute by which Krita keeps its layers apart in an EXR, which has then no merged picture.
+KRITA_LAYERS = "krita_layers_info"
+
+#: What programs call the channels of a colour, and alpha, in any case.
+RGB_NAMES = (("r", "g", "b"), ("red", "green", "blue"))
+ALPHA_NAMES = ("a", "alpha")
+
+#: Text attribute in which Blender and others name the colour space, and what says nothing.
+COLOR_SPACE = "colorInteropID"
+UNSAID = ("", "data", "unknown")
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A colour image in a part: its channels are those with this prefix.
+
+    name: what a person calls it by; "" if it is the only one in its file without a name.
+    """
+
+    name: str
+    part: Part
+    prefix: str
+
+    def rgb(self) -> Floats:
+        """(h, w, 3) float32, linear Rec.709, a copy. See `linear_rgb`."""
+        return linear_rgb(self.part, self.prefix)
+
+    def channel(self, *names: str) -> npt.NDArray[np.float32] | None:
+        """The first of these channels that the layer has, (h, w) float32."""
+        name = channel_named(self.part.channels, self.prefix, *names)
+        return None if name is None else self.part.channels[name].astype(np.float32, copy=False)
+
+
+def colour_channels(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
+    """Layer (prefix) → its channels of red, green and blue, of layers that have all three."""
+    found = {}
+    for layer, here in _by_layer(names).items():
+        for r, g, b in RGB_NAMES:
+            if layer not in found and r in here and g in here and b in here:
+                found[layer] = (here[r], here[g], here[b])
+    return found
+
+
+def channel_named(names: Iterable[str], layer: str, *lasts: str) -> str | None:
+    """The channel of `layer`, a prefix, whose name ends in the first of `lasts` that there is."""
+    here = _by_layer(names).get(layer, {})
+    return next((here[x] for x in map(str.casefold, lasts) if x in here), None)
+
+
+def _by_layer(names: Iterable[str]) -> dict[str, dict[str, str]]:
+    """Layer → last part of a name, in lower case → the channel, the first if there are two."""
+    layers: dict[str, dict[str, str]] = {}
+    for name in names:
+        layer, _, last = name.rpartition(".")
+        layers.setdefault(layer, {}).setdefault(last.casefold(), name)
+    return layers
+
+
+def linear_rgb(part: Part, layer: str = "") -> Floats:
+    """The colour of `layer`, a prefix of channels in `part`, as (h, w, 3) float32 Rec.709.
+
+    Its channels are R, G, B; or Y, which is grey; or Y, RY and BY, luminance and chroma.
+    Other primaries that the header declares are converted. Raises ImageError, listing what
+    is there, if it has none of these, or if its colours are of a space that is not known.
+    """
+    primaries = primaries_of(part)
+    if (names := colour_channels(part.channels).get(layer)) is not None:
+        image = np.empty((*part.size, 3), np.float32)
+        for k, name in enumerate(names):
+            image[..., k] = part.channels[name]
+        return _in_rec709(image, primaries)
+    luminance = part.channels.get(_joined(layer, "Y"))
+    if luminance is None:
+        raise ImageError(
+            f"no channel {', '.join(_joined(layer, c) for c in 'RGB')} or {_joined(layer, 'Y')} "
+            f"in part {part.name!r}, which has {some_names(part.channels)}"
+        )
+    luminance = luminance.astype(np.float32, copy=False)
+    chroma = [part.channels.get(_joined(layer, name)) for name in ("RY", "BY")]
+    if chroma[0] is None or chroma[1] is None:
+        # A grey has the colour of white, and white is adapted.
+        return np.repeat(luminance[..., None], 3, axis=-1)
+    image = _from_chroma(luminance, chroma[0], chroma[1], primaries or REC709)
+    return _in_rec709(image, primaries)
+
+
+def colour_layers(parts: Sequence[Part]) -> list[Layer]:
+    """Every layer of a file that holds a colour, in the file's order, the unnamed one first."""
+    layers = []
+    for part in parts:
+        prefixes = dict.fromkeys(name.rpartition(".")[0] for name in part.channels)
+        for prefix in sorted(filter(lambda p: _is_colour(part, p), prefixes), key=bool):
+            layers.append(Layer(_layer_name(part, prefix, several=len(parts) > 1), part, prefix))
+    return layers
+
+
+def choose_layer(parts: Sequence[Part], wanted: str | None = None) -> Layer:
+    """The layer called `wanted`: its name, that of its part or view, or its prefix.
+
+    Without one, the only layer, or the only one without a prefix, unless Krita wrote it: there
+    it is the background alone. Raises ImageError, listing the layers, where there is none or more
+    than one.
+    """
+    layers = colour_layers(parts)
+    if not layers:
+        channels = dict.fromkeys(name for part in parts for name in part.channels)
+        raise ImageError(
+            f"is not an RGB image: no channels R, G, B or Y; it has {some_names(channels)}"
+        )
+    if wanted is None:
+        if len(layers) > 1 and any(KRITA_LAYERS in part.attributes for part in parts):
+            raise ImageError(
+                f"has {len(layers)} layers of Krita ({_names(layers)}) and no merged picture: "
+                "flatten the image and export it again, or name the painted one with layer=..."
+            )
+        plain = [layer for layer in layers if not layer.prefix] or layers
+        if len(plain) > 1:
+            raise ImageError(
+                f"has {len(plain)} layers ({_names(plain)}), and which of them is meant cannot be "
+                "told: name it with layer=..., or export a single image"
+            )
+        return plain[0]
+    for named in (
+        [layer for layer in layers if layer.name == wanted],
+        [layer for layer in layers if wanted in _views(layer)],
+        [layer for layer in layers if layer.prefix == wanted],
+    ):
+        if len(named) == 1:
+            return named[0]
+    raise ImageError(f"has no layer {wanted!r}: it has {_names(layers)}")
+
+
+def _names(layers: Sequence[Layer]) -> str:
+    return some_names(layer.name or "one without a name" for layer in layers)
+
+
+def _layer_name(part: Part, prefix: str, *, several: bool) -> str:
+    if not several or prefix == part.name or prefix.startswith(f"{part.name}."):
+        return prefix
+    return _joined(part.name, prefix) if prefix else part.name
+
+
+def _views(layer: Layer) -> list[str]:
+    """Names of the view that the layer is: the part's, or the first of several in one part."""
+    if layer.prefix:
+        return []
+    return [v for v in (layer.part.attributes.get("view"), *layer.part.views[:1]) if v]
+
+
+def _is_colour(part: Part, prefix: str) -> bool:
+    if _joined(prefix, "Y") in part.channels:
+        # Beside X it is no luminance but a direction or a place.
+        return _joined(prefix, "X") not in part.channels
+    return prefix in colour_channels(part.channels)
+
+
+def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: tuple[float, ...]) -> Floats:
+    """RGB of luminance and RY = (R − Y)/Y, BY = (B − Y)/Y, as OpenEXR defines them."""
+    red, green, blue = rgb_to_xyz(primaries)[1]
+    image = np.empty((*y.shape, 3), np.float32)
+    with np.errstate(invalid="ignore", over="ignore"):
+        image[..., 0] = (ry + 1) * y
+        image[..., 2] = (by + 1) * y
+        image[..., 1] = (y - red * image[..., 0] - blue * image[..., 2]) / green
+    return image
+
+
+def _in_rec709(image: Floats, primaries: tuple[float, ...] | None) -> Floats:
+    return image if primaries is None else converted(image, to_rec709(primaries))
+
+
+def primaries_of(part: Part) -> tuple[float, ...] | None:
+    """Those that a part of an EXR declares, by numbers or by name; None for Rec.709's.
+
+    Raises ImageError, without naming the file, for colours of a name that is not known as linear.
+    """
+    if part.primaries is not None:
+        return None if is_rec709(part.primaries) else part.primaries
+    space = part.attributes.get(COLOR_SPACE, "")
+    if space in UNSAID or space.startswith(("lin_rec709", "lin_srgb")):
+        return None
+    if space not in SPACES:
+        raise ImageError(
+            f"is in the colour space {space!r}, but linear Rec.709 is expected: convert it and "
+            "export it again"
+        )
+    return primaries_in(SPACES[space])
+
+
+def _joined(layer: str, name: str) -> str:
+    return f"{layer}.{name}" if layer else name

@@ -1,0 +1,172 @@
+"""PNG files: of 8 bits to look at, of 16 to paint on and read back, and what one says of itself."""
+
+import io
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour.display.srgb import encode_display, to_8_bit
+from lightpaint.colour.icc import Profile, gamma_profile, srgb_profile
+from lightpaint.colour.primaries import is_rec709, primaries_in
+from lightpaint.errors import ImageError, OutputError
+from lightpaint.files import replacing, write_bytes
+from lightpaint.keywords import keywords
+
+#: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
+MAX_CHUNK = 2**24
+
+#: Bytes of a PNG that say its size.
+PNG_HEAD = 26
+
+#: Bytes of a PNG in which its texts stand.
+MAX_TEXTS = 2**12
+
+#: Effort of compression: renders come out no larger than at 6, the usual, in a third of the time.
+EFFORT = 3
+
+#: Text in a PNG that names the view transform it was shown through.
+TRANSFORM_KEY = "lightpaint.view"
+
+
+def write_png_16(
+    path: Path, image_display: Floats, *, texts: Mapping[str, str] | None = None
+) -> None:
+    """Write display values in [0, 1], (h, w) or (h, w, 3), as a 16-bit PNG, whole or not at all.
+
+    texts: Latin-1, kept in the file.
+    """
+    import OpenImageIO
+
+    values = np.round(image_display * 65535).astype(np.uint16)
+    height, width = values.shape[:2]
+    spec = OpenImageIO.ImageSpec(width, height, 1 if values.ndim == 2 else 3, "uint16")
+    for key, text in (texts or {}).items():
+        spec.attribute(key, text)
+    with replacing(path) as beside:
+        output = OpenImageIO.ImageOutput.create("png")
+        assert output is not None  # which formats there are is decided when it is built
+        done = output.open(str(beside), spec) and output.write_image(np.ascontiguousarray(values))
+        if not (output.close() and done):
+            raise OutputError(f"cannot write {path}: {output.geterror() or 'no reason given'}")
+
+
+def png_bytes(image_8_bit: npt.NDArray[Any], texts: Mapping[str, str] | None = None) -> bytes:
+    """An (h, w, 3) or (h, w, 4) uint8 image as a PNG file, with these Latin-1 texts in it."""
+    said = PngInfo()
+    for key, text in (texts or {}).items():
+        said.add_text(key, text)
+    buffer = io.BytesIO()
+    Image.fromarray(image_8_bit).save(buffer, "PNG", pnginfo=said, compress_level=EFFORT)
+    return buffer.getvalue()
+
+
+def png_says(path: Path, key: str) -> bool:
+    """Whether the file at `path` is a PNG that `png_bytes` wrote with a text of that key."""
+    with path.open("rb") as file:
+        head = file.read(MAX_TEXTS)
+    return head.startswith(b"\x89PNG") and b"tEXt" + key.encode() + b"\0" in head
+
+
+@keywords()
+def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1) -> Image.Image:
+    """A linear image as a picture that a notebook shows.
+
+    Args:
+        image: (h, w, 3) linear.
+        stops: Exposure, chosen if not given.
+        zoom: Side of a pixel of `image` in the picture.
+
+    Examples:
+        >>> lp.display_picture(target.image, zoom=8).size
+        (128, 128)
+    """
+    exposure = choose_exposure(image) if stops is None else stops
+    pixels = to_8_bit(encode_display(image, stops=exposure))
+    return Image.fromarray(np.kron(pixels, np.ones((zoom, zoom, 1), np.uint8)))
+
+
+def write_png(
+    path: Path, image: Floats, *, stops: float = 0.0, texts: Mapping[str, str] | None = None
+) -> None:
+    """Write a linear image display-encoded as 8-bit sRGB PNG, whole or not at all."""
+    write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops)), texts))
+
+
+def longest_png(head: bytes) -> int:
+    """Return the most bytes that a PNG which begins like `head` has any use for.
+
+    That is what its pixels take without compression, and room for profiles, texts and a thumbnail.
+    Raises ImageError, without naming the file, for what does not begin like one.
+    """
+    if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
+        raise ImageError("is damaged: it does not begin like a PNG")
+    width, height, bits, colour = struct.unpack_from(">IIBB", head, 16)
+    channels = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(colour, 4)
+    # Adam7 has seven pictures, each with a byte for each of its rows.
+    row = -(-width * channels * bits // 8) + 1
+    return int(2 * MAX_CHUNK + 8 * height + row * height * 1001 // 1000)
+
+
+def read_png_head(path: Path) -> tuple[str | None, Profile | None]:
+    """What the small chunks of a PNG say: the transform it was made with, and its colours.
+
+    The order is the standard's: cICP, iCCP, sRGB, then gAMA and cHRM.
+    """
+    chunks = dict(_chunks(path))
+    text = chunks.get(b"tEXt", b"")
+    shown = text.partition(b"\0")[2].decode("latin-1") or None
+    if b"cICP" in chunks:
+        return shown, _of_cicp(chunks[b"cICP"])
+    gamma, colours = chunks.get(b"gAMA", b""), chunks.get(b"cHRM", b"")
+    if chunks.keys() & {b"iCCP", b"sRGB"} or len(gamma) != 4:
+        return shown, None
+    primaries = None
+    if len(colours) == 32:
+        wx, wy, *rgb = (v / 1e5 for v in struct.unpack(">8I", colours))
+        primaries = (*rgb, wx, wy)
+    encoding = int.from_bytes(gamma, "big") / 1e5
+    if not encoding or (abs(encoding - 1 / 2.2) < 1e-3 and is_rec709(primaries)):
+        return shown, None  # how sRGB is written in these chunks
+    try:
+        return shown, gamma_profile(1 / encoding, primaries)
+    except ValueError as error:
+        raise ImageError(f"declares colours that make no sense: {error}") from error
+
+
+def _chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
+    """Type and content of the chunks before the pixels, of which only ours of the texts.
+
+    Raises ImageError where a checksum is wrong: the library would do without that chunk.
+    """
+    with path.open("rb") as file:
+        file.seek(8)
+        while len(head := file.read(8)) == 8 and head[4:] not in (b"IDAT", b"IEND"):
+            length = int.from_bytes(head[:4], "big")
+            if length > MAX_CHUNK:
+                raise ImageError("is damaged: a part of its head is too long")
+            content, checksum = file.read(length), file.read(4)
+            if zlib.crc32(content, zlib.crc32(head[4:])) != int.from_bytes(checksum, "big"):
+                raise ImageError("is damaged: a checksum is wrong")
+            if head[4:] != b"tEXt" or content.startswith(TRANSFORM_KEY.encode() + b"\0"):
+                yield head[4:], content
+
+
+def _of_cicp(content: bytes) -> Profile | None:
+    """Coding-independent code points (ITU-T H.273): sRGB and Display P3."""
+    srgb, display_p3 = b"\x01\x0d", b"\x0c\x0d"
+    if content[:2] == srgb:
+        return None
+    if content[:2] == display_p3:
+        return srgb_profile("Display P3", primaries_in("Display P3"))
+    raise ImageError(
+        f"declares the colours {content[:2].hex(' ')} (cICP): export it as sRGB or Display P3"
+    )

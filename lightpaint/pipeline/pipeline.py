@@ -1,0 +1,288 @@
+"""The corridor: obtain bases → solve → improve → analyse → relight → predict, verify, report."""
+
+import math
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache_folder import folder
+from lightpaint.basis.clean import MOST, clean_planes
+from lightpaint.basis.render.obtain import Render, obtain_basis
+from lightpaint.basis.render.render import render_basis, samples_for
+from lightpaint.images.estimate import write_estimate
+from lightpaint.keywords import keywords
+from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_findings
+from lightpaint.lighting.analysis.uncertainty import correct_noise
+from lightpaint.lighting.file import write_lighting
+from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
+from lightpaint.pipeline.job import Job, PaintedView
+from lightpaint.pipeline.results import Look, write_predicted, write_report
+from lightpaint.pipeline.settings import Settings
+from lightpaint.placement.suggest import suggest_lights
+from lightpaint.progress import Listener, Progress, labelled, listener, silent
+from lightpaint.relit.budget import Budget, verification_budget
+from lightpaint.relit.export.exports import write_exports
+from lightpaint.relit.power import with_power
+from lightpaint.relit.relight import relight, settle
+from lightpaint.relit.rounds import refine_by_rendering
+from lightpaint.relit.verify import verify
+from lightpaint.report.basis_memo import ahead
+from lightpaint.report.page.page import prepare_page
+from lightpaint.scene.presets import samples
+from lightpaint.scene.scene import Scene, load_scene
+
+
+@keywords()
+def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = None) -> list[Look]:
+    """Do `job`: find its lighting, prove it, and write results to its folder.
+
+    Args:
+        job: What is asked.
+        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
+        bases: Of the views on their films, where an earlier run has obtained them; the list is
+            emptied, so that no pixel is held twice.
+
+    Returns:
+        A look for each view.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> job = lp.Job((), (lp.Painting("painting.exr"),), Path("evening"), basis)
+        >>> [look] = lp.run(job)
+        >>> np.round(look.lighting.emission["panel"], 3).tolist()
+        [2.0, 1.5, 1.0]
+    """
+    listen = listener(progress)
+    job.results.check()
+    for remark in job.remarks:
+        listen.say(remark)
+    problem = Problem.of(
+        _obtained(job, bases, listen),
+        [view.target for view in job.views],
+        constraints=job.asked,
+        fit=job.fit,
+    )
+    if job.settings.report:
+        for basis in problem.views.bases:
+            ahead(basis, prepare_page)
+    solution = _improved(job, solution_of(problem), listen)
+    analyses = analyse(solution)
+    with job.results.filled() as folder:
+        lighting = with_findings(solution, analyses).lighting
+        write_lighting(folder / "lighting.json", lighting)
+        if job.groups is not None:
+            write_exports(folder, job.groups, lighting)
+        relit = None
+        if (scene := job.views[0].scene) is not None:
+            relit = relight(scene, lighting, folder / "relit.xml")
+        looks = [
+            _finished(job, folder, view, analysis, relit, _hearing(job, view, listen))
+            for view, analysis in zip(job.views, analyses, strict=True)
+        ]
+        other = scene and settle(scene, lighting, folder / "relit.xml", job.folder / "relit.xml")
+    return [_loaded_anew(look) for look in looks] if other else looks
+
+
+def obtain(
+    scene: Scene,
+    settings: Settings,
+    progress: Progress,
+    *,
+    views: int = 1,
+    render: Render = render_basis,
+) -> Basis:
+    """The basis of `scene` on its film, kept or rendered.
+
+    views: that share the time there is. render: who renders what is missing.
+    """
+    listen = listener(progress)
+    is_rendered = is_all_rendered = False
+
+    def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+        nonlocal is_rendered, is_all_rendered
+        is_all_rendered |= not is_rendered and done == 0
+        is_rendered = True
+        listen(label, done, total, unit)
+
+    asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+    began_s = time.perf_counter()
+    basis = obtain_basis(
+        scene,
+        spp=asked,
+        time_s=None if settings.time_s is None else settings.time_s / views,
+        seed=settings.seed,
+        use_cache=settings.use_cache,
+        exact_spp=settings.exact_spp,
+        progress=report,
+        render=render,
+    )
+    if is_all_rendered:
+        basis = replace(basis, render_s=time.perf_counter() - began_s)
+    if settings.use_cache and not cache.is_kept(basis):
+        listen.say(
+            f"the basis could not be kept in {folder()}, so the next run renders it again: "
+            "is the disk full, or the folder not yours?"
+        )
+    elif settings.use_cache and is_rendered:
+        clean_planes(basis, most=MOST, progress=lambda k, n: listen("denoising", k, n, "planes"))
+    has = f"basis of {basis.origin.spp} samples per pixel"
+    wanted = scene.spp if asked is None else asked
+    if not is_rendered and basis.origin.spp > samples_for(scene, asked):
+        listen.say(
+            f"{has} kept from an earlier run: more than the {wanted} asked for, so the answer may "
+            "differ a little from one of these (exact_spp=True takes just them)"
+        )
+    elif not is_rendered:
+        listen.say(f"{has} kept from an earlier run (use_cache=False renders it anew)")
+    elif settings.time_s is None and basis.origin.spp > wanted + 1:
+        listen.say(f"{has}, not {wanted}: it takes one in each pixel of a block for each half")
+    origin, (height, width) = basis.origin, basis.size
+    how = "rendered" if is_rendered else "taken from the cache"
+    listen.note(
+        f"basis {how}: {len(basis.lights)} lights, {width}x{height} pixels, {origin.spp} samples "
+        f"per pixel, seed {origin.seed}, {origin.method}"
+    )
+    return basis
+
+
+def _obtained(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:
+    """The basis of each view: handed in, given with the job, kept, or rendered."""
+    if bases is None:
+        made = [_basis_of(job, view, listen) for view in job.views]
+    else:
+        made = list(bases)
+        bases.clear()
+    # What the scene's lights file asks by now, whenever they were made.
+    return [
+        basis if view.scene is None else basis.asking(view.scene.asked)
+        for basis, view in zip(made, job.views, strict=True)
+    ]
+
+
+def _basis_of(job: Job, view: PaintedView, listen: Listener) -> Basis:
+    if view.basis is not None:
+        return view.basis
+    assert view.scene is not None
+    return obtain(view.scene, job.settings, _hearing(job, view, listen), views=len(job.views))
+
+
+def _hearing(job: Job, view: PaintedView, listen: Listener) -> Listener:
+    """`listen`, told of which view, where there are several."""
+    return listen if len(job.views) == 1 else labelled(listen, view.folder.name)
+
+
+def _improved(job: Job, solution: Solution, listen: Listener) -> Solution:
+    """What can be done against noise is done."""
+    settings, found = job.settings, solution.certificate
+    listen.note(
+        f"solved in {max(found.sweeps)} sweeps, to a KKT residual of {max(found.kkt_residual):.1e}"
+    )
+    if settings.corrects_noise(is_known=solution.basis.knows_noise):
+        solution = correct_noise(solution)
+    pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
+    scenes = [(scene, basis) for scene, basis in pairs if scene is not None]
+    solution = refine_by_rendering(
+        scenes, solution, rounds=settings.refine, seed=settings.seed, progress=listen
+    )
+    lighting = replace(solution.lighting, cd_per_unit=settings.cd_per_unit)
+    return replace(solution, lighting=lighting)
+
+
+def _loaded_anew(look: Look) -> Look:
+    """`look` with its relit scene as it is written by now."""
+    assert look.relit is not None
+    path, sensor = look.relit.path, look.relit.sensor
+    return replace(look, relit=_through(look.relit, path, sensor))
+
+
+def _through(relit: Scene, path: Path, sensor: int) -> Scene:
+    """Load a relit scene anew from `path`, with the parameters that it has."""
+    return load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)
+
+
+def _finished(
+    job: Job,
+    folder: Path,
+    view: PaintedView,
+    analysis: Analysis,
+    relit: Scene | None,
+    listen: Listener,
+) -> Look:
+    """A view predicted, verified and shown. folder: what takes the place of the job's when done."""
+    settings, scene, solution = job.settings, view.scene, analysis.solution
+    listen.note("analysed, and the lighting written")
+    basis = solution.basis
+    place = folder / view.folder.relative_to(job.folder)
+    place.mkdir(exist_ok=True)
+    predicted = combine(basis, solution.lighting)
+    verification, suggestions, budget = None, None, None
+    if relit is not None and scene is not None:
+        if relit.sensor != scene.sensor:
+            relit = _through(relit, relit.path, scene.sensor)
+        budget = _budget(settings, basis, relit)
+        if relit.parameters and view is job.views[0]:
+            given = " ".join(f"-D{name}={value}" for name, value in relit.parameters.items())
+            listen.say(f"relit.xml keeps the scene's own defaults: give Mitsuba {given} with it")
+    spp, size = basis.origin.spp, basis.size
+    if budget is not None:
+        spp, size = budget.spp, budget.scene.size
+    write_predicted(
+        place / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size, scene=relit
+    )
+    if budget is not None and settings.verify:
+        listen.say(_spoken(budget, basis))
+        verification = verify(
+            predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen
+        )
+        verification = with_power(verification, predicted, basis, solution.lighting)
+        write_estimate(place / "verified.exr", verification.verified, {})
+        listen.note(f"verified with {budget.spp} samples per pixel")
+    if settings.suggest and scene is not None:
+        suggestions = suggest_lights(
+            scene, basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
+        )
+        listen.note("lights suggested")
+    look = Look(
+        target=view.target,
+        basis=basis,
+        solution=solution,
+        predicted=predicted,
+        relit=None if relit is None else relit.moved(folder, job.folder),
+        verification=verification,
+        analysis=analysis,
+        suggestions=suggestions,
+    )
+    write_report(place, look, command=settings.command, is_shown=settings.report)
+    listen.note("report written")
+    for remark in look.remarks:
+        listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
+    return look
+
+
+def _budget(settings: Settings, basis: Basis, relit: Scene) -> Budget:
+    """Return what the verification of `relit`, on its whole film, may cost."""
+    most = None if settings.checks_as_basis else settings.spp or relit.spp
+    spp = basis.origin.spp
+    if settings.time_s is None:
+        # A basis that was kept may have many times the samples that are asked for.
+        spp = min(spp, samples(settings.quality, spp=settings.spp, time_s=None) or relit.spp)
+    return verification_budget(relit, basis.size, spp, most_spp=most, asked_spp=settings.verify_spp)
+
+
+def _spoken(budget: Budget, basis: Basis) -> str:
+    """Return how long a verification takes, said before it starts."""
+    height, width = budget.scene.size
+    its = f"verification of {budget.spp} samples per pixel on {width}x{height}"
+    how = "(verify=False skips it)"
+    if basis.render_s is not None:
+        seconds = math.ceil(budget.share * basis.render_s)
+        long = f"{seconds} s" if seconds < 120 else f"{math.ceil(seconds / 60)} min"
+        return f"{its}: at most {long} {how}"
+    if budget.share <= 1:
+        return f"{its}: no longer than that many samples of the basis took {how}"
+    return f"{its}: at most {budget.share:.2g} times as long as the basis took {how}"

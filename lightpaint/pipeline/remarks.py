@@ -1,0 +1,111 @@
+"""What is worth saying to a person before a job is run, in plain text."""
+
+from lightpaint.basis.render.integrators import remark_on_separate_renders
+from lightpaint.basis.render.render import memory_needed
+from lightpaint.images.denoiser import LACKING, is_there
+from lightpaint.images.pixel_blocks import left_over, whole_factor
+from lightpaint.pipeline.settings import Settings
+from lightpaint.scene.presets import PRESETS
+from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
+from lightpaint.target.target import Target
+
+#: Bytes of memory from which on a basis is worth a word.
+MUCH_MEMORY = 2e9
+
+
+def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
+    """What is worth knowing of its lights and, where it is to be rendered, of how that is done."""
+    remarks = []
+    if scene.lights_file is not None:
+        remarks.append(f"lights and groups as in {scene.lights_file}")
+    remarks += [
+        f"{len(x.members)} alike lamps without names are one light, {x.name}: group_alike=False "
+        "parts them all, groups={'name': ...} makes a light of some"
+        for x in scene.lights
+        if x.is_found
+    ]
+    if scene.instead is not None:
+        remarks.append(f"rendered by {scene.instead}, not by the scene's own integrator")
+    if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
+        remarks.append(f"left as it is: {some_names(obstacles, '; ')}")
+    # Python gets the same as a warning.
+    note = use_variant().note
+    if not note and is_rendered:
+        note = remark_on_separate_renders(scene) or ""
+    return [*remarks, note] if note else remarks
+
+
+def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
+    """What of the picture a reduced film leaves out, and whether it is as small as was asked for.
+
+    scene: on that film.
+    """
+    film, remarks = scene.film, []
+    width, height = film.pixels
+    if any(film.left_out):
+        whole = "x".join(map(str, film.crop_size))
+        remarks.append(
+            f"film of {whole} reduced to {width}x{height} blocks of {film.block}x{film.block} "
+            f"pixels: {_spoken_rest(film.left_out)} left over, and nowhere counted"
+        )
+    few = None
+    if settings.quality is not None and settings.resolution is None:
+        few = PRESETS[settings.quality].pixels
+    if few is not None and width * height > few:
+        remarks.append(
+            f'the film cannot be made as small as quality="{settings.quality}" would have it: '
+            f"{width}x{height} pixels are rendered"
+        )
+    return remarks
+
+
+def _spoken_rest(rest: tuple[int, int]) -> str:
+    """`3 columns at the right and 1 row at the bottom are`. rest: how many of both."""
+    columns, rows = rest
+    parts = [f"{columns} column{'s' * (columns > 1)} of pixels at the right"] * bool(columns)
+    parts += [f"{rows} row{'s' * (rows > 1)} at the bottom"] * bool(rows)
+    return f"{' and '.join(parts)} {'is' if columns + rows == 1 else 'are'}"
+
+
+def remarks_of_pictures() -> list[str]:
+    """Says so where pictures are denoised less well than they could be."""
+    return [] if is_there() else [LACKING]
+
+
+def remarks_of_memory(scene: Scene) -> list[str]:
+    """Says so where the basis of `scene` takes much memory."""
+    if (needed := memory_needed(scene)) <= MUCH_MEMORY:
+        return []
+    return [
+        f"{len(scene.lights)} lights of {scene.size[1]}x{scene.size[0]} pixels: "
+        f"{needed / 1e9:.1f} GB of memory at most"
+    ]
+
+
+def remarks_of_target(
+    target: Target, size: tuple[int, int], scene: Scene | None, fit: Settings
+) -> list[str]:
+    """How `target` was read. size: of the basis that it is solved on. fit: with all decided."""
+    remarks = []
+    if scene is not None and target.content not in ("", scene.content):
+        remarks.append("the scene has changed since its template was made")
+    (height, width), (mine_h, mine_w) = size, target.size
+    is_asked_for = fit.resize or fit.resolution or fit.quality
+    if size != target.size and not is_asked_for:
+        rest = left_over(target.size, whole_factor(target.size, size) or 1)
+        remark = f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}"
+        if any(rest):
+            remark += f": {_spoken_rest((rest[1], rest[0]))} left over, and nowhere counted"
+        remarks.append(remark)
+    name = "srgb" if target.transform is None else target.transform.name
+    if fit.space == "linear" and name not in ("srgb", "linear"):
+        remarks.append(
+            f"painted through {name}, whose highlights stand for very much light and rule the "
+            'fit: space="display" fits what the eye sees'
+        )
+    remarks += target.notes
+    if target.not_finite:
+        remarks.append(f"{target.not_finite} pixels hold NaN or Inf and count nothing")
+    return [f"{target.name}: {remark}" for remark in remarks]

@@ -1,0 +1,308 @@
+"""What a solve leaves in its folder, and what is read back from there."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.errors import ImageError, OutputError, SceneError
+from lightpaint.files import is_name, one_line, write_bytes, write_text
+from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
+from lightpaint.images.formats.png import png_bytes
+from lightpaint.images.pixel_blocks import Size, whole_factor
+from lightpaint.keywords import keywords
+from lightpaint.lighting.analysis.analyse import Analysis
+from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.solution import Solution
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.progress import Progress, silent
+from lightpaint.relit.export.exports import EXPORTS
+from lightpaint.relit.verification import Verification
+from lightpaint.relit.verify import verify
+from lightpaint.report.answer_pictures import residual_of, transform_of
+from lightpaint.report.clean_pictures import Looks
+from lightpaint.report.comparison import comparison_image
+from lightpaint.report.page.notebook_html import look_html
+from lightpaint.report.page.page import report_page
+from lightpaint.report.report_json import report_numbers
+from lightpaint.report.verdict import verdict
+from lightpaint.report.visible_emitters import emitters_in_view
+from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene_render import Stream
+from lightpaint.scene.surfaces import render_features
+from lightpaint.screen import some_names
+from lightpaint.storage.json_records import read_record, strict_json
+from lightpaint.storage.staging import finish
+from lightpaint.target.target import Target
+from lightpaint.threads import side_by_side
+
+#: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
+VIEW_KEY = "lightpaint.view"
+
+#: What every solve writes.
+ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html", "report.json")
+
+#: What each view has where there are several.
+VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html", "report.json")
+
+#: What a solve and a relight write, and the next solve replaces.
+RESULTS = (
+    "lighting.json",
+    "predicted.exr",
+    "verified.exr",
+    "comparison.png",
+    "report.html",
+    "report.json",
+    "relit.xml",
+    "relit.png",
+    "relit.exr",
+    "relit.*.exr",
+    *EXPORTS,
+)
+
+
+@keywords()
+@dataclass(frozen=True)
+class Look:
+    """One painting and its answer.
+
+    Attributes:
+        target: What was wanted, at the size of the basis.
+        basis: What it was solved with.
+        solution: The answer, with its errors and what holds its lights.
+        predicted: Σ w_i Φ_i, what it will look like.
+        relit: The scene as it was relit; None where there was only a saved basis.
+        verification: Prediction against a render; None without a scene.
+        analysis: How sure the lights are, and why the painting is not met.
+        suggestions: Lights that would help most, None if they were not asked for.
+
+    Examples:
+        >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
+        >>> look.lighting.emission["panel"] == look.solution.lighting.emission["panel"]
+        True
+    """
+
+    target: Target
+    basis: Basis
+    solution: Solution
+    predicted: Estimate
+    relit: Scene | None
+    verification: Verification | None
+    analysis: Analysis
+    suggestions: tuple[Suggestion, ...] | None = None
+
+    def __repr__(self) -> str:
+        return f"Look(of {self.target.name}: {self.verdict})"
+
+    def _repr_html_(self) -> str:
+        return look_html(
+            self.target, self.solution, self.predicted, self.verification, seen=self.analysis.seen
+        )
+
+    @property
+    def verdict(self) -> str:
+        """How near the lights come to what was painted, in sentences."""
+        return verdict(self.solution, self.predicted, self.verification, seen=self.analysis.seen)
+
+    @property
+    def uncertainty(self) -> Uncertainty | None:
+        """How sure the lights are; None where nothing is known of the noise."""
+        return self.analysis.uncertainty
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """Why the painting is not met."""
+        return self.analysis.diagnosis
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a person should know of emitters in view: painted pixels that do not count."""
+        return emitters_in_view(self.target, self.solution, self.predicted)
+
+    @property
+    def lighting(self) -> Lighting:
+        """The lighting that comes closest to the target."""
+        return self.solution.lighting
+
+
+def result_folders(folder: Path) -> list[Path]:
+    """`folder` itself, or where it holds several views the folders of these."""
+    finish(folder)
+    if (folder / "predicted.exr").is_file() or not (folder / "relit.xml").is_file():
+        return [folder]
+    return sorted(file.parent for file in folder.glob("*/predicted.exr")) or [folder]
+
+
+def view_names(scenes: Sequence[Scene]) -> list[str]:
+    """The sensor of each, after which its folder is called.
+
+    Raises SceneError for one that is there twice or names no folder.
+    """
+    names = [scene.sensor_names[scene.sensor] for scene in scenes]
+    if len(set(names)) < len(names):
+        raise SceneError(f"a view is painted twice: {some_names(names)}; give each sensor once")
+    for name in names:
+        if not is_name(name):
+            raise SceneError(
+                f"the sensor id {one_line(repr(name))} cannot name a folder: choose another id"
+            )
+    return names
+
+
+def write_predicted(
+    path: Path,
+    predicted: Estimate,
+    *,
+    origin: Origin,
+    spp: int,
+    size: Size | None = None,
+    scene: Scene | None = None,
+) -> None:
+    """Write predicted.exr, with a note of how to see the relit scene as the basis saw it.
+
+    origin: of the basis. spp, size: samples per pixel of the verification, and (height, width) of
+    its film, the whole one by default. scene: whose parameters the relit scene needs again.
+    """
+    film = {} if size is None else {"width": size[1], "height": size[0]}
+    given = {} if scene is None or not scene.parameters else {"parameters": scene.parameters}
+    seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film, **given}
+    write_estimate(path, predicted, {VIEW_KEY: json.dumps(seen)})
+
+
+def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = True) -> None:
+    """Write what people look at, denoised, and its numbers.
+
+    These are comparison.png and report.html, and report.json. is_shown: whether people look.
+    """
+    how = _reported(look, command)
+    if not is_shown:
+        write_text(folder / "report.json", report_numbers(**how))
+        return
+    verified = look.verification.verified.image if look.verification else None
+    larger = None
+    if look.relit is not None and verified is not None:
+        height, width = size = verified.shape[:2]
+        if size != look.basis.size:
+            is_whole = size == look.relit.size
+            film = look.relit if is_whole else look.relit.reduced(f"{width}x{height}")
+            larger = render_features(film)
+    weights, predicted = look.solution.weights, look.predicted.image
+    looks = Looks.clean(look.basis, weights, predicted, verified, larger=larger)
+    transform = transform_of(look.target, look.basis, predicted)
+    missed = residual_of(look.solution, predicted, transform=transform)
+
+    def comparison() -> None:
+        sheet = comparison_image(
+            basis=look.basis,
+            target=look.target,
+            solution=look.solution,
+            predicted=look.predicted.image,
+            verified=verified,
+            seen=look.analysis.seen,
+            looks=looks,
+            missed=missed,
+        )
+        write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
+
+    def page() -> None:
+        write_text(folder / "report.html", report_page(**how, looks=looks, missed=missed))
+
+    def numbers() -> None:
+        write_text(folder / "report.json", report_numbers(**how, missed=missed))
+
+    side_by_side(lambda write: write(), (page, comparison, numbers))
+
+
+def _reported(look: Look, command: str) -> dict[str, Any]:
+    """What page and numbers tell of."""
+    return {
+        "basis": look.basis,
+        "target": look.target,
+        "solution": look.solution,
+        "predicted": look.predicted,
+        "verification": look.verification,
+        "command": command,
+        "uncertainty": look.uncertainty,
+        "diagnosis": look.diagnosis,
+        "unconstrained": look.analysis.unconstrained,
+        "suggestions": look.suggestions,
+        "seen": look.analysis.seen,
+        "color_choices": look.analysis.color_choices,
+    }
+
+
+def verify_result(
+    folder: str | Path,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Verification:
+    """Render the relit.xml of a result folder anew and compare it with its predicted.exr.
+
+    spp: samples per pixel (those that predicted.exr was solved with by default).
+    Raises OutputError if `folder` holds no such result, ImageError if predicted.exr is damaged.
+    """
+    folder = Path(folder)
+    for one in (folder, folder.parent):
+        finish(one)
+    relit_xml = folder / "relit.xml"
+    if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
+        relit_xml = folder.parent / "relit.xml"  # one of several views
+    missing = [file.name for file in (folder / "predicted.exr", relit_xml) if not file.is_file()]
+    if missing:
+        raise OutputError(
+            f"{folder} is no result folder with a relit scene: it has no "
+            f"{' and no '.join(missing)}; give one that lightpaint solve made from a scene"
+        )
+    path = folder / "predicted.exr"
+    predicted, attributes = read_estimate(path)
+    seen = _read_view(path, attributes.get(VIEW_KEY, "{}"))
+    relit = load_scene(
+        relit_xml, sensor=seen.sensor, parameters=seen.parameters, use_lights_file=False
+    )
+    if seen.width is not None and seen.height is not None:
+        film = (seen.height, seen.width)
+        # A scene that was changed by hand has another film, which `verify` refuses by name.
+        if relit.size != film and whole_factor(relit.size, film) is not None:
+            relit = relit.reduced(f"{seen.width}x{seen.height}")
+    return verify(
+        predicted,
+        relit,
+        spp=seen.spp if spp is None else spp,
+        seed=seed,
+        stream=Stream.SECOND_VERIFICATION,
+        progress=progress,
+    )
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What stands under VIEW_KEY; None where nothing does.
+
+    spp: samples per pixel. width, height: of the verification; of the whole film if not there.
+    parameters: values of `$name` parameters that the scene was loaded with.
+    """
+
+    sensor: str | None = None
+    spp: int | None = None
+    width: int | None = None
+    height: int | None = None
+    parameters: Mapping[str, str] | None = None
+
+    def __post_init__(self) -> None:
+        if self.spp == 0:
+            raise ValueError("spp is a whole number > 0, not 0")
+
+
+def _read_view(path: Path, text: str) -> _Seen:
+    try:
+        return read_record(_Seen, strict_json(text), others=True)
+    except ValueError as error:
+        raise ImageError(
+            f"{path} is damaged in its attribute {VIEW_KEY}: {one_line(str(error))}; solve again"
+        ) from None

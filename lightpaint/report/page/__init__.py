@@ -1,0 +1,1 @@
+"""report.html and its sections, its mixer, and what notebooks show."""

@@ -1,0 +1,93 @@
+"""What each choice of `colors` would come to, in words and as a part of the report."""
+
+from html import escape
+
+import numpy as np
+
+from lightpaint.colour.color import cct_and_duv
+from lightpaint.colour.hue import spoken_hue
+from lightpaint.lighting.analysis.color_choices import Choices, ColorChoice
+from lightpaint.lighting.fit import Colors
+from lightpaint.report.page.html import row, table
+from lightpaint.screen import some_names
+
+#: What the lamps may do, in few words.
+MEANING: dict[Colors, str] = {
+    "free": "any colour",
+    "gentle": "their own colour, unless the painting clearly asks for another",
+    "white": "whites, from warm to cool",
+}
+
+#: Headings of the table.
+HEADS = ("lamps may have", "mean ΔE", "what would change")
+
+#: ΔE by which another choice must be closer to be told at once, and below which it is as close.
+NOTICED, SAME = 1.0, 0.1
+
+
+def spoken_choice(choice: ColorChoice, chosen: ColorChoice) -> str:
+    """`free: ΔE 2.1 instead of 2.6, but pendant turns green`."""
+    gains = chosen.delta_e - choice.delta_e
+    told = f"ΔE {choice.delta_e:.1f} instead of {chosen.delta_e:.1f}"
+    if abs(gains) < SAME:
+        told = f"as close (ΔE {choice.delta_e:.1f})"
+    turns = spoken_turn(choice)
+    joint = ", but " if gains >= SAME else ", and "
+    return f"{choice.colors}: {told}{joint + turns if turns else ''}"
+
+
+def spoken_turn(choice: ColorChoice) -> str:
+    """`pendant turns green`; "" where nobody would see a light change its hue."""
+    if not choice.light:
+        return ""
+    before, after = (np.array(x) for x in (choice.before, choice.color))
+    words = [spoken_hue(x) for x in (before, after)]
+    whites = [cct_and_duv(x) for x in (before, after)]
+    if words[0] != words[1]:
+        how = words[1]
+    elif words[0].endswith("white") and whites[0] and whites[1]:
+        how = "warmer" if whites[1][0] < whites[0][0] else "cooler"
+    else:
+        deeper = np.ptp(after) / after.max() > np.ptp(before) / before.max()
+        how = f"a {'deeper' if deeper else 'paler'} {words[1]}"
+    return f"{some_names([choice.light])} turns {how}"
+
+
+def closer_choice(choices: Choices) -> str:
+    """`free: ΔE 2.1 …`, where another choice comes notably closer; else ""."""
+    chosen = next((choice for choice in choices if choice.is_chosen), None)
+    best = min(choices, key=lambda choice: choice.delta_e, default=None)
+    if chosen is None or best is None or chosen.delta_e - best.delta_e < NOTICED:
+        return ""
+    return spoken_choice(best, chosen)
+
+
+def colors_section(choices: Choices) -> str:
+    """The choices beside the one that was made. Empty where there is none."""
+    chosen = next((choice for choice in choices if choice.is_chosen), None)
+    if chosen is None:
+        return ""
+    rows = [
+        row(
+            f"{choice.colors}{', as solved' if choice.is_chosen else ''}<br>"
+            f"<small>{MEANING[choice.colors]}</small>",
+            f"{choice.delta_e:.1f}",
+            escape(_change(choice, chosen)),
+        )
+        for choice in choices
+    ]
+    return (
+        "<section><h2>What colours cost</h2>"
+        "<p>How near the lights would come if they were freer, or less free, to change their "
+        "colour, with all else as it is. A quick look; <code>colors</code> says which to "
+        f"solve with.</p>{table(HEADS, rows, kind='choices')}</section>"
+    )
+
+
+def _change(choice: ColorChoice, chosen: ColorChoice) -> str:
+    """In a cell of the table."""
+    if choice is chosen:
+        return ""
+    gains = chosen.delta_e - choice.delta_e
+    near = "as close" if abs(gains) < SAME else "closer" if gains > 0 else "farther"
+    return "; ".join(filter(None, (near, spoken_turn(choice))))

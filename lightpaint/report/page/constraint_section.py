@@ -1,0 +1,110 @@
+"""The part of the report on what constraints cost the picture. Returns HTML."""
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.denoiser import denoised
+from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.lighting.solution import Solution
+from lightpaint.report.clean_pictures import Looks
+from lightpaint.report.measures import relative_residual
+from lightpaint.report.page.figures import Picture, figure
+from lightpaint.report.page.html import SHOWN, SPARE, row, share_cell, table
+from lightpaint.report.sentences import spoken_percent
+
+#: Width in pixels that the pictures are reduced to, by a whole factor: this to twice this.
+WIDTH = 320
+
+#: How many lights fewer and more than asked for have their picture.
+AROUND = 2
+
+
+def constraints_section(
+    basis: Basis,
+    solution: Solution,
+    free: Solution | None,
+    *,
+    transform: ViewTransform,
+    looks: Looks | None = None,
+) -> str:
+    """The best lighting without constraints, `free`, beside the one as asked, from the basis.
+
+    With `sparse`, what other numbers of lights would miss. Empty where there is none.
+    """
+    if free is None:
+        return ""
+    start = solution.weights
+    without, asked = (spoken_percent(relative_residual(x)) for x in (free, solution))
+    pictures = [
+        (free.weights, "Without constraints", f"{without} missed."),
+        (start, "As asked", f"{asked} missed."),
+    ]
+    return (
+        '<section><h2>What the constraints cost</h2><div class="explained"><div>'
+        f"<p>Free to have any colour and brightness, the lights would miss {without} of the "
+        f"painted light (RMS). As asked, they miss {asked}. Both pictures are sums of the "
+        f"basis images.</p></div>{_curve(solution, free)}</div>"
+        f'<div class="maps">{_figures(basis, pictures, transform, looks)}'
+        f"{_numbers(basis, solution, transform, looks)}"
+        "</div></section>"
+    )
+
+
+def _curve(solution: Solution, free: Solution) -> str:
+    """With `sparse`, what is missed by number of lights."""
+    curve = solution.certificate.curve
+    if not curve:
+        return ""
+    used, near = _used(solution), list(curve)
+    if len(curve) > SHOWN + SPARE:
+        near = sorted(sorted(curve, key=lambda point: abs(point[0] - used))[: SHOWN - 1])
+    told = [
+        *((_lights(count) + ", as asked" * (count == used), missed) for count, missed in near),
+        ("without constraints", relative_residual(free)),
+        *((_lights(count), missed) for count, missed in curve if (count, missed) not in near),
+    ]
+    rows = [row(what, share_cell(spoken_percent(x), min(x, 1.0))) for what, x in told]
+    heads = ("lights on, the best that were found", "missed")
+    return f"<div>{table(heads, rows, shown=len(near) + 1)}</div>"
+
+
+def _numbers(
+    basis: Basis, solution: Solution, transform: ViewTransform, looks: Looks | None
+) -> str:
+    """With `sparse`, pictures with fewer and with more lights."""
+    used, missed_with = _used(solution), dict(solution.certificate.curve)
+    pictures = [
+        (weights, f"With {_lights(count)}", f"{spoken_percent(missed_with[count])} missed.")
+        for count, weights in solution.tried
+        if count in missed_with and 0 < abs(count - used) <= AROUND
+    ]
+    return _figures(basis, pictures, transform, looks)
+
+
+def _figures(
+    basis: Basis,
+    pictures: list[tuple[Doubles, str, str]],
+    transform: ViewTransform,
+    looks: Looks | None,
+) -> str:
+    """Pictures of weights (n, 3), each with its name and a caption."""
+    factor = max(1, min(basis.size[1] // WIDTH, *basis.size))
+    figures = []
+    for weights, name, caption in pictures:
+        # Reduced it is quick to denoise, and needs no features.
+        image = np.asarray(block_mean(basis.mix(weights), factor), np.float32)
+        pixels = transform.encode(denoised(image) if looks and looks.is_clean else image)
+        figures.append(figure(Picture(name, f"{name}, predicted.", pixels), caption, ""))
+    return "".join(figures)
+
+
+def _used(solution: Solution) -> int:
+    """The number of lights of the curve that the answer has."""
+    most = solution.problem.constraints.sparse or 0
+    return max((count for count, _ in solution.certificate.curve if count <= most), default=0)
+
+
+def _lights(count: int) -> str:
+    return f"{count} light{'' if count == 1 else 's'}"

@@ -1,0 +1,230 @@
+"""The parts of the report on how sure the answer is and what is missed. Each returns HTML."""
+
+from html import escape
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import luminance
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.solution import Solution
+from lightpaint.report.answer_pictures import (
+    FINEST_SCALE,
+    coverage,
+    diverging,
+    round_up,
+    unpainted_look,
+)
+from lightpaint.report.measures import energy_shares
+from lightpaint.report.page.figures import Picture, figure, signed_scale
+from lightpaint.report.page.html import folded, listed, name_of, row, share_cell, table
+from lightpaint.report.sentences import (
+    brightness,
+    how_sure,
+    relative_errors,
+    spoken_errors,
+    spoken_hold,
+    spoken_percent,
+    what_is_missed,
+)
+
+#: Headings of the table of errors, and rows of it and of that of bounds that are not folded.
+SURE, ROWS = ("light", "solved", "95 % between", "of it", "of the picture"), 6
+
+#: Headings of the table of what holds lights back.
+BOUNDS = ("light", "held by", "less missed<br>without that", "at first")
+
+#: Bounds with a smaller share of the miss are not worth a row.
+SMALLEST_GAIN = 0.002
+
+
+def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> str:
+    """How far noise may have moved the answer: a sentence, and the lights it matters for."""
+    if uncertainty is None:
+        return ""
+    shares = energy_shares(basis, solution.lighting)
+    errors, spoken = relative_errors(uncertainty), spoken_errors(uncertainty, len(shares))
+    solved, low, high = brightness(uncertainty)
+    effect = np.where(np.isfinite(errors) & ~uncertainty.untold, errors, 0) * shares
+    # Those that are off and may be on come behind, by how bright they may be.
+    order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
+    rows = [
+        row(
+            name_of(basis.names[k]),
+            f"{solved[k]:.3g}",
+            f"{low[k]:.3g} … {high[k]:.3g}",
+            spoken[k] if np.isfinite(errors[k]) or uncertainty.untold[k] else "–",
+            f"± {spoken_percent(float(effect[k]))}" if effect[k] else "–",
+        )
+        for k in order
+        if errors[k] > 0
+    ]
+    meaning = (
+        "<p>The table shows the brightness of each light, and between which values many samples "
+        "would find it in 95 of 100 cases. Lights that do nearly the same may be off by much and "
+        "yet make up for each other in the picture.</p>"
+    )
+    return (
+        '<section><h2>How sure</h2><div class="explained">'
+        f"<div><p>{escape(how_sure(basis, solution, uncertainty))}</p>"
+        "<p>Together these errors miss about "
+        f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).</p>"
+        f"{_steps(solution)}{folded('How to read the table', meaning)}</div>"
+        f"<div>{table(SURE, rows, kind='sure', shown=ROWS)}</div></div></section>"
+    )
+
+
+def _steps(solution: Solution) -> str:
+    """What was done against noise, besides sampling."""
+    steps = []
+    if solution.problem.noise_removed:
+        steps.append(
+            f"{spoken_percent(solution.problem.noise_removed)} of the noise's power in the "
+            "equations was taken out of them"
+        )
+    if solution.problem.refinement is not None:
+        steps.append(
+            "the answer was refined by a render of the mix, which decided "
+            f"{spoken_percent(solution.problem.refinement.share)} of the last step"
+        )
+    text = "; ".join(steps)
+    return f"<p>{text[0].upper()}{text[1:]}.</p>" if text else ""
+
+
+def missed_section(
+    solution: Solution,
+    diagnosis: Diagnosis | None,
+    current: Floats,
+    *,
+    transform: ViewTransform,
+    seen: Seen | None = None,
+) -> str:
+    """Why it does not look like the painting: sentences, shares, maps and bounds."""
+    if diagnosis is None:
+        return ""
+    sentences = "".join(f"<p>{escape(text)}</p>" for text in what_is_missed(diagnosis, seen))
+    return (
+        f'<section><h2>What is missed</h2><div class="explained"><div>{sentences}</div>'
+        f"{_shares(diagnosis)}</div>"
+        f'<div class="maps">{_maps(solution, diagnosis, current, transform=transform)}</div>'
+        f"{_bounds(diagnosis)}</section>"
+    )
+
+
+def _shares(diagnosis: Diagnosis) -> str:
+    d = diagnosis
+    by_what = "by zero or by what is asked" if d.is_constrained else "needs light below zero"
+    parts = [
+        ("out of reach of any mix", d.unreachable),
+        (f"forbidden: {by_what}", d.forbidden),
+        *([("noise of the basis", d.noise)] if d.noise > 0 else []),
+        *([("noise of the painting", d.painting_noise)] if d.painting_noise > 0 else []),
+    ]
+    if d.compromise > 0:
+        parts.insert(2, ("given up for the other views", d.compromise))
+    shares = [(what, d.share(part)) for what, part in parts]
+    rows = [row(what, share_cell(spoken_percent(x), x)) for what, x in shares]
+    if d.ignored > 0:
+        times = d.ignored / d.total if d.total > 0 else np.inf
+        told = f"{times:.2g} times as much" if np.isfinite(times) else "all"
+        rows.append(row("besides, where it does not count", told))
+    return f'<table class="shares"><tbody>{"".join(rows)}</tbody></table>'
+
+
+def _maps(
+    solution: Solution, diagnosis: Diagnosis, current: Floats, *, transform: ViewTransform
+) -> str:
+    parts = [
+        (
+            "Out of reach",
+            diagnosis.unreachable_map,
+            "What no mix of the lights makes, negative ones included.",
+        ),
+        (
+            "Forbidden",
+            diagnosis.forbidden_map,
+            "What only light below zero, or beyond what is asked, would mend."
+            + " So is what other views ask for." * (diagnosis.compromise > 0),
+        ),
+    ]
+    limit = maps_limit(solution, diagnosis, transform=transform)
+    share = coverage(solution.importance)[..., None]
+    grey = unpainted_look(current, transform=transform)
+    figures = []
+    for name, image, caption in parts:
+        if name == "Forbidden" and diagnosis.share(diagnosis.avoidable) < SMALLEST_GAIN:
+            continue  # an empty picture
+        # As in the residual's map: predicted − painted, so that bright is too bright.
+        colours = diverging(-luminance(image) / limit)
+        figures.append(
+            figure(
+                Picture(name, f"False-colour map: {name}.", share * colours + (1 - share) * grey),
+                caption,
+                signed_scale(limit),
+            )
+        )
+    if diagnosis.ignored > 0:
+        colours = diverging(-diagnosis.ignored_map / limit)
+        figures.append(
+            figure(
+                Picture("Not counted", "False-colour map of what does not count.", colours),
+                "Painted and missed where the importance is small.",
+                signed_scale(limit),
+            )
+        )
+    return "".join(figures)
+
+
+def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTransform) -> float:
+    """The end of the scale of all maps of what is missed."""
+    counted = solution.importance > 0
+    maps = (diagnosis.unreachable_map, diagnosis.forbidden_map)
+    sizes = np.concatenate([np.abs(luminance(image))[counted] for image in maps])
+    return round_up(max(float(np.percentile(sizes, 99)), FINEST_SCALE * 2.0**-transform.stops))
+
+
+def _bounds(diagnosis: Diagnosis) -> str:
+    rows = [
+        row(
+            listed(bound.lights),
+            escape(_held_by(bound)),
+            spoken_percent(diagnosis.gained(bound)),
+            f'<td class="rgb">{_multiplier(bound)}</td>',
+        )
+        for bound in diagnosis.bounds
+        if diagnosis.gained(bound) >= SMALLEST_GAIN
+    ]
+    if not rows:
+        return ""
+    more = diagnosis.bounds_left_out
+    others = f"<p>{more} more seem to matter less, and were not looked into.</p>" if more else ""
+    meaning = (
+        "<p>What would be gained if one of these alone were let go, and all others stayed. It is a "
+        "share of everything that counts, including the unpainted parts that are held. "
+        "A light that is kept, locked, limited, coloured or tied would then have any emission; one "
+        "that is off for no other reason would go below zero and so take light away: a hint at "
+        "which other lights spill where they should not.</p><p>At first: how the objective would "
+        "change, per unit, if that which holds were raised a little.</p>"
+    )
+    return (
+        '<div class="explained" style="margin-top: 32px"><div><h3>What holds the lights back</h3>'
+        f"{others}{folded('How to read the table', meaning)}</div>"
+        f"<div>{table(BOUNDS, rows, kind='bounds', shown=ROWS)}</div></div>"
+    )
+
+
+def _held_by(bound: Bound) -> str:
+    """Zero, so that nobody takes it for somebody's wish, or what else holds."""
+    held = spoken_hold(bound)
+    return held.replace("off", "zero") if bound.kind == "zero" else held
+
+
+def _multiplier(bound: Bound) -> str:
+    numbers = [f"{value:+.3g}".replace("-", "−") if value else "0" for value in bound.multiplier]
+    per = {"emission": "unit of R, G, B", "luminance": "unit of luminance"}
+    return f"{', '.join(numbers)} <small>per {per.get(bound.per, 'present brightness')}</small>"

@@ -1,0 +1,239 @@
+"""The pictures of the report: the wipe, the maps, thumbnails. HTML with data: URIs."""
+
+import base64
+import io
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from lightpaint.arrays import Floats, largest
+from lightpaint.colour.display.srgb import encode_display, to_8_bit
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.denoiser import denoised
+from lightpaint.images.formats.png import png_bytes
+from lightpaint.lighting.solution import Solution
+from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.report.answer_pictures import (
+    DIVERGING,
+    Residual,
+    diverging,
+    importance_picture,
+    residual_of,
+    residual_picture,
+)
+from lightpaint.threads import side_by_side
+
+#: Ends of the importance map's legend, as `importance_picture` shows a mid grey.
+UNCOUNTED, COUNTED = "#393939", "#e8d8a2"
+
+#: Colours of a signed quantity from its lower to its upper end, for the legend.
+SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGING)]
+
+#: A picture whose PNG is larger than this many bytes goes into the page as JPEG.
+LARGEST_PNG = 150_000
+
+#: Lines of a picture in a row that tell how well they pack.
+STRIP = 8
+
+#: JPEG quality of pictures with their noise, which is what takes the room.
+RAW_QUALITY = 75
+
+#: Width of the lights' pictures in the table, in pixels.
+THUMBNAIL = 144
+#: Pixels in a row that one of such a picture averages, from which on it is not denoised.
+ENOUGH = 4
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of the page, (h, w, 3) in display values. alt: what it shows, in words.
+
+    raw: the same as it was rendered, where `pixels` were denoised.
+    """
+
+    name: str
+    alt: str
+    pixels: Floats
+    raw: Floats | None = None
+
+
+def data_uri(
+    image_8_bit: npt.NDArray[np.uint8], *, largest_png: int = LARGEST_PNG, quality: int = 91
+) -> str:
+    """An (h, w, 3) picture as a data: URI: lossless while it is small, else a good JPEG."""
+    data, kind = _small_png(image_8_bit, largest_png), "png"
+    if data is None:
+        buffer = io.BytesIO()
+        Image.fromarray(image_8_bit).save(buffer, "JPEG", quality=quality, subsampling=0)
+        data, kind = buffer.getvalue(), "jpeg"
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def _small_png(image_8_bit: npt.NDArray[np.uint8], largest: int) -> bytes | None:
+    """A picture as a PNG of that many bytes at most, if it can be one."""
+    # Every fourth strip of it tells what will be too large.
+    quarter = image_8_bit[np.arange(len(image_8_bit)) // STRIP % 4 == 0]
+    if largest == 0 or len(png_bytes(quarter)) > 0.3 * largest:
+        return None
+    data = png_bytes(image_8_bit)
+    return data if len(data) <= largest else None
+
+
+def thumbnail(
+    image: Floats, emitters_seen: npt.NDArray[np.bool_], *, is_clean: bool = False
+) -> tuple[Floats, float]:
+    """A small display-encoded picture of what one light does, and its exposure in stops.
+
+    image: (h, w, 3) linear. The 98th percentile of what it lights, seen emitters aside, is
+    brought to white; reduced in linear light. is_clean: whether it is denoised then.
+    """
+    width = image.shape[1]
+    stops = exposure_of(image, emitters_seen)
+    if width > THUMBNAIL:
+        image = resized(image, THUMBNAIL / width)
+    # Where many pixels make one, their mean has hardly any noise left to take out.
+    if is_clean and width < ENOUGH * THUMBNAIL:
+        image = denoised(image)
+    return encode_display(image, stops=stops), stops
+
+
+def resized(image: Floats, factor: float) -> Floats:
+    """An (h, w, 3) picture at `factor` of its size, box-filtered; no side is less than a pixel."""
+    height, width = (max(1, round(side * factor)) for side in image.shape[:2])
+    box = Image.Resampling.BOX
+    planes = [
+        np.asarray(Image.fromarray(image[..., c].astype(np.float32)).resize((width, height), box))
+        for c in range(3)
+    ]
+    return np.stack(planes, axis=-1)
+
+
+def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
+    """Stops that bring the 98th percentile of what a light lights to white, seen emitters aside."""
+    bright = largest(image)
+    lit = bright[(bright > 0) & ~emitters_seen]
+    lit = lit if lit.size else bright[bright > 0]
+    return float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
+
+
+def _raw_uri(look: Picture) -> str:
+    if look.raw is None:
+        return ""
+    return data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)
+
+
+def wipe(looks: list[Picture]) -> str:
+    """Two of the looks over each other, with a movable border between them."""
+    # The verification may be larger than the rest, which the page then enlarges.
+    height, width = max(look.pixels.shape[:2] for look in looks)
+    # The prediction first: it is the answer, and less noisy than the render that checks it.
+    a, b = (next(k for k, x in enumerate(looks) if x.name == n) for n in ("painting", "answer"))
+
+    def choices(chosen: int) -> str:
+        return "".join(
+            f'<option value="{k}"{" selected" if k == chosen else ""}>{look.name}</option>'
+            for k, look in enumerate(looks)
+        )
+
+    shown = side_by_side(lambda look: data_uri(to_8_bit(look.pixels)), looks)
+    raw = side_by_side(_raw_uri, looks)
+    images = "".join(
+        f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
+        f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '
+        f'src="{shown[k]}">'
+        for k, look in enumerate(looks)
+    )
+    images += "".join(
+        f'<img class="as-rendered" data-look="{k}" data-raw="" width="{width}" '
+        f'height="{height}" draggable="false" alt="{look.name}, raw: {look.alt}" '
+        f'src="{raw[k]}">'
+        for k, look in enumerate(looks)
+        if look.raw is not None
+    )
+    switch = '<label><input type="checkbox" id="raw"> Raw, as rendered</label>'
+    switch = switch if any(look.raw is not None for look in looks) else ""
+    return (
+        f'<figure class="wipe" id="wipe" style="--aspect: {width / height:.5f}">'
+        f'<div class="stage" id="stage" style="aspect-ratio: {width} / {height}">{images}'
+        '<div class="edge" aria-hidden="true"><i></i></div>'
+        f'<span class="tag tag-a" id="tag-a" aria-hidden="true">{looks[a].name}</span>'
+        f'<span class="tag tag-b" id="tag-b" aria-hidden="true">{looks[b].name}</span></div>'
+        '<figcaption class="controls">'
+        f'<label>Left <select id="a">{choices(a)}</select></label>'
+        '<label class="slide">Wipe <input type="range" id="split" min="0" max="100" step="1" '
+        'value="50"></label>'
+        f'<label>Right <select id="b">{choices(b)}</select></label>{switch}</figcaption></figure>'
+    )
+
+
+def maps(
+    solution: Solution,
+    predicted: Floats,
+    current: Floats,
+    *,
+    verification: Verification | None,
+    transform: ViewTransform,
+    missed: Residual | None = None,
+) -> str:
+    """False-colour pictures: what is missed, what counts, and where the render disagrees.
+
+    predicted: (h, w, 3) linear, as rendered; current: behind what does not count. missed: what
+    `residual_of` says.
+    """
+    missed = missed or residual_of(solution, predicted, transform=transform)
+    picture = residual_picture(missed, solution, current, transform=transform)
+    figures = [
+        figure(
+            Picture("Residual", "False-colour map of the residual.", picture),
+            f"Luminance, answer − painting, as rendered{missed.spoken}. Hatched pixels do not "
+            "count.",
+            signed_scale(missed.limit),
+        ),
+        figure(
+            Picture(
+                "Importance",
+                "Map of how much each pixel counts.",
+                importance_picture(solution.importance, current, transform=transform),
+            ),
+            f"How much each pixel counts: {solution.importance.mean():.2g} on average, "
+            f"{solution.importance.max():.3g} at most.",
+            scale([UNCOUNTED, COUNTED], "hatched: does not count", "yellow: counts fully"),
+        ),
+    ]
+    if verification is not None:
+        z = verification.z.mean(axis=-1, dtype=np.float64)
+        figures.append(
+            figure(
+                Picture("Verification", "False-colour map of z.", diverging(z / LIMIT)),
+                "Answer − render in standard errors, mean of the channels. Noise alone "
+                "looks like even grain; a shape in it is an error.",
+                scale(SIGNED, f"−{LIMIT:g} answer darker", "0", f"answer brighter +{LIMIT:g}"),
+            )
+        )
+    return "".join(figures)
+
+
+def figure(picture: Picture, caption: str, legend: str) -> str:
+    """A map with its legend, as `scale` makes it, and what it shows."""
+    height, width = picture.pixels.shape[:2]
+    return (
+        f'<figure><img width="{width}" height="{height}" alt="{picture.alt} {caption}" '
+        f'src="{data_uri(to_8_bit(picture.pixels))}">{legend}'
+        f"<figcaption><strong>{picture.name}.</strong> {caption}</figcaption></figure>"
+    )
+
+
+def signed_scale(limit: float) -> str:
+    """The legend of what is too dark or too bright, up to `limit`."""
+    return scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}")
+
+
+def scale(colours: list[str], *ends: str) -> str:
+    """The legend of a map: its colours from left to right, and what they are in words."""
+    words = "".join(f"<span>{end}</span>" for end in ends)
+    gradient = f"linear-gradient(to right, {', '.join(colours)})"
+    return (
+        f'<div class="scale" style="background: {gradient}"></div><div class="ends">{words}</div>'
+    )

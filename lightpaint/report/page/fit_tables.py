@@ -1,0 +1,175 @@
+"""The tables of the report beside that of lights: fit, renders, verification. Each returns HTML.
+
+Names of lights, targets and scenes come from other people's files and are escaped here.
+"""
+
+import platform
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.painting import left_out
+from lightpaint.lighting.software import Software, version
+from lightpaint.lighting.solution import Solution
+from lightpaint.relit.power import ERROR
+from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.report.measures import (
+    brighter_as_allowed,
+    codes_missed,
+    linear_residual,
+    noise_residual,
+    relative_residual,
+)
+from lightpaint.report.page.html import facts, listed, row
+from lightpaint.report.sentences import partly_reached
+from lightpaint.screen import some_of
+from lightpaint.target.target import Target
+from lightpaint.version import __version__
+
+
+def fit_table(solution: Solution) -> str:
+    """Objective with its standard error, optimality and sweeps, per channel and in all."""
+    q = solution.certificate
+    norm2 = np.where(solution.norm2 > 0, solution.norm2, 1)
+    errors = None if q.objective_error is None else np.array(q.objective_error)
+    each = [""] * 3 if errors is None else [f" ± {e:.1g}" for e in errors / norm2]
+    columns = zip(
+        ("red", "green", "blue"), q.relative_objective, each, q.kkt_residual, q.sweeps, strict=True
+    )
+    rows = [
+        row(name, f"{objective:.3g}{error}", f"{np.sqrt(objective):.3g}", f"{kkt:.1e}", f"{sweeps}")
+        for name, objective, error, kkt, sweeps in columns
+    ]
+    total = relative_residual(solution)
+    # One path carries all channels, so that their errors go together.
+    whole = "" if errors is None else f" ± {errors.sum() / norm2.sum():.1g}"
+    rows.append(
+        f'<tr class="total"><th scope="row">all</th><td>{total**2:.3g}{whole}</td>'
+        f"<td>{total:.3g}</td>"
+        f"<td>{max(q.kkt_residual):.1e}</td><td>{max(q.sweeps)}</td></tr>"
+    )
+    return "".join(rows)
+
+
+def verification_table(verification: Verification | None) -> str:
+    """How far prediction and render are apart, each number beside what is allowed."""
+    if verification is None:
+        return facts([("Result", "not verified")])
+    v = verification
+    means = ", ".join(f"{value:+.2f}" for value in v.z_mean).replace("-", "−")
+    return facts(
+        [
+            ("Result", "agrees within noise" if v.agrees else "DISAGREES beyond noise"),
+            ("RMSE of the pixels", f"{v.rmse:.3g}; noise alone gives {v.noise_rmse:.3g}"),
+            ("z of the whole image", f"{means} (R, G, B); limit ±{LIMIT:g}"),
+            ("z of the pattern", f"{v.z_pattern:+.2f}; limit {LIMIT:g}".replace("-", "−")),
+            ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; about 1 is noise"),
+            ("ΔE2000", f"mean {v.delta_e_mean:.2f}; 95 % of pixels below {v.delta_e_95:.2f}"),
+            *_power(v),
+        ]
+    )
+
+
+def _power(v: Verification) -> list[tuple[str, str]]:
+    """Return a row: how likely an error in each light was to be seen, the least likely first."""
+    if not v.power:
+        return []
+    in_order = sorted(v.power.items(), key=lambda its: its[1])
+    told = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
+    return [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(told, room=400))]
+
+
+def render_table(
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+) -> str:
+    """Where the basis comes from, and which pixels and lights took no part."""
+    origin, q = basis.origin, solution.certificate
+    height, width = basis.size
+    stopped = f"no: stopped after {max(q.sweeps)} sweeps"
+    seen = int(basis.emitters_seen.sum())
+    out = int(left_out(target, basis.emitters_seen, solution.problem.fit.emitters).sum())
+    adjusted = int((~basis.is_fixed).sum())
+    told: list[tuple[str, str]] = [
+        ("Solve converged", "yes" if q.converged else stopped),
+        ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
+        ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
+        ("Basis", f"{origin.method}, {_samples(basis)}"),
+        ("Integrator", f"{origin.integrator}, not the scene's own" if origin.integrator else ""),
+        ("Emitters seen directly", f"in {seen} pixels{_seen_note(out)}"),
+    ]
+    missed, noise = relative_residual(solution), noise_residual(solution, predicted)
+    told.append(("Missed (RMS)", f"{missed:.3g} of what was asked; noise adds {noise:.3g}"))
+    told += _fitted(solution, predicted)
+    for light in basis.lights:
+        if light.is_fixed:
+            told.append(("Kept as they are", listed(light.members)))
+    if q.unreached:
+        told.append(("Reach nothing painted, so kept", listed(q.unreached)))
+    for channels in partly_reached(solution.lighting):
+        told.append(("Reach nothing painted in a channel", channels))
+    if target.not_finite:
+        told.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
+    return facts([(what, value) for what, value in told if value])
+
+
+def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
+    """What was compared with the painting, where it was not plain light."""
+    if solution.problem.is_linear or solution.reweighting is None:
+        return []
+    q = solution.certificate
+    told: list[tuple[str, str]] = []
+    if q.display:
+        told += [
+            ("Fitted in display space", f"as {q.display} shows it"),
+            (
+                "Missed on the display",
+                f"{codes_missed(solution):.1f} of 255 codes, {relative_residual(solution):.3g} of "
+                "the painting (RMS)",
+            ),
+            (
+                "Missed in linear light",
+                f"{linear_residual(solution, predicted):.3g} of the painting (RMS)",
+            ),
+        ]
+    if (at_least := brighter_as_allowed(solution, predicted.image)) is not None:
+        pixels, brighter = at_least
+        text = f"{pixels} pixels, {brighter} of which are brighter now"
+        told.append(("Painted as at least so bright", text))
+    return [*told, ("Linear problems solved", f"{q.rounds}, each certified")]
+
+
+def _samples(basis: Basis) -> str:
+    if not basis.knows_noise:
+        return "which says nothing of its samples and noise"
+    return f"{basis.origin.spp} samples per pixel, seed {basis.origin.seed}"
+
+
+def _full_size(basis: Basis, verification: Verification | None) -> str:
+    if verification is None or verification.verified.size == basis.size:
+        return ""
+    height, width = verification.verified.size
+    return f", verified at {width} × {height}"
+
+
+def versions(basis: Basis) -> str:
+    """What made this: lightpaint and the libraries under it, as installed here."""
+    parts = [f"lightpaint {__version__}"]
+    if basis.origin.lightpaint != __version__:
+        parts[0] += f" (basis by {basis.origin.lightpaint})"
+    parts += [f"{name} {its}" for name in ("mitsuba", "drjit", "numpy") if (its := version(name))]
+    software = Software.here()
+    parts.append(f"{software.blas} {software.kernel}".strip())
+    return " · ".join([*parts, f"Python {platform.python_version()}"])
+
+
+def _lights_off(solution: Solution) -> int:
+    return sum(not any(light.emission) for light in solution.lighting.lights)
+
+
+def _seen_note(out: int) -> str:
+    return f", of which {out} were painted and do not count" if out else ""

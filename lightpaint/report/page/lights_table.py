@@ -1,0 +1,203 @@
+"""The table of lights in the report, as HTML.
+
+Names of lights come from other people's files and are escaped here.
+"""
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import BasisLight
+from lightpaint.colour.color import luminance, rgb_to_hex
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.photometry import Photometry
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.setting import ALL_REACHED, LightSetting
+from lightpaint.lighting.solution import Solution
+from lightpaint.report.basis_memo import once
+from lightpaint.report.clean_pictures import MOST_THUMBNAILS
+from lightpaint.report.measures import energy_shares, largest_shares, that_do_most
+from lightpaint.report.page.figures import data_uri, thumbnail
+from lightpaint.report.page.html import SHOWN, SPARE, folded, name_of, share_cell
+from lightpaint.report.sentences import (
+    UNTOLD,
+    UNTOLD_HERE,
+    spoken_errors,
+    spoken_percent,
+    unreached_channels,
+)
+from lightpaint.threads import side_by_side
+
+#: Headings of the columns, with the classes of their cells.
+COLUMNS = (
+    ("thumb", "alone"),
+    ("name", "light"),
+    ("colour", "colour"),
+    ("rgb now", "emission now<br>R, G, B"),
+    ("rgb new", "solved<br>R, G, B"),
+    ("unit", "parameter"),
+    ("rgb amount", "{amounts}"),
+    ("change", "luminance"),
+    ("share", "share of the<br>picture’s energy"),
+)
+
+
+def lights_table(
+    basis: Basis,
+    solution: Solution,
+    uncertainty: Uncertainty | None = None,
+    *,
+    is_clean: bool = False,
+) -> str:
+    """One row per light, in document order; of many those that do most, and the rest folded.
+
+    What a light does is its part of the picture's energy, now or as solved, whichever is more.
+    is_clean: whether its pictures are denoised.
+    """
+    is_clean = is_clean and len(basis.lights) <= MOST_THUMBNAILS
+    rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
+    if len(rows) <= SHOWN + SPARE:
+        return _table(rows, solution)
+    shares = largest_shares(basis, solution.lighting)
+    most = that_do_most(basis, solution.lighting)
+    rest = np.setdiff1d(np.arange(len(rows)), most)
+    told = (
+        f"{len(rest)} more lights, none of which is more than "
+        f"{spoken_percent(float(shares[rest].max()))} of the picture, now or as solved"
+    )
+    return (
+        f"<p>The {len(most)} that do most in the picture, now or as solved.</p>"
+        + _table([rows[k] for k in most], solution)
+        + folded(told, _table([rows[k] for k in rest], solution))
+    )
+
+
+def _table(rows: list[str], solution: Solution) -> str:
+    amounts = "flux<br>(relative)" if solution.lighting.cd_per_unit is None else "output"
+    heads = "".join(
+        f'<th scope="col" class="{kind}">{heading.format(amounts=amounts)}</th>'
+        for kind, heading in COLUMNS
+    )
+    return (
+        '<div class="scroll" role="region" aria-labelledby="lights" tabindex="0">'
+        f'<table class="lights"><thead><tr>{heads}</tr></thead><tbody>{"".join(rows)}</tbody>'
+        "</table></div>"
+    )
+
+
+def _rows(
+    basis: Basis, solution: Solution, uncertainty: Uncertainty | None, *, is_clean: bool
+) -> list[str]:
+    shares = energy_shares(basis, solution.lighting)
+    errors = spoken_errors(uncertainty, len(shares))
+    settings = {light.name: light for light in solution.lighting.lights}
+
+    rows, thumbnails = [], thumbnails_of(basis, is_clean=is_clean)
+    for k, (light, (uri, shape, stops)) in enumerate(zip(basis.lights, thumbnails, strict=True)):
+        name, setting = escape(light.name), settings[light.name]
+        error = UNTOLD_HERE if errors[k] == UNTOLD else errors[k]
+        error = f" <small>{error}</small>" if error else ""
+        what = f"What {name} lights alone, shown at {stops:+.1f} stops"
+        rows.append(
+            f'<tr><td class="thumb"><img src="{uri}" '
+            f'width="{shape[1]}" height="{shape[0]}" alt="{what}" '
+            f'title="{what}"></td>'
+            f'<th scope="row" class="name">{name_of(light.name)}<small>{escape(light.plugin)}'
+            f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
+            f"{_emission_cells(light, setting, solution.lighting)}"
+            f'<td class="change">{change(light, setting)}{error}{_asked(setting)}</td>'
+            f"{share_cell(f'{100 * shares[k]:.1f} %', shares[k])}</tr>"
+        )
+    return rows
+
+
+def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int, ...], float]]:
+    """What each light lights alone: data: URI, size and exposure. is_clean: whether denoised."""
+
+    def shown(image: Floats) -> tuple[str, tuple[int, ...], float]:
+        picture, stops = thumbnail(image, basis.emitters_seen, is_clean=is_clean)
+        return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
+
+    return once(basis, ("thumbnails", is_clean), lambda: side_by_side(shown, basis.images))
+
+
+def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:
+    """Colour, emission before and after, their unit, and what an eye makes of it."""
+    seen = lighting.photometry(setting)
+    if light.is_fixed:
+        return "".join(f'<td class="{kind}"></td>' for kind, _ in COLUMNS[2:7])
+    return (
+        f'<td class="colour">{_swatch(setting, seen)}</td>'
+        f'<td class="rgb now">{_rgb(light.emission)}</td>'
+        f'<td class="rgb new">{_rgb(setting.emission, setting.reached)}</td>'
+        f'<td class="unit">{escape(light.parameter)} <small>{escape(light.unit)}</small></td>'
+        f'<td class="rgb amount{" flux" * (lighting.cd_per_unit is None)}">{_amounts(seen)}</td>'
+    )
+
+
+def change(light: BasisLight, setting: LightSetting) -> str:
+    """In words or as a ratio of luminance, what happens to a light where it reaches anything."""
+    if light.is_fixed:
+        return "kept as it is"
+    if not any(setting.reached):
+        return "unchanged: reaches nothing painted"
+    kept = f"<small>{unreached_channels(setting)} kept: reaches nothing painted</small>"
+    return _changed(light, setting) + (kept if setting.is_partly_reached else "")
+
+
+def _changed(light: BasisLight, setting: LightSetting) -> str:
+    its = np.array(setting.reached)
+    before = float(luminance(np.where(its, light.emission, 0)))
+    after = float(luminance(np.where(its, setting.emission, 0)))
+    if after == 0:
+        return "off" if before > 0 else "stays off"
+    if before == 0:
+        return "was off, now on"
+    stops = f"{np.log2(after / before):+.2f} stops".replace("-", "−")
+    return f"×{after / before:.3g} <small>{stops}</small>"
+
+
+def _asked(setting: LightSetting) -> str:
+    """What was asked of a light, and whether that holds it."""
+    holds = " (holds it)" if setting.is_active else ""
+    return f" <small>{escape(setting.constraint)}{holds}</small>" if setting.constraint else ""
+
+
+def hex_color(emission: RGB) -> str | None:
+    """Colour of a light as #rrggbb, its brightest channel at full; None if it is off."""
+    return rgb_to_hex(np.array(emission)) if any(emission) else None
+
+
+def _swatch(setting: LightSetting, seen: Photometry) -> str:
+    """The colour of a light; of one whose own is not known, that of its factor."""
+    if setting.is_partly_reached:
+        return '<span class="swatch none"></span><small>not known</small>'
+    emission = setting.emission
+    color = seen.hex or hex_color(emission)
+    if color is None or not any(emission):
+        return '<span class="swatch none"></span> <small>off</small>'
+    kelvin = "" if seen.kelvin is None else f"{seen.kelvin:.0f} K"
+    away = "" if seen.duv is None else f"Duv {seen.duv:+.3f}".replace("-", "−")
+    return (
+        f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
+        f"{f' <small>{kelvin}</small> <small>{away}</small>' if kelvin else ''}"
+    )
+
+
+def _amounts(seen: Photometry) -> str:
+    """Luminous quantity and flux; without a scale, the flux in proportion."""
+    if seen.luminous is not None or seen.flux_lm is not None:
+        return " <br>".join(filter(None, seen.amounts))
+    return "" if seen.flux_y is None else f"{seen.flux_y:.3g}"
+
+
+def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
+    """A line for each channel, in brackets where nothing tells it."""
+    if not any(emission):
+        return "off"
+    told = zip(emission, reached, strict=True)
+    return " <br>".join(f"{v:.4g}" if tells else f"({v:.4g})" for v, tells in told)

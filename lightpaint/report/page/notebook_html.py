@@ -1,0 +1,273 @@
+"""What notebooks show of scenes, bases, targets and answers: small tables and pictures.
+
+`screen.Shown` calls `html_of` and `png_of`. All has inline styles and takes the notebook's own
+colours. Names come from other people's files and are escaped here.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import singledispatch
+from html import escape
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from lightpaint.arrays import RGB, Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import LUMINANCE, luminance
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.images.denoiser import denoised
+from lightpaint.images.estimate import Estimate
+from lightpaint.images.formats.png import png_bytes
+from lightpaint.images.pixel_blocks import covered, enlarged
+from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.solution import Solution
+from lightpaint.relit.verification import Verification
+from lightpaint.report.answer_pictures import coverage, transform_of, unpainted_look
+from lightpaint.report.comparison import SURROUND, TEXT, fitted
+from lightpaint.report.page.figures import THUMBNAIL, data_uri, thumbnail
+from lightpaint.report.page.lights_table import change, hex_color
+from lightpaint.report.sentences import UNTOLD_HERE
+from lightpaint.report.verdict import agreement, verdict
+from lightpaint.scene.scene import Scene
+from lightpaint.target.target import Target
+
+#: Lights that are shown of many, those that matter most; pictures of a contact sheet, and in a row.
+MOST, SHEET, ACROSS = 10, 12, 4
+#: Pixels of a picture in a page, and width of one that stands alone.
+PIXELS, WIDTH = 2**16, 480
+
+CELL = "text-align: left; padding: 0 1em 0 0"
+
+
+@singledispatch
+def html_of(shown: object) -> str | None:
+    """A small page of it; None for what is shown as a picture alone."""
+    return None
+
+
+@singledispatch
+def png_of(shown: object) -> bytes | None:
+    """A small PNG of it; None for what is shown as a page."""
+    return None
+
+
+@html_of.register
+def scene_html(scene: Scene) -> str:
+    """Its lights: what they are, how bright, and where."""
+    (height, width), lights = scene.size, scene.lights
+
+    def row(k: int) -> Sequence[str]:
+        x = lights[k]
+        colour = _swatch(x.emission, photometry(x.emission, unit=x.unit, unit_flux=x.unit_flux))
+        return x.name, x.plugin, colour, _rgb(x.emission), x.unit, x.form
+
+    return (
+        f"<p>{escape(scene.path.name)}: {len(lights)} lights, {width} × {height} through "
+        f"{escape(scene.sensor_names[scene.sensor])}</p>"
+        + _table(("light", "kind", "colour", "emission", "unit", "form"), row, _sizes(lights))
+    )
+
+
+@html_of.register
+def lighting_html(lighting: Lighting) -> str:
+    """Its lights and, of a solve, how good that was."""
+
+    def row(k: int) -> Sequence[str]:
+        light = lighting.lights[k]
+        seen = lighting.photometry(light)
+        asked = "kept" if light.is_fixed else light.constraint
+        asked = ", ".join(filter(None, (asked, UNTOLD_HERE if light.untold else "")))
+        colour, output = _swatch(light.emission, seen), " ".join(seen.amounts)
+        if light.is_partly_reached:
+            colour = _Html("")
+        return light.name, colour, _rgb(light.emission), light.unit, output, asked
+
+    told = "" if lighting.certificate is None else f"<p>{escape(str(lighting.certificate))}</p>"
+    heads = ("light", "colour", "emission", "unit", "output", "asked")
+    return told + _table(heads, row, _sizes(lighting.lights))
+
+
+@html_of.register
+def solution_html(solution: Solution) -> str:
+    """What happens to each light, of those that change the picture most, and how good that is."""
+    basis, lighting = solution.basis, solution.lighting
+
+    def row(k: int) -> Sequence[str]:
+        light, setting = basis.lights[k], lighting.lights[k]
+        # What a page of the report stacks stands in a line here.
+        told = change(light, setting).replace("<small>", " ").replace("</small>", "")
+        told += f", {UNTOLD_HERE}" if setting.untold else ""
+        colour = _swatch(setting.emission, lighting.photometry(setting))
+        colour = _Html("") if setting.is_partly_reached else colour
+        now, new = _rgb(light.emission), _rgb(setting.emission)
+        return light.name, colour, now, new, told, setting.constraint
+
+    moved = np.abs(solution.weights - basis.present_weights) * basis.totals @ LUMINANCE
+    heads = ("light", "colour", "now", "new", "change", "asked")
+    return f"<p>{escape(str(solution.certificate))}</p>" + _table(heads, row, moved)
+
+
+@html_of.register
+def verification_html(verification: Verification) -> str:
+    """The render, and whether it is what was predicted."""
+    said = agreement(verification)
+    return (
+        _picture("verified", [verification.verified.image], _transform(verification.verified.image))
+        + f"<p>{escape(said[0].upper() + said[1:])}; ΔE2000 {verification.delta_e_mean:.2f} on "
+        f"average, below {verification.delta_e_95:.2f} in 95 % of the pixels.</p>"
+    )
+
+
+def look_html(
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+    *,
+    seen: Seen | None = None,
+) -> str:
+    """Painting, prediction and render side by side, the verdict, and what the lights do."""
+    images = [_on_grey(target.image, target.importance), predicted.image]
+    names = ["target", "predicted"]
+    if verification is not None:
+        images.append(covered(verification.verified.image, predicted.size))
+        names.append("verified")
+    transform = transform_of(target, solution.basis, predicted.image)
+    said = verdict(solution, predicted, verification, seen=seen)
+    return (
+        _picture(", ".join(names), images, transform, paintings=1)
+        + f"<p>{', '.join(names)}</p><p>{escape(said)}</p>{solution_html(solution)}"
+    )
+
+
+@png_of.register
+def basis_png(basis: Basis) -> bytes:
+    """A contact sheet: what each light does alone, at exposures of their own."""
+    power = (basis.present_weights * basis.totals) @ LUMINANCE
+    chosen = _most(power, SHEET)
+    pictures = [
+        _wide(thumbnail(basis.images[k], basis.emitters_seen, is_clean=True)[0]) for k in chosen
+    ]
+    height, width = pictures[0].shape[:2]
+    text = 12
+    rows, columns = -(-len(chosen) // ACROSS), min(ACROSS, len(chosen))
+    left = len(basis.lights) - len(chosen)
+    size = (columns * (width + 4) + 4, rows * (height + 2 * text) + 4 + (2 * text if left else 0))
+    sheet = Image.new("RGB", size, SURROUND)
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(text)
+    for k, (light, picture) in enumerate(zip(chosen, pictures, strict=True)):
+        x, y = 4 + k % ACROSS * (width + 4), 4 + k // ACROSS * (height + 2 * text)
+        sheet.paste(Image.fromarray(to_8_bit(picture)), (x, y))
+        draw.text((x, y + height + 2), fitted(basis.names[light], font, width), TEXT, font)
+    if left:
+        draw.text((4, size[1] - 2 * text), f"and {left} more", TEXT, font)
+    return png_bytes(np.asarray(sheet))
+
+
+@png_of.register
+def target_png(target: Target) -> bytes:
+    """The painting; dim and hatched where nothing was painted."""
+    transform = target.transform or _transform(target.image)
+    share = _sized(coverage(target.importance)[..., None], WIDTH)
+    image = _sized(target.image, WIDTH)
+    paint, rest = transform.encode(image), unpainted_look(image, transform=transform)
+    return png_bytes(to_8_bit(_wide(share * paint + (1 - share) * rest)))
+
+
+def _table(heads: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any) -> str:
+    """The rows of the largest, and how many are left; cells that are no HTML are escaped."""
+
+    def cells(kind: str, texts: Iterable[str]) -> str:
+        made = (x if isinstance(x, _Html) else escape(_cut(x)) for x in texts)
+        row = "".join(f'<{kind} style="{CELL}">{x}</{kind}>' for x in made)
+        return f"<tr>{row}</tr>"
+
+    chosen = _most(np.asarray(sizes, np.float64), MOST)
+    body = "".join(cells("td", row(k)) for k in chosen)
+    left = len(sizes) - len(chosen)
+    more = f"<p>… and {left} more, which matter less</p>" if left else ""
+    return f"<table>{cells('th', heads)}{body}</table>{more}"
+
+
+class _Html(str):
+    """What is HTML already."""
+
+
+def _most(sizes: Any, count: int) -> list[int]:
+    """Indices of the largest, in their order."""
+    return sorted(np.argsort(-sizes, kind="stable")[:count].tolist())
+
+
+def _sizes(lights: Sequence[Any]) -> Doubles:
+    """How bright lights are: their flux or, where that is not known of all, their emission."""
+    emission = np.array([light.emission for light in lights])
+    if all(light.unit_flux is not None for light in lights):
+        emission = emission * [light.unit_flux for light in lights]
+    return np.asarray(emission @ LUMINANCE)
+
+
+def _cut(text: str, room: int = 120) -> str:
+    return text if len(text) <= room else text[: room - 1] + "…"
+
+
+def _rgb(emission: RGB) -> str:
+    return " ".join(f"{v:.4g}" for v in emission) if any(emission) else "off"
+
+
+def _swatch(emission: RGB, seen: Photometry) -> _Html:
+    """The colour of a light; of one whose own is not known, that of its factor."""
+    color = (seen.hex or hex_color(emission)) if any(emission) else None
+    if color is None:
+        return _Html("")
+    box = f"display: inline-block; width: 1em; height: 1em; background: {color}"
+    kelvin = "" if seen.kelvin is None else f" {seen.kelvin:.0f} K"
+    return _Html(f'<span style="{box}" title="{color}"></span>{kelvin}')
+
+
+def _transform(image: Floats) -> ViewTransform:
+    return ViewTransform("srgb", choose_exposure(image))
+
+
+def _on_grey(image: Floats, importance: Floats) -> Floats:
+    """(h, w, 3) linear, what is not painted in a dim grey of its own luminance."""
+    share = coverage(importance)[..., None]
+    return np.asarray(share * image + (1 - share) * 0.2 * luminance(image)[..., None])
+
+
+def _picture(
+    alt: str, images: Sequence[Floats], transform: ViewTransform, *, paintings: int = 0
+) -> str:
+    """Linear pictures side by side, at one size, as an element of HTML.
+
+    paintings: how many of them, the first, were not rendered.
+    """
+    height, width = images[0].shape[:2]
+    wide = int(min(WIDTH, np.sqrt(PIXELS * width / (height * len(images)))))
+    # Pictures for people: without their grain, once they are small.
+    small = [_sized(image, wide) for image in images]
+    small[paintings:] = map(denoised, small[paintings:])
+    shown = [_wide(transform.encode(image), wide) for image in small]
+    height = min(x.shape[0] for x in shown)
+    strip = to_8_bit(np.concatenate([x[:height] for x in shown], axis=1))
+    return f'<img alt="{escape(alt)}" src="{data_uri(strip, largest_png=2**13)}">'
+
+
+def _sized(image: Floats, width: int) -> Floats:
+    """(h, w, n) no wider than that, averaged in linear light."""
+    height, wide = image.shape[:2]
+    if wide <= width:
+        return image
+    size, box = (width, max(1, round(height * width / wide))), Image.Resampling.BOX
+    planes = np.ascontiguousarray(np.moveaxis(image.astype(np.float32), -1, 0))
+    shrunk = [np.asarray(Image.fromarray(plane).resize(size, box)) for plane in planes]
+    return np.stack(shrunk, axis=-1)
+
+
+def _wide(picture: Floats, width: int = THUMBNAIL) -> Floats:
+    """A small picture with larger pixels, as wide as a thumbnail or nearly so."""
+    return np.asarray(enlarged(picture, max(1, width // picture.shape[1])))

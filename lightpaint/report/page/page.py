@@ -1,0 +1,238 @@
+"""report.html: one self-contained page about one result.
+
+The page's frame is page.html.in; what is filled in comes from the other modules here. Pictures
+are data: URIs; nothing is loaded from anywhere, and the page's own content policy forbids it.
+"""
+
+import shlex
+from collections.abc import Callable, Sequence
+from functools import partial
+from html import escape
+from importlib import resources
+from pathlib import Path
+from string import Template
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.estimate import Estimate
+from lightpaint.images.pixel_blocks import covered
+from lightpaint.lighting.analysis.color_choices import Choices
+from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.solution import Solution
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.verification import Verification
+from lightpaint.report.answer_pictures import (
+    Residual,
+    brighter_than_white,
+    target_picture,
+    transform_of,
+)
+from lightpaint.report.clean_pictures import MOST_THUMBNAILS, Looks
+from lightpaint.report.influences import spoken_meaning
+from lightpaint.report.page.color_section import colors_section
+from lightpaint.report.page.constraint_section import constraints_section
+from lightpaint.report.page.diagnosis_section import missed_section, sure_section
+from lightpaint.report.page.figures import Picture, maps, wipe
+from lightpaint.report.page.fit_tables import fit_table, render_table, verification_table, versions
+from lightpaint.report.page.html import SHOWN, SPARE
+from lightpaint.report.page.lights_table import lights_table, thumbnails_of
+from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
+from lightpaint.report.page.suggestion_section import suggestion_section
+from lightpaint.report.verdict import verdict
+from lightpaint.report.visible_emitters import emitters_in_view
+from lightpaint.target.target import Target
+from lightpaint.threads import side_by_side
+
+
+def report_page(
+    *,
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+    command: str,
+    uncertainty: Uncertainty | None = None,
+    diagnosis: Diagnosis | None = None,
+    unconstrained: Solution | None = None,
+    suggestions: Sequence[Suggestion] | None = None,
+    seen: Seen | None = None,
+    looks: Looks | None = None,
+    color_choices: Choices = (),
+    missed: Residual | None = None,
+) -> str:
+    """The page as HTML text.
+
+    verification: None where nothing was rendered to check the prediction.
+    command: the shell command that made the result.
+    uncertainty, diagnosis, unconstrained, suggestions: without them the page has no section on
+    what they tell. seen: what `what_is_seen` says, where somebody has looked.
+    looks: the pictures without their grain, which then have it on a switch. color_choices: what
+    other colours would come to, if that is known. missed: what `residual_of` says.
+
+    Raises SizeError if target and basis differ in size.
+    """
+    target = target.fitted_to(basis.size, resize=False)
+    verified = None if verification is None else verification.verified.image
+    raw = Looks.raw(basis, predicted.image, verified)
+    looks = looks or raw
+    transform = looks.through(transform_of(target, basis, predicted.image))
+    current = looks.current
+    template = resources.files("lightpaint.report.page").joinpath("page.html.in")
+    # Pictures take the time, and none waits for another.
+    making: tuple[Callable[[], str], ...] = (
+        partial(_mixer, basis, target, solution, looks, transform=transform),
+        partial(
+            maps,
+            solution,
+            predicted.image,
+            current,
+            verification=verification,
+            transform=transform,
+            missed=missed,
+        ),
+        partial(_wipe, target, solution, looks, raw, transform=transform),
+        partial(missed_section, solution, diagnosis, current, transform=transform, seen=seen),
+        partial(
+            constraints_section, basis, solution, unconstrained, transform=transform, looks=looks
+        ),
+        partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
+    )
+    made = side_by_side(lambda make: make(), making)
+    mixer, of_pixels, pictures, what_is_missed, constraints, lights = made
+    return Template(template.read_text(encoding="utf-8")).substitute(
+        title=escape(f"{target.name} · {basis.origin.scene}"),
+        target=escape(target.name),
+        scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
+        verdict=escape(verdict(solution, predicted, verification, seen=seen)),
+        meant=escape(spoken_meaning(solution)),
+        banner=_banner(verification) + _notes(emitters_in_view(target, solution, predicted)),
+        wipe=pictures,
+        exposure=_exposure(transform, predicted.image, looks.how),
+        maps=of_pixels,
+        missed=what_is_missed + constraints + colors_section(color_choices),
+        suggestions=suggestion_section(
+            suggestions,
+            transform=transform,
+            cd_per_unit=solution.lighting.cd_per_unit,
+            is_clean=looks.is_clean,
+        ),
+        sure=sure_section(basis, solution, uncertainty),
+        lights=lights,
+        fit=fit_table(solution),
+        verification=verification_table(verification),
+        render=render_table(basis, target, solution, predicted, verification),
+        mixer=mixer + mixer_assets(),
+        command=escape(command or "(made from Python, without a command line)"),
+        again=_paint_again(basis, target, verification),
+        versions=escape(versions(basis)),
+    )
+
+
+def prepare_page(basis: Basis) -> None:
+    """Make what a page shows of a basis whatever the answer: `report_page` then finds it there."""
+    if len(basis.lights) <= SHOWN + SPARE:
+        planes_for_page(basis, is_clean=True)
+    thumbnails_of(basis, is_clean=len(basis.lights) <= MOST_THUMBNAILS)
+
+
+def _wipe(
+    target: Target, solution: Solution, looks: Looks, raw: Looks, *, transform: ViewTransform
+) -> str:
+    """What can be put side by side, in the order of its lists."""
+
+    def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> Picture:
+        size = looks.predicted.shape[:2]
+        both = [covered(transform.encode(x), size) for x in (clean, noisy)]
+        return Picture(name, alt, both[0], both[1] if looks.is_clean else None)
+
+    pictures = [
+        picture("now", "The scene as it is.", looks.current, raw.current),
+        Picture(
+            "painting",
+            "What was painted. Unpainted pixels are grey, dim and hatched.",
+            target_picture(target, solution, looks.current, transform=transform),
+        ),
+        picture(
+            "answer",
+            "The solved lighting, as the sum of the basis images.",
+            looks.predicted,
+            raw.predicted,
+        ),
+    ]
+    if looks.verified is not None and raw.verified is not None:
+        about = "An independent render of the relit scene."
+        pictures.append(picture("render", about, looks.verified, raw.verified))
+    return wipe(pictures)
+
+
+def _mixer(
+    basis: Basis, target: Target, solution: Solution, looks: Looks, *, transform: ViewTransform
+) -> str:
+    """The lights by hand."""
+    scene = basis.origin.scene
+    return mixer_html(
+        basis,
+        solution.lighting,
+        target_picture(target, solution, looks.current, transform=transform),
+        transform=transform,
+        is_clean=looks.is_clean,
+        scene=shlex.quote(_from_any_folder(scene)) if scene.endswith(".xml") else None,
+    )
+
+
+def _from_any_folder(path: str) -> str:
+    """Return the path of a file that is there as any folder has it, or what it was called."""
+    return str(Path(path).absolute()) if Path(path).exists() else path
+
+
+def _banner(verification: Verification | None) -> str:
+    """What must be known before looking: loud where the render contradicts the prediction."""
+    if verification is None:
+        return (
+            '<p class="note">Not verified: there is no render of the relit scene to compare with, '
+            "as of a saved basis, or because none was asked for.</p>"
+        )
+    if verification.agrees:
+        return ""
+    return (
+        '<div class="warning" role="alert"><strong>⚠ Warning: do not trust the prediction.</strong>'
+        "<p>The independent render of the relit scene differs from it by more than the noise of "
+        "both explains. See the map of the verification below for where; check that basis and "
+        "scene belong together, and render both with more samples.</p></div>"
+    )
+
+
+def _notes(remarks: list[str]) -> str:
+    return "".join(f'<p class="note">{escape(remark)}.</p>' for remark in remarks)
+
+
+def _exposure(transform: ViewTransform, predicted: Floats, how: str) -> str:
+    """How linear light became these pictures, and what of it they cannot show."""
+    at = f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
+    clipped = brighter_than_white(predicted, transform)
+    text = f"All at {at}, {'sRGB' if transform.name == 'srgb' else transform.name}."
+    if clipped > 0:
+        text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
+    if how:
+        text += f" Denoised by {escape(how)}; all numbers and maps are of the raw renders."
+    return text
+
+
+def _paint_again(basis: Basis, target: Target, verification: Verification | None) -> str:
+    """How to change the painting and solve once more, for those who open the page much later."""
+    text = (
+        "Open the painting with its layers, change it, save it under the same name, and give the "
+        "command again. The basis is kept"
+    )
+    text += "." if verification is None else "; only the verification is rendered anew."
+    if target.content:
+        text += " What counts is what differs from the template."
+    elif target.everything and basis.origin.scene.endswith(".xml"):
+        scene = shlex.quote(_from_any_folder(basis.origin.scene))
+        make = f"<code>lightpaint template {escape(scene)}</code>"
+        text += f" Here every pixel counts; painted over what {make} renders, only the paint does."
+    return text

@@ -1,0 +1,121 @@
+"""Lights that would help, in words and as a part of the report. Sections are HTML."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from html import escape
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.denoiser import denoised
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.report.page.figures import data_uri
+from lightpaint.report.page.html import facts
+from lightpaint.report.sentences import spoken_percent
+
+#: Ring around the place of a light in the picture, dark on bright and bright on dark.
+RING = (
+    "position:absolute;width:22px;height:22px;margin:-11px 0 0 -11px;border:2px solid #fff;"
+    "border-radius:50%;box-shadow:0 0 0 1.5px #000,inset 0 0 0 1.5px #000"
+)
+
+
+def spoken_suggestions(suggestions: Sequence[Suggestion]) -> str:
+    """How much the suggested lights would help, in one sentence."""
+    if not suggestions:
+        return "No point light would surely take away a hundredth of what is missed."
+    first, last = suggestions[0], suggestions[-1]
+    beginning = f"A light at {spoken_position(first)} would take away "
+    share = f"{spoken_percent(first.gain_share)} of what is missed (in energy)"
+    if len(suggestions) == 1:
+        return f"{beginning}{share}."
+    together = spoken_percent(1 - last.missed_share)
+    return f"{beginning}{share}; all {len(suggestions)} suggested lights together, {together}."
+
+
+def spoken_position(suggestion: Suggestion) -> str:
+    """`(1.02, 2.03, 3.57)`, in units of the scene."""
+    return f"({', '.join(f'{v:.4g}' for v in suggestion.position)})".replace("-", "−")
+
+
+def suggestion_section(
+    suggestions: Sequence[Suggestion] | None,
+    *,
+    transform: ViewTransform,
+    cd_per_unit: float | None = None,
+    is_clean: bool = False,
+) -> str:
+    """Each suggested light: the picture without and with it, where it is, what to paste.
+
+    None, where nobody asked, is no section. is_clean: whether the pictures are denoised.
+    """
+    if suggestions is None:
+        return ""
+    how = (
+        "<p>Each is a point light that was tried in free space, with all lights solved anew "
+        "beside it and beside those above it. Paste it into <code>&lt;scene&gt;</code>, and "
+        "solve again: the small pictures are a quick look, and the lights are found anew.</p>"
+        if suggestions
+        else ""
+    )
+    shown = "".join(
+        _shown(
+            replace(x, without=denoised(x.without), with_it=denoised(x.with_it)) if is_clean else x,
+            before=k > 0,
+            transform=transform,
+            cd_per_unit=cd_per_unit,
+        )
+        for k, x in enumerate(suggestions)
+    )
+    return (
+        f"<section><h2>Lights that would help</h2><p>{escape(spoken_suggestions(suggestions))}</p>"
+        f"{how}{shown}</section>"
+    )
+
+
+def _shown(
+    suggestion: Suggestion, *, before: bool, transform: ViewTransform, cd_per_unit: float | None
+) -> str:
+    """before: whether others are suggested before it, which then are in both pictures."""
+    seen = suggestion.photometry(cd_per_unit)
+    amounts = ", ".join(filter(None, seen.amounts))
+    told = [
+        ("at", spoken_position(suggestion)),
+        ("intensity", f"{' '.join(f'{v:.4g}' for v in suggestion.emission)} W/sr"),
+        ("colour", seen.color),
+        ("amount", amounts),
+        ("takes away", f"{spoken_percent(suggestion.gain_share)} of what is missed"),
+        ("leaves", f"{spoken_percent(suggestion.missed_share)} of it"),
+    ]
+    listed = facts((k, v) for k, v in told if v)
+    swatch = f'<span class="swatch" style="background: {seen.hex}"></span>' if seen.hex else ""
+    where = (
+        "the ring is where it would be, perhaps behind something"
+        if suggestion.seen_at
+        else "it would be outside of the picture"
+    )
+    without = "with those above it" if before else "as solved"
+    name = escape(suggestion.name)
+    return (
+        f'<h3 style="margin-top:24px">{name}</h3><div class="maps">'
+        f"{_picture(suggestion.without, f'Without {name}', without, None, transform)}"
+        f"{_picture(suggestion.with_it, f'With {name}', where, suggestion.seen_at, transform)}"
+        f"<div>{swatch}<dl>{listed}</dl></div></div>"
+        f'<pre style="margin-top:12px">{escape(suggestion.xml)}</pre>'
+    )
+
+
+def _picture(
+    image: Floats, name: str, caption: str, at: tuple[float, float] | None, transform: ViewTransform
+) -> str:
+    height, width = image.shape[:2]
+    ring = ""
+    if at is not None:
+        place = f"left:{100 * at[0]:.2f}%;top:{100 * at[1]:.2f}%"
+        ring = f'<span style="{RING};{place}" aria-hidden="true"></span>'
+    source = data_uri(to_8_bit(transform.encode(image)))
+    return (
+        f'<figure><div style="position:relative"><img width="{width}" height="{height}" '
+        f'alt="{name}: {caption}." src="{source}">{ring}</div>'
+        f"<figcaption><strong>{name}</strong>: {caption}.</figcaption></figure>"
+    )

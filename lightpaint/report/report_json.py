@@ -1,0 +1,293 @@
+"""report.json: the numbers of a report, for programs (docs/formats.md).
+
+What stands in lighting.json, as emissions do, is not repeated. The page rounds; this does not.
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import luminance
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.color_choices import Choices, ColorChoice
+from lightpaint.lighting.analysis.diagnosis import Diagnosis
+from lightpaint.lighting.analysis.elsewhere import Elsewhere
+from lightpaint.lighting.analysis.held_back import Reason
+from lightpaint.lighting.analysis.seen import Seen, what_is_seen
+from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.solution import Solution
+from lightpaint.placement.suggestion import Suggestion
+from lightpaint.relit.power import ERROR
+from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.report.answer_pictures import (
+    Residual,
+    brighter_than_white,
+    residual_of,
+    transform_of,
+)
+from lightpaint.report.influences import meaning_of
+from lightpaint.report.measures import (
+    brighter_as_allowed,
+    codes_missed,
+    energy_shares,
+    linear_residual,
+    noise_residual,
+    relative_residual,
+)
+from lightpaint.report.page.diagnosis_section import maps_limit
+from lightpaint.report.sentences import (
+    UNTOLD_HERE,
+    brightness,
+    halving_spp,
+    most_uncertain,
+    relative_errors,
+)
+from lightpaint.target.target import Target
+from lightpaint.version import __version__
+
+FORMAT = "lightpaint-report 1"
+
+
+def report_numbers(
+    *,
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+    command: str = "",
+    uncertainty: Uncertainty | None = None,
+    diagnosis: Diagnosis | None = None,
+    unconstrained: Solution | None = None,
+    suggestions: Sequence[Suggestion] | None = None,
+    seen: Seen | None = None,
+    color_choices: Choices = (),
+    missed: Residual | None = None,
+) -> str:
+    """JSON of the numbers of `report_page`, whose arguments these are."""
+    transform = transform_of(target, basis, predicted.image)
+    residual = missed or residual_of(solution, predicted.image, transform=transform)
+    told = {
+        "format": FORMAT,
+        "lightpaint": __version__,
+        "target": target.name,
+        "command": command,
+        "basis": _basis(basis),
+        "painting": _painting(target, solution),
+        "view": {
+            "name": transform.name,
+            "stops": transform.stops,
+            "brighter_than_white": brighter_than_white(predicted.image, transform),
+            "residual_limit": residual.limit,
+            "residual_pixels": 2 * residual.radius + 1,
+        },
+        "seen": _seen(seen or what_is_seen(solution, predicted)),
+        "meant": meaning_of(solution),
+        "colors": {choice.colors: _choice(choice) for choice in color_choices} or None,
+        "fit": _fit(solution, predicted, unconstrained),
+        "lights": _lights(basis, solution, uncertainty),
+        "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
+        "uncertainty": None if uncertainty is None else _sure(basis, solution, uncertainty),
+        "verification": None if verification is None else verification_numbers(verification),
+        "suggestions": _suggested(suggestions, solution.lighting.cd_per_unit),
+    }
+    return json.dumps(finite(told), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _basis(basis: Basis) -> dict[str, Any]:
+    origin, (height, width) = basis.origin, basis.size
+    return {
+        "scene": origin.scene,
+        "sensor": origin.sensor,
+        "method": origin.method,
+        "lightpaint": origin.lightpaint,
+        "spp": origin.spp if basis.knows_noise else None,
+        "seed": origin.seed if basis.knows_noise else None,
+        "size": [width, height],
+        "adjusted": int((~basis.is_fixed).sum()),
+        "emitters_seen": int(basis.emitters_seen.sum()),
+    }
+
+
+def _painting(target: Target, solution: Solution) -> dict[str, Any]:
+    importance = solution.importance
+    return {
+        "share": target.painted_share,
+        "importance_mean": float(importance.mean()),
+        "importance_max": float(importance.max()),
+        "not_finite": target.not_finite,
+    }
+
+
+def _seen(seen: Seen) -> dict[str, Any]:
+    """Mean CIEDE2000 over what was painted, and what of that has come about."""
+    place = seen.place
+    return {
+        "delta_e": seen.delta_e,
+        "noise": seen.noise,
+        "asked": seen.asked,
+        "share_met": seen.share_met,
+        "region": None if place is None else place.region,
+        "object": place.object or None if place else None,
+        "held": seen.held or None,
+        "held_by_views": seen.held_by_views or None,
+        "reasons": [_reason(reason) for reason in seen.reasons] or None,
+        "elsewhere": _elsewhere(seen.elsewhere),
+    }
+
+
+def _reason(reason: Reason) -> dict[str, Any]:
+    """One thing that keeps the lights from the paint, and the share of the miss that it is."""
+    told: dict[str, Any] = {"kind": reason.kind, "names": reason.names or None}
+    told |= {"share": reason.share, "is_joint": reason.is_joint or None}
+    if (its := reason.loosening) is not None:
+        told |= {"weaker_hold": its.hold, "weaker_hold_share": its.share}
+        told |= {"weaker_hold_elsewhere": _elsewhere(its.elsewhere)}
+    return told
+
+
+def _elsewhere(rest: Elsewhere | None) -> dict[str, Any] | None:
+    """Change of what is not painted, in CIEDE2000."""
+    if rest is None:
+        return None
+    place = {"object": rest.object} if rest.object else {"region": rest.region}
+    return {"delta_e": rest.delta_e, "worst": rest.worst, **place}
+
+
+def _choice(choice: ColorChoice) -> dict[str, Any]:
+    """What a choice of colours comes to, and the light that it would change most."""
+    told: dict[str, Any] = {"delta_e": choice.delta_e}
+    if choice.light:
+        told |= {"light": choice.light, "before": choice.before, "color": choice.color}
+    return told
+
+
+def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
+    """RMS, relative to the painting. norm2: what relative objectives are relative to."""
+    told = {
+        "missed": relative_residual(solution),
+        "noise": noise_residual(solution, predicted),
+        "missed_without_constraints": None if free is None else relative_residual(free),
+        "off": sum(not any(light.emission) for light in solution.lighting.lights),
+        "norm2": solution.norm2.tolist(),
+        "noise_removed": solution.problem.noise_removed,
+    }
+    if solution.problem.refinement is not None:
+        told["refined"] = solution.problem.refinement.share
+    if not solution.problem.is_linear:
+        told["missed_in_linear_light"] = linear_residual(solution, predicted)
+    if solution.certificate.display:
+        told["codes_missed"] = codes_missed(solution)
+    if (brighter := brighter_as_allowed(solution, predicted.image)) is not None:
+        told["at_least"], told["at_least_and_brighter"] = brighter
+    return told
+
+
+def _lights(
+    basis: Basis, solution: Solution, uncertainty: Uncertainty | None
+) -> Mapping[str, dict[str, Any]]:
+    lighting = solution.lighting
+    shares, before = (energy_shares(basis, its) for its in (lighting, Lighting.present(basis)))
+    told: dict[str, dict[str, Any]] = {}
+    for k, (light, setting) in enumerate(zip(basis.lights, lighting.lights, strict=True)):
+        # Of the channels that reach something painted: of the others nothing is told.
+        told_of = np.array(setting.reached) | light.is_fixed
+        now, new = (float(luminance(told_of * np.array(x.emission))) for x in (light, setting))
+        told[light.name] = {
+            "share": float(shares[k]),
+            "share_before": float(before[k]),
+            "emission_before": light.emission,
+            "luminance": new,
+            "times": new / now if now > 0 else None,
+            "stops": math.log2(new / now) if now > 0 and new > 0 else None,
+        }
+    if uncertainty is not None:
+        errors, (solved, *ends) = relative_errors(uncertainty), brightness(uncertainty)
+        for k, its in enumerate(told.values()):
+            its["interval"] = [float(end[k]) for end in ends]
+            its["relative_error"] = float(errors[k])
+            its["untold"] = UNTOLD_HERE if uncertainty.untold[k] else None
+            if solved[k] > 0:
+                its["relative_interval"] = [float(end[k] / solved[k]) - 1 for end in ends]
+    return told
+
+
+def _missed(solution: Solution, d: Diagnosis, transform: ViewTransform) -> dict[str, Any]:
+    """Shares of the energy that is missed."""
+    told: dict[str, Any] = {
+        "energy": d.total,
+        "out_of_reach": d.share(d.unreachable),
+        "forbidden": d.share(d.forbidden),
+        "given_up": d.share(d.compromise),
+        "noise": d.share(d.noise),
+        "painting_noise": d.share(d.painting_noise),
+        "not_counted": d.share(d.ignored),
+        "map_limit": maps_limit(solution, d, transform=transform),
+        "bounds": [
+            {"lights": x.lights, "share": d.gained(x), "multiplier": x.multiplier} for x in d.bounds
+        ],
+        "bounds_left_out": d.bounds_left_out,
+    }
+    if d.place is not None:
+        names = ("region", "share", "box", "painted", "reached")
+        told["place"] = {name: getattr(d.place, name) for name in names}
+    return told
+
+
+def _sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[str, Any]:
+    k = most_uncertain(basis, solution, uncertainty)
+    return {
+        "excess": uncertainty.relative_excess,
+        "most_uncertain": None if k is None else basis.names[k],
+        "halving_spp": None if k is None else halving_spp(basis, uncertainty, k),
+    }
+
+
+def verification_numbers(v: Verification) -> dict[str, Any]:
+    """Whether render and prediction agree, and how far they are apart."""
+    height, width = v.verified.size
+    return {
+        "agrees": v.agrees,
+        "standard_errors": v.difference,
+        "limit": LIMIT,
+        "size": [width, height],
+        "rmse": v.rmse,
+        "noise_rmse": v.noise_rmse,
+        "z_mean": v.z_mean,
+        "z_pattern": v.z_pattern,
+        "z_rms": v.z_rms,
+        "delta_e_mean": v.delta_e_mean,
+        "delta_e_95": v.delta_e_95,
+        "power": None if v.power is None else {"error": ERROR, "lights": dict(v.power)},
+    }
+
+
+def _suggested(
+    suggestions: Sequence[Suggestion] | None, cd_per_unit: float | None
+) -> list[dict[str, Any]] | None:
+    if suggestions is None:
+        return None
+    names = ("name", "position", "emission", "gain_share", "missed_share", "seen_at", "xml")
+    return [
+        {name: getattr(x, name) for name in names}
+        | {"photometry": x.photometry(cd_per_unit).fields(), "together": 1 - x.missed_share}
+        for x in suggestions
+    ]
+
+
+def finite(told: Any) -> Any:
+    """The same without what there is none of, and without NumPy's numbers."""
+    if isinstance(told, Mapping):
+        held = {key: finite(value) for key, value in told.items()}
+        return {key: value for key, value in held.items() if value is not None}
+    if isinstance(told, list | tuple):
+        return [finite(value) for value in told]
+    if isinstance(told, np.generic):
+        told = told.item()
+    return None if isinstance(told, float) and not math.isfinite(told) else told

@@ -1,0 +1,1 @@
+"""The lights of a scene: its emitters, their emissions, and the file that groups them."""

@@ -1,0 +1,211 @@
+"""The emitters of a loaded scene, as Mitsuba has them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import RGB
+from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
+from lightpaint.errors import SceneError
+from lightpaint.scene.lights.emission import (
+    AS_AUTHORED,
+    ENVIRONMENTS,
+    PLUGINS,
+    EmissionKind,
+    Scaling,
+    emission_kind,
+    read_emission,
+    why_not_adjusted,
+)
+from lightpaint.scene.lights.emitter_names import hangs_on, has_name
+from lightpaint.scene.scene_tree import ParsedScene
+from lightpaint.validation import MAX_NAME
+
+#: Emitters that no RGB variant of Mitsuba renders as they are meant, and what to do about them.
+NOT_RENDERED = {"timed_sunsky": "use sunsky with the hour you want"}
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """One emitter of a scene.
+
+    kind: how it is scaled; None where lightpaint cannot.
+    emission: present linear RGB emission in the unit of `kind`; 1 for what is a multiple.
+    file, offset: where its element's `<` stands: index into Scene.files, byte offset.
+    obstacle: why it cannot be solved for, in words behind its name; "" if it can.
+    unit_flux: watts per channel at an emission of 1; None where there is no such number.
+    has_name: whether somebody chose its name, and it is not made up here.
+    hangs_on: of one that has none, the name of its material, file or parent; "" if there is none.
+    """
+
+    name: str
+    plugin: str
+    kind: EmissionKind | None
+    emission: RGB
+    form: str
+    sampling_weight: float
+    node: int
+    file: int
+    offset: int
+    obstacle: str = ""
+    unit_flux: float | None = None
+    has_name: bool = True
+    hangs_on: str = ""
+
+    def __repr__(self) -> str:
+        return f"Emitter({self.name!r}, {self.plugin} {self.form})"
+
+    @property
+    def by_chance(self) -> bool:
+        """Whether only rays that happen to hit it may find it: it is never sampled.
+
+        Meshes painted by an attribute: Mitsuba's sampling of these and the probability that it
+        states for it do not agree, so that a render would depend on the sampling weights, and
+        with them on which other lights are on.
+        """
+        return self.plugin == "area" and self.kind is not None and self.kind.is_scalar
+
+
+def point_emitter(name: str, node: int, position: tuple[float, float, float]) -> Emitter:
+    """A point light of intensity 1 that stands in no file."""
+    parameter, unit = PLUGINS["point"]
+    x, y, z = position
+    return Emitter(
+        name=name,
+        plugin="point",
+        kind=EmissionKind(Scaling.COLOUR, parameter, unit),
+        emission=AS_AUTHORED,
+        form=f"at ({x:.2f}, {y:.2f}, {z:.2f})",
+        sampling_weight=1.0,
+        node=node,
+        file=0,
+        offset=-1,
+        unit_flux=point_flux(),
+    )
+
+
+def find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
+    """The emitters that take part in the scene, in document order."""
+    node_of = {name: node for node, name in parsed.names.items()}
+    found = []
+    for emitter in loaded.emitters():
+        name = emitter.id()
+        if name not in node_of:
+            raise SceneError(f"emitter {name!r} does not stand in {parsed.path} as itself")
+        node = parsed.state.nodes[node_of[name]]
+        plugin = node.props.plugin_name()
+        kind = emission_kind(emitter, plugin)
+        if kind is None:
+            check_rendered(emitter, plugin, name, parsed.integrator().plugin)
+        emission = read_emission(emitter, kind, name)
+        found.append(
+            Emitter(
+                name=name,
+                plugin=plugin,
+                kind=kind,
+                emission=emission,
+                form=describe_form(emitter, plugin),
+                sampling_weight=float(emitter.sampling_weight()),
+                node=node_of[name],
+                file=node.file_index,
+                offset=node.offset - 1,
+                obstacle=why_not_adjusted(plugin, kind, emission),
+                unit_flux=flux_of_unit(emitter, plugin, kind),
+                has_name=has_name(parsed, node_of[name]),
+                hangs_on=hangs_on(parsed, node_of[name]),
+            )
+        )
+    return tuple(sorted(found, key=lambda emitter: emitter.node))
+
+
+def check_emitters(path: Path, emitters: Sequence[Emitter]) -> None:
+    """Raise SceneError for a scene without light, and for a name that nobody can mean."""
+    if not emitters:
+        raise SceneError(f"{path} has no lights: add at least one emitter")
+    if max(len(emitter.name) for emitter in emitters) > MAX_NAME:
+        raise SceneError(f"{path} has an emitter whose name has more than {MAX_NAME} characters")
+
+
+def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> None:
+    """Raise SceneError if `integrator` cannot render the emitter, though Mitsuba has loaded it."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if plugin in NOT_RENDERED:
+        raise SceneError(
+            f"light {name!r} is a {plugin} emitter, which Mitsuba cannot render here: "
+            f"{NOT_RENDERED[plugin]}"
+        )
+    # What is not implemented fails when it is first asked for; after a render that failed, the
+    # process would be good for nothing.
+    middle = mi.Point2f(0.5)
+    try:
+        emitter.sample_direction(dr.zeros(mi.SurfaceInteraction3f), middle)
+        if integrator == "ptracer":
+            emitter.sample_ray(0.0, 0.5, middle, middle)
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise SceneError(
+            f"light {name!r} cannot be rendered by {integrator} in {mi.variant()}: Mitsuba says "
+            f"{reason!r}; give it a colour, <rgb .../>"
+        ) from None
+
+
+def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float | None:
+    """Watts that a loaded emitter of one colour radiates at an emission of 1, by its form.
+
+    In W where a unit of the scene is a metre. None for what has no flux of its own (a sky, a
+    sun) and for what is not of one colour in all directions.
+    """
+    import mitsuba as mi
+
+    if kind is None or kind.scaling is not Scaling.COLOUR:
+        return None
+    if plugin == "area":
+        return lambertian_flux(float(np.array(emitter.get_shape().surface_area()).ravel()[0]))
+    if plugin == "point":
+        return point_flux()
+    if plugin != "spot":
+        return None
+    parameters = mi.traverse(emitter)
+    axes = np.array(parameters["to_world"].matrix, dtype=float).reshape(4, 4)[:3, :3]
+    squares = axes.T @ axes
+    texture = np.array(parameters["texture.value"]) if "texture.value" in parameters else None
+    # A cone that is sheared or stretched is no cone, and a picture has no closed form. Both
+    # thresholds are Mitsuba's float32.
+    is_cone = np.allclose(squares, squares[0, 0] * np.eye(3), atol=1e-4 * squares[0, 0])
+    if texture is None or not is_cone or np.ptp(texture) > 1e-6:
+        return None
+    angles = (np.array(parameters[key]).ravel()[0] for key in ("cutoff_angle", "beam_width"))
+    cutoff, beam_width = (math.radians(float(angle)) for angle in angles)
+    return float(texture.mean()) * spot_flux(cutoff, beam_width)
+
+
+def describe_form(emitter: Any, plugin: str) -> str:
+    """Where a loaded emitter is and how large, in scene units, for people to read."""
+    import mitsuba as mi
+
+    def at(point: Any) -> str:
+        x, y, z = np.array(point, dtype=float).ravel()[:3]
+        return f"({x:.2f}, {y:.2f}, {z:.2f})"
+
+    shape = emitter.get_shape()
+    if shape is not None:
+        box = shape.bbox()
+        area = float(np.array(shape.surface_area()).ravel()[0])
+        return f"area {area:.3g} at {at(box.center())}"
+    if plugin in ENVIRONMENTS:
+        return "all around"
+    parameters = mi.traverse(emitter)
+    if "position" in parameters:
+        return f"at {at(parameters['position'])}"
+    if "to_world" not in parameters:
+        return ""
+    matrix = np.array(parameters["to_world"].matrix, dtype=float).reshape(4, 4)
+    if plugin == "directional":
+        return f"towards {at(matrix[:3, 2])}"
+    return f"at {at(matrix[:3, 3])} towards {at(matrix[:3, 2])}"

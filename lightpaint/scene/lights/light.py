@@ -1,0 +1,191 @@
+"""Lights as people adjust them: one emitter, or several tied together under one weight."""
+
+import itertools
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from lightpaint.arrays import RGB
+from lightpaint.errors import SceneError
+from lightpaint.scene.lights.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
+from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.screen import some_names
+
+#: What emission scales in a light that is a multiple of what the scene has.
+WHOLE_EMISSION = "emission"
+
+
+def free_names(stem: str, count: int, taken: Collection[str]) -> list[str]:
+    """`stem_1`, `stem_2` … without those that are taken."""
+    numbered = (f"{stem}_{k}" for k in itertools.count(1))
+    return list(itertools.islice((name for name in numbered if name not in taken), count))
+
+
+@dataclass(frozen=True)
+class Light:
+    """What a person adjusts: one emitter, or several tied together under one weight.
+
+    parameter, unit: what one unit of weight is. With the unit MULTIPLE the weight multiplies
+    what each member has in the scene; with any other it is the emission of each.
+    emission: present RGB emission in `unit`.
+    is_scalar: whether it has one weight for all channels instead of three.
+    is_fixed: whether it is all that stays as it is, with weight 1.
+    is_found: whether nobody tied its members, but that they are many, alike and without names.
+    """
+
+    name: str
+    members: tuple[Emitter, ...]
+    parameter: str
+    unit: str
+    emission: RGB
+    is_scalar: bool = False
+    is_fixed: bool = False
+    is_found: bool = False
+
+    def __repr__(self) -> str:
+        emission = " ".join(f"{v:.4g}" for v in self.emission)
+        kept = ", kept" if self.is_fixed else ""
+        of = "" if len(self.members) == 1 else f", {len(self.members)} emitters"
+        what = f"{self.plugin} {self.parameter} {emission} {self.unit}"
+        return f"Light({self.name!r}, {what}{of}{kept})"
+
+    @property
+    def member_names(self) -> tuple[str, ...]:
+        """Names of its emitters."""
+        return tuple(member.name for member in self.members)
+
+    @property
+    def plugin(self) -> str:
+        """Mitsuba's name of the emitter plugin; `area + point` where members differ."""
+        return " + ".join(dict.fromkeys(member.plugin for member in self.members))
+
+    @property
+    def form(self) -> str:
+        """Place and size in words; for several emitters, which."""
+        if len(self.members) == 1:
+            return self.members[0].form
+        return f"{len(self.members)} emitters: {some_names(self.member_names)}"
+
+    @property
+    def unit_flux(self) -> RGB | None:
+        """Watts per channel at an emission of 1, of all members together.
+
+        None where one of them has no flux that is known.
+        """
+        total = [0.0, 0.0, 0.0]
+        for member in self.members:
+            if member.unit_flux is None:
+                return None
+            for k, emission in enumerate(self.emission_of(member, (1.0, 1.0, 1.0))):
+                total[k] += emission * member.unit_flux
+        return total[0], total[1], total[2]
+
+    def emission_of(self, member: Emitter, emission: RGB) -> RGB:
+        """What `member` emits, in its own unit, where this light has `emission`."""
+        if self.unit != MULTIPLE:
+            return emission
+        r, g, b = (w * own for w, own in zip(emission, member.emission, strict=True))
+        return r, g, b
+
+
+def tie(name: str, members: Sequence[Emitter]) -> Light:
+    """The light `name` made of emitters that share one weight.
+
+    If all have one colour, in the same unit and of the same value, that colour is the
+    unknown; so it is if all are black. Otherwise the unknown is a factor: what they are in
+    proportion to each other, they stay. Raises SceneError if that is nothing, because all
+    are black and differ in kind.
+    """
+    kinds = {member.kind for member in members}
+    first = members[0]
+    is_colour = len(kinds) == 1 and first.kind is not None and _is_colour(first)
+    if is_colour and len({member.emission for member in members}) == 1:
+        assert first.kind is not None
+        return Light(name, tuple(members), first.kind.parameter, first.kind.unit, first.emission)
+    if not any(any(member.emission) for member in members):
+        listed = some_names(f"{m.name} ({m.plugin})" for m in members)
+        raise SceneError(
+            f"group {name!r} has only black lights of different kinds, {listed}, so nothing "
+            "says how bright they are relative to each other: give one of them a colour"
+        )
+    parameters = {member.kind.parameter for member in members if member.kind is not None}
+    return Light(
+        name,
+        tuple(members),
+        parameters.pop() if len(parameters) == 1 else WHOLE_EMISSION,
+        MULTIPLE,
+        AS_AUTHORED,
+        is_scalar=any(kind is not None and kind.is_scalar for kind in kinds),
+    )
+
+
+def _is_colour(emitter: Emitter) -> bool:
+    return emitter.kind is not None and emitter.kind.scaling is Scaling.COLOUR
+
+
+def keep(name: str, emitters: Sequence[Emitter]) -> Light:
+    """The fixed light `name` of all `emitters` that stay as they are."""
+    return Light(name, tuple(emitters), WHOLE_EMISSION, MULTIPLE, AS_AUTHORED, is_fixed=True)
+
+
+def lights_of(
+    emitters: Sequence[Emitter], members: Mapping[str, Sequence[str]], fixed: Collection[str]
+) -> tuple[Light, ...]:
+    """The lights `members` (name → names of its emitters), of which those in `fixed` are kept.
+
+    Raises SceneError if an adjusted one holds an emitter that cannot be scaled.
+    """
+    by_name = {emitter.name: emitter for emitter in emitters}
+    lights = []
+    for name, names in members.items():
+        its = sorted((by_name[n] for n in names), key=lambda emitter: emitter.node)
+        if name not in fixed:
+            check_adjustable(its)
+        lights.append(keep(name, its) if name in fixed else tie(name, its))
+    return tuple(sorted(lights, key=lambda light: (light.is_fixed, light.members[0].node)))
+
+
+def light_named(name: str, lights: Sequence[Light], *, scene: str) -> Light:
+    """The light called `name`. Raises SceneError if there is none."""
+    for light in lights:
+        if light.name == name:
+            return light
+    raise SceneError(f"{scene} has no light {name!r}: it has {some_names(x.name for x in lights)}")
+
+
+def settings_for(
+    lights: Sequence[Light],
+    emitters: Sequence[Emitter],
+    emission: Mapping[str, RGB],
+    *,
+    scene: str,
+) -> dict[int, EmitterSetting]:
+    """What emitters are set to, by their nodes, where `emission` is that of lights, by name."""
+    settings: dict[int, EmitterSetting] = {}
+    for name, rgb in emission.items():
+        light = light_named(name, lights, scene=scene)
+        if not light.is_fixed:
+            settings |= {m.node: _setting(m, light.emission_of(m, rgb)) for m in light.members}
+        elif not any(rgb):
+            settings |= {m.node: _setting(m, rgb) for m in light.members}
+        elif tuple(rgb) != AS_AUTHORED:
+            raise SceneError(f"what is kept can be loaded black or as it is, not times {rgb}")
+    own = {emitter.node: emitter.sampling_weight for emitter in emitters}
+    if not any((own | {node: x.sampling_weight for node, x in settings.items()}).values()):
+        # Mitsuba refuses a scene in which no emitter may be sampled.
+        return {node: replace(x, sampling_weight=own[node] or 1.0) for node, x in settings.items()}
+    return settings
+
+
+def _setting(emitter: Emitter, rgb: RGB) -> EmitterSetting:
+    # An emitter the scene keeps switched off is sampled again once it shines.
+    weight = (emitter.sampling_weight or 1.0) if any(rgb) and not emitter.by_chance else 0.0
+    return EmitterSetting(emitter.kind, rgb, weight)
+
+
+def check_adjustable(emitters: Iterable[Emitter]) -> None:
+    """Raise SceneError for the first that cannot be scaled."""
+    for emitter in emitters:
+        if emitter.obstacle:
+            raise SceneError(
+                f"light {emitter.name!r} {emitter.obstacle}, so it can only stay as it is"
+            )

@@ -1,0 +1,166 @@
+"""The lights file: which lights to adjust and which go together, in a TOML beside the scene.
+
+For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. What it asks of the
+lights in the solve is kept as it stands (lighting/constraints/file.py makes something of it).
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from lightpaint.errors import SceneError
+from lightpaint.files import one_line, read_text
+from lightpaint.storage.json_records import strict_toml
+from lightpaint.validation import MAX_LISTED, MAX_NAME
+
+SUFFIX = ".lights.toml"
+#: What asks for something in the solve.
+CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
+#: What files called `prefer_current` before, as `prefer = { current = 0.01 }`.
+OLDER = ("prefer",)
+KNOWN = ("lights", "groups", "group_alike", *CONSTRAINTS)
+
+#: Longest lights file that is read, in bytes.
+MAX_BYTES = 2**20
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a lights file asks of the lights in the solve: CONSTRAINTS, as they stand there.
+
+    source: the file, for errors; "" where there is none, and nothing is asked.
+    """
+
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ""
+
+    @classmethod
+    def of(cls, path: Path, data: Mapping[str, Any]) -> "Asked":
+        """Of all keys of the lights file at `path`."""
+        return cls({key: data[key] for key in (*CONSTRAINTS, *OLDER) if key in data}, str(path))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names and patterns of lights, of which something is asked."""
+        lights, ties = self.keys.get("light"), self.keys.get("tie")
+        return (*(lights if isinstance(lights, dict) else ()), *_texts(ties))
+
+
+@dataclass(frozen=True)
+class LightsFile:
+    """What a lights file says. path: None if there is none.
+
+    lights, groups, group_alike: as `choose_lights` takes them. asked: what is for the solve.
+    """
+
+    path: Path | None = None
+    lights: Iterable[str] | None = None
+    groups: Mapping[str, Iterable[str]] = field(default_factory=dict)
+    asked: Asked = field(default_factory=Asked)
+    group_alike: bool = True
+
+    def with_more(
+        self, lights: Iterable[str] | None, groups: Mapping[str, Iterable[str]] | None
+    ) -> "LightsFile":
+        """With what was given along with it: `lights` replaces its own, `groups` are added."""
+        groups = groups or {}
+        if lights is None and self.lights is not None:
+            # Who makes a group here and now means to adjust it.
+            lights = (*self.lights, *groups)
+        return replace(self, lights=lights, groups={**self.groups, **groups})
+
+
+def lights_file_beside(scene: Path) -> Path:
+    """Where the lights file of `scene` lies if it has one."""
+    return scene.with_name(scene.stem + SUFFIX)
+
+
+def lights_file_for(scene: Path, named: str | Path | None, *, beside: bool) -> LightsFile:
+    """What is read for `scene`: the file `named`, else the one beside it, if `beside` allows."""
+    if named is not None:
+        return read_lights_file(Path(named))
+    path = lights_file_beside(scene)
+    return read_lights_file(path) if beside and path.is_file() else LightsFile()
+
+
+def read_lights_file(path: Path) -> LightsFile:
+    """Read a lights file.
+
+    Raises SceneError, with the line where the TOML is wrong, or with the key that is.
+    """
+    data = read_keys(path)
+    groups, group_alike = data.get("groups", {}), data.get("group_alike", True)
+    if not isinstance(group_alike, bool):
+        said = one_line(repr(group_alike))
+        raise SceneError(f"{path}: group_alike is true or false, not {said}")
+    if not isinstance(groups, dict):
+        raise SceneError(f'{path}: groups is a table, [groups], with lines like a = ["b", "c"]')
+    return LightsFile(
+        path,
+        _names(path, "lights", data["lights"]) if "lights" in data else None,
+        {name: _names(path, f"groups.{one_line(name)}", its) for name, its in groups.items()},
+        Asked.of(path, data),
+        group_alike,
+    )
+
+
+def read_keys(path: Path) -> dict[str, Any]:
+    """All keys of a lights file, none of them unknown. Raises SceneError."""
+    text = read_text(path, "lights file", SceneError, limit=MAX_BYTES, may_be_empty=True)
+    try:
+        data = strict_toml(text)
+    except ValueError as error:
+        end = f"at line {text.rstrip().count(chr(10)) + 1}, the end"
+        reason = one_line(str(error).replace("at end of document", end))
+        raise SceneError(f"{path} is not TOML: {reason}") from None
+    if unknown := [key for key in data if key not in (*KNOWN, *OLDER)]:
+        raise SceneError(
+            f"{path}: unknown key {one_line(repr(unknown[0]))}; known are {', '.join(KNOWN)}"
+        )
+    if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
+        raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")
+    if (count := sum(1 for _ in _texts_in(data))) > MAX_LISTED:
+        raise SceneError(f"{path} names {count} lights and more: at most {MAX_LISTED} are read")
+    if any(len(text) > MAX_NAME for text in _texts_in(data)):
+        raise SceneError(f"{path} has a name of more than {MAX_NAME} characters")
+    return data
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """All texts in lists, and in the `lights` of tables."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from _texts(value.get("lights"))
+    elif isinstance(value, list):
+        for one in value:
+            yield from _texts(one)
+
+
+def _texts_in(value: Any) -> Iterator[str]:
+    """All keys and texts, however deep."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        yield from value
+        for one in value.values():
+            yield from _texts_in(one)
+    elif isinstance(value, list):
+        for one in value:
+            yield from _texts_in(one)
+
+
+def _integers(value: Any) -> Iterator[int]:
+    if isinstance(value, int):
+        yield value
+    elif isinstance(value, dict | list):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from _integers(one)
+
+
+def _names(path: Path, key: str, value: Any) -> tuple[str, ...]:
+    if not (isinstance(value, list) and value and all(isinstance(v, str) and v for v in value)):
+        said = one_line(repr(value))
+        raise SceneError(f'{path}: {key} is a list of at least one name, ["a", "b"], not {said}')
+    return tuple(value)

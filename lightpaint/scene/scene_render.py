@@ -1,0 +1,172 @@
+"""Ordinary Mitsuba renders of a scene, in passes, as an `Estimate` with its noise."""
+
+from collections.abc import Mapping, Sequence
+from enum import IntEnum
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Doubles, Floats
+from lightpaint.errors import SceneError
+from lightpaint.images.estimate import Estimate
+from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.progress import Progress, silent
+from lightpaint.scene.runtime.kernel_threads import kernels
+from lightpaint.scene.runtime.render_lock import tracing
+from lightpaint.scene.scene import Scene
+
+#: Camera samples in one pass: a running kernel cannot be interrupted, and a pass is what
+#: memory is taken for, so passes are short.
+SAMPLES_PER_PASS = 2**21
+
+#: Camera samples of the passes that are added up by themselves.
+SAMPLES_PER_RANGE = 2**22
+
+
+class Stream(IntEnum):
+    """What random numbers are drawn for; equal seeds in two streams share none."""
+
+    BASIS = 0
+    VERIFICATION = 1
+    TEMPLATE = 2
+    NUMBERS = 3
+    SECOND_VERIFICATION = 4
+    REFINEMENT = 5
+    VIEW = 6
+    SURFACES = 7
+    CANDIDATES = 8
+
+
+def pass_seed(seed: int, stream: Stream, index: int) -> int:
+    """The 32-bit seed of pass `index`: unrelated for any other seed, stream or index."""
+    return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
+
+
+def view_seed(seed: int, sensor: int) -> int:
+    """The seed of a view: no two share random numbers, so that their noise is independent."""
+    return seed if sensor == 0 else pass_seed(seed, Stream.VIEW, sensor)
+
+
+def largest_pass(pixels: int, *, shorter: int = 1) -> int:
+    """Samples per pixel of a whole pass. shorter: the part of SAMPLES_PER_PASS it may have."""
+    return max(1, SAMPLES_PER_PASS // shorter // pixels)
+
+
+def plan_passes(
+    pixels: int, spp: int, *, done: tuple[int, int] = (0, 0), shorter: int = 1, step: int = 1
+) -> list[tuple[int, int]]:
+    """(half 0 or 1, samples per pixel) of each pass that is left to do, the halves in turn.
+
+    spp: what both halves come to together, or a little more to make them equal.
+    done: samples per pixel that each half has already. step: they come in multiples of this.
+    """
+    if spp < 2:
+        raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
+    largest = max(1, largest_pass(pixels, shorter=shorter) // step)
+    lists = []
+    # An interrupt may have left the second half behind: its turn is next.
+    for half in (0, 1) if done[0] <= done[1] else (1, 0):
+        left = -(-max(0, -(-spp // 2) - done[half]) // step)
+        sizes = [largest] * (left // largest) + [left % largest] * (left % largest > 0)
+        lists.append([(half, size * step) for size in sizes])
+    return [one for pair in zip_longest(*lists) for one in pair if one is not None]
+
+
+def render(
+    scene: Scene,
+    emission: Mapping[str, RGB] | None = None,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    stream: Stream,
+    label: str = "render",
+    progress: Progress = silent,
+) -> Estimate:
+    """Render `scene` with its own integrator and the given emissions (its own by default).
+
+    spp: samples per pixel in all (the scene's own number by default).
+    Returns linear Rec.709 radiance, (h, w, 3).
+    """
+
+    def rendered(loaded: Any) -> Estimate:
+        return render_loaded(
+            loaded, scene, spp=spp, seed=seed, stream=stream, label=label, progress=progress
+        )
+
+    return scene.while_loaded(rendered, emission)
+
+
+def render_loaded(
+    loaded: Any,
+    scene: Scene,
+    *,
+    spp: int | None = None,
+    seed: int,
+    stream: Stream,
+    label: str = "render",
+    progress: Progress = silent,
+) -> Estimate:
+    """As `render`, for a scene that is already loaded."""
+    passes = passes_of(scene, spp)
+    sums = np.zeros((2, *scene.size, 3), np.float64)
+    progress(label, 0, len(passes))
+    with tracing() as let_others_through:
+        for some in ranges_of(scene, passes):
+            its = np.zeros_like(sums)
+            for k in some:
+                half, pass_spp = passes[k]
+                its[half] += pass_sum(loaded, scene, k, pass_spp, seed=seed, stream=stream)
+                progress(label, k + 1, len(passes))
+                let_others_through()
+            sums += its
+    return estimate_of(sums, passes)
+
+
+def passes_of(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
+    """(half, samples per pixel) of all passes of an ordinary render, which go by their numbers."""
+    height, width = scene.size
+    step = scene.film.block_pixels
+    return plan_passes(height * width, scene.spp if spp is None else spp, step=step)
+
+
+def ranges_of(scene: Scene, passes: Sequence[tuple[int, int]]) -> list[range]:
+    """Ranges of passes that are added up by themselves, so that others may render some of them."""
+    height, width = scene.size
+    largest = max((spp for _, spp in passes), default=1)
+    size = max(1, SAMPLES_PER_RANGE // (height * width * largest))
+    return [range(k, min(k + size, len(passes))) for k in range(0, len(passes), size)]
+
+
+def pass_sum(
+    loaded: Any, scene: Scene, number: int, spp: int, *, seed: int, stream: Stream
+) -> Doubles:
+    """The undivided sum of a pass, (h, w, 3) float64."""
+    image = render_pass(loaded, scene, seed=pass_seed(seed, stream, number), spp=spp)
+    return spp * image.astype(np.float64)
+
+
+def estimate_of(sums: Doubles, passes: Sequence[tuple[int, int]]) -> Estimate:
+    """The picture of undivided sums of both halves, (2, h, w, 3), which are overwritten."""
+    sums /= sum(size for _, size in passes) / 2
+    return Estimate.of_halves(as_float32(sums[0]), as_float32(sums[1]))
+
+
+def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
+    """What the scene's own integrator makes of so many samples per pixel, (h, w, 3).
+
+    spp: a multiple of the pixels of a block of the film.
+    """
+    import mitsuba as mi
+
+    film = scene.film
+    spp //= film.block_pixels
+    with kernels():
+        image = np.array(mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp))
+    # Integrators that wrap another add channels of their own behind R, G and B.
+    return block_mean(image[..., :3], film.block)
+
+
+def as_float32(image: Floats) -> Floats:
+    """The image in the precision that images are kept and written in."""
+    return image.astype(np.float32)

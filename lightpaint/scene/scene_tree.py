@@ -1,0 +1,354 @@
+"""Mitsuba's parsed form of a scene XML, and how loaded scenes are made of it.
+
+What Mitsuba parsed is kept and copied for every load: instantiating changes it, and only one
+loaded scene should be alive at a time.
+"""
+
+import hashlib
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from copy import copy
+from pathlib import Path
+from typing import Any
+
+from lightpaint.arrays import Position
+from lightpaint.errors import SceneError
+from lightpaint.files import one_line, unnamed
+from lightpaint.scene.checks.assets import check_assets
+from lightpaint.scene.checks.xml import check_nodes, check_xml
+from lightpaint.scene.film import Film
+from lightpaint.scene.integrator import (
+    Integrator,
+    IntegratorChoice,
+    integrator_nodes,
+    read_integrator,
+    replace_integrator,
+)
+from lightpaint.scene.lights.emission import EmitterSetting, child_named, set_emission
+from lightpaint.scene.normals import settle_normals
+from lightpaint.scene.runtime.plugins import UnknownPluginError, check_plugins
+
+#: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
+MAX_SAID = 2000
+
+
+class ParsedScene:
+    """The nodes of a scene XML, by Mitsuba's own parser."""
+
+    def __init__(
+        self,
+        path: Path,
+        parameters: Mapping[str, str],
+        variant: str,
+        instead: IntegratorChoice | None = None,
+    ) -> None:
+        """instead: an integrator in the place of the scene's own."""
+        import mitsuba as mi
+
+        self.path = path
+        self.parameters = parameters
+        self.config = mi.parser.ParserConfig(variant)
+        # Merged meshes would lose the order and the names of their emitters.
+        self.config.merge_meshes = False
+        self.resolver = mi.FileResolver(mi.file_resolver())
+        self.resolver.prepend(str(path.resolve().parent))
+        with self._resolving(), mitsuba_errors(path):
+            check_xml(path, parameters, mi.file_resolver())
+            self.state = mi.parser.parse_file(self.config, str(path), **parameters)
+            # Mitsuba takes properties that were looked at for used, and reports the others.
+            check_nodes(path, mi.parser.ParserState(self.state))
+            mi.parser.transform_all(self.config, self.state)
+            has_exr = check_assets(path, mi.parser.ParserState(self.state), self.resolver)
+            # Thrown in one of several threads, what its OpenEXR reader makes of a damaged table of
+            # offsets now and then ends the process.
+            self.config.parallel = self.config.parallel and not has_exr
+        if self.state.nodes[0].props.plugin_name() != "scene":
+            raise SceneError(f"{path} is not a scene: its root element must be <scene>")
+        self.files = tuple(Path(str(f)) for f in self.state.files)
+        self.instead, self.replaced = self._replace_integrator(instead)
+        with mitsuba_errors(path, self.instead):
+            check_plugins(self.state, self.resolver)
+        kinds = mi.ObjectType
+        self.emitter_nodes = self._nodes_of(kinds.Emitter)
+        self.sensor_nodes = self.children_of(0, kinds.Sensor)
+        self.sensor_names = tuple(
+            self.state.nodes[k].props.id() or f"sensor_{i}" for i, k in enumerate(self.sensor_nodes)
+        )
+        self.shape_of = {
+            child: shape
+            for shape in self._nodes_of(kinds.Shape)
+            for child in self.children_of(shape, kinds.Emitter)
+        }
+        self.parent_of = {
+            child: shape
+            for shape in self._nodes_of(kinds.Shape)
+            for child in self.children_of(shape, kinds.Shape)
+        }
+        self.names = self._name_lights()
+
+    def _replace_integrator(
+        self, instead: IntegratorChoice | None
+    ) -> tuple[IntegratorChoice | None, tuple[tuple[int, int], ...]]:
+        """The one that is put in, and where what it replaces stands: index of file, byte offset."""
+        if instead is None:
+            return None, ()
+        nodes = [self.state.nodes[k] for k in integrator_nodes(self.state)]
+        # The parser's offset is just behind the `<`.
+        places = tuple((int(node.file_index), int(node.offset) - 1) for node in nodes)
+        return replace_integrator(self.state, instead), places
+
+    def _nodes_of(self, kind: Any) -> list[int]:
+        return [k for k, node in enumerate(self.state.nodes) if node.type == kind]
+
+    def children_of(self, parent: int, kind: Any = None) -> list[int]:
+        """Nodes that stand in that one, or are referred to by it; kind: only those of it."""
+        import mitsuba as mi
+
+        props = self.state.nodes[parent].props
+        reference = mi.Properties.Type.ResolvedReference
+        children = [props[k].index() for k in props if props.type(k) == reference]
+        return [c for c in children if kind is None or self.state.nodes[c].type == kind]
+
+    def _name_lights(self) -> dict[int, str]:
+        """Names by node: emitter id, else the id of its shape, else `<plugin>_<k>`."""
+        names: dict[int, str] = {}
+        taken: set[str] = set()
+        count: dict[str, int] = {}
+        for node in self.emitter_nodes:
+            props = self.state.nodes[node].props
+            plugin = props.plugin_name()
+            count[plugin] = count.get(plugin, -1) + 1
+            shape = self.shape_of.get(node)
+            shape_id = self.state.nodes[shape].props.id() if shape is not None else ""
+            base = props.id() or shape_id or f"{plugin}_{count[plugin]}"
+            name, k = base, 2
+            while name in taken:
+                name, k = f"{base}_{k}", k + 1
+            taken.add(name)
+            names[node] = name
+        return names
+
+    def instantiate(self, settings: Mapping[int, EmitterSetting], film: Film | None = None) -> Any:
+        """Make a `mi.Scene`, its emitters set by node.
+
+        film: put in the place of its sensor's own; None leaves all as they are.
+        """
+        import mitsuba as mi
+
+        state = mi.parser.ParserState(self.state)
+        for node, name in self.names.items():
+            state.nodes[node].props.set_id(name)
+        # Sensors that belong to shapes stand among the others once loaded: ids tell them apart.
+        for node, name in zip(self.sensor_nodes, self.sensor_names, strict=True):
+            state.nodes[node].props.set_id(name)
+        for node, setting in settings.items():
+            set_emission(state, node, setting, on_shape=node in self.shape_of)
+        if film is not None:
+            props = state.nodes[self.sensor_nodes[film.sensor]].props
+            for key in list(props):
+                reference = mi.Properties.Type.ResolvedReference
+                if (
+                    props.type(key) == reference
+                    and state.nodes[props[key].index()].type == mi.ObjectType.Film
+                ):
+                    del props[key]
+            props["film"] = film.load()
+        with self._resolving(), mitsuba_errors(self.path, self.instead):
+            scene = mi.parser.instantiate(self.config, state)
+        settle_normals(scene)
+        return scene
+
+    def lit_by_points(
+        self, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
+    ) -> "ParsedScene":
+        """This scene with point lights of intensity 1 added, and the settings `dark` made.
+
+        positions: by the names of the new lights, which no other has. The nodes of these come
+        last, in that order.
+        """
+        import mitsuba as mi
+
+        other = copy(self)
+        other.state = mi.parser.ParserState(self.state)
+        for node, setting in dark.items():
+            set_emission(other.state, node, setting, on_shape=node in self.shape_of)
+        other.emitter_nodes, other.names = [*self.emitter_nodes], dict(self.names)
+        for name, position in positions.items():
+            node = mi.parser.SceneNode()
+            node.type = mi.ObjectType.Emitter
+            node.props = mi.Properties("point")
+            node.props["position"] = mi.ScalarPoint3f(*position)
+            node.props["intensity"] = mi.ScalarColor3f(1)
+            other.state.nodes.append(node)
+            k = len(other.state.nodes) - 1
+            other.state.nodes[0].props[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(k)
+            other.emitter_nodes.append(k)
+            other.names[k] = name
+        return other
+
+    def moved(self, old: Path, new: Path) -> "ParsedScene":
+        """This scene, all of whose files in the folder `old` are about to be moved to `new`."""
+        import mitsuba as mi
+
+        other = copy(self)
+        other.path = new / self.path.relative_to(old)
+        other.files = tuple(moved(file, old, new) for file in self.files)
+        other.resolver = mi.FileResolver(self.resolver)
+        other.resolver.clear()
+        for k in range(len(self.resolver)):
+            other.resolver.append(str(moved(Path(str(self.resolver[k])), old, new)))
+        return other
+
+    def image_file(self, node: int, parameter: str) -> tuple[Path, bool]:
+        """(file, whether its values are linear as they stand) of the image that emitter emits."""
+        texture = child_named(self.state, node, parameter)
+        props = self.state.nodes[node if texture is None else texture].props
+        if "filename" not in props:
+            raise SceneError(f"light {self.names[node]!r} emits an image that is in no file")
+        path = Path(str(self.resolver.resolve(props["filename"])))
+        return path, bool(props.get("raw", False))
+
+    def integrator(self) -> Integrator:
+        """What renders it."""
+        return read_integrator(self.state, self.path)
+
+    def has_media(self) -> bool:
+        import mitsuba as mi
+
+        return bool(self._nodes_of(mi.ObjectType.Medium))
+
+    def content(self, sensor: int) -> str:
+        import mitsuba as mi
+
+        # The parsed form holds what stood in files that only the parser reads.
+        parsed = mi.parser.write_string(self.state)
+        digest = hashlib.sha256(repr((mi.__version__, parsed)).encode())
+        for path in (*self.files, *self.assets()):
+            with Path(path).open("rb") as file:
+                digest.update(os.fstat(file.fileno()).st_size.to_bytes(8, "little"))
+                while data := file.read(2**24):
+                    digest.update(data)
+        digest.update(repr((sorted(self.parameters.items()), sensor)).encode())
+        if self.instead is not None:
+            digest.update(str(self.instead).encode())
+        return digest.hexdigest()[:32]
+
+    def assets(self) -> Iterator[Path]:
+        """Files that plugins read: meshes, textures, tables."""
+        for name in self._asset_names():
+            path = Path(str(self.resolver.resolve(name)))
+            if path.is_file():
+                yield path
+
+    def _asset_names(self) -> Iterator[str]:
+        """As they stand in the scene."""
+        import mitsuba as mi
+
+        for node in self.state.nodes:
+            for key in node.props:
+                if "file" in key and node.props.type(key) == mi.Properties.Type.String:
+                    yield str(node.props[key])
+
+    def places(self) -> set[Path]:
+        """Everywhere that its files are, or would be found if there were any.
+
+        More than Mitsuba looks at: wherever it looks for one file it may look for each of them.
+        """
+        folders = {Path(str(self.resolver[k])) for k in range(len(self.resolver))}
+        folders |= {file.parent for file in self.files}
+        there = {*self.files, *self.assets()}
+        names = {Path(name) for name in self._asset_names()}
+        names |= {x.relative_to(y) for x in there for y in folders if x.is_relative_to(y)}
+        return there | {folder / name for folder in folders for name in names}
+
+    @contextmanager
+    def _resolving(self) -> Iterator[None]:
+        """Let relative paths be found beside the scene's files meanwhile."""
+        import mitsuba as mi
+
+        before = mi.file_resolver()
+        mi.set_file_resolver(self.resolver)
+        try:
+            yield
+        finally:
+            mi.set_file_resolver(before)
+
+
+def moved(path: Path, old: Path, new: Path) -> Path:
+    """Where `path` leads when the folder `old` has been moved to `new`, by a way that lasts."""
+    if ".." not in path.parts and path.is_relative_to(old):
+        return new / path.relative_to(old)
+    real, gone = Path(os.path.realpath(path)), Path(os.path.realpath(old))
+    if real.is_relative_to(gone):
+        return Path(os.path.realpath(new)) / real.relative_to(gone)
+    # The way there may lead through the old folder.
+    return real if gone.name in path.parts else path
+
+
+@contextmanager
+def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Iterator[None]:
+    """Turn what Mitsuba throws into one line: its own words, without its source places.
+
+    instead: the integrator that was put in.
+    """
+    try:
+        yield
+    except MemoryError:
+        raise SceneError(f"{path} takes more memory than there is") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            f"{path}, or a file that it refers to, has text that is not UTF-8: {error.reason}"
+        ) from None
+    except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
+        text = one_line(_without_places(str(error), path), limit=MAX_SAID)
+        undefined = re.search(r"undefined parameter: \$(\w+)", text)
+        hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
+        if "integrator plugin" in text:
+            hint = f"; that is the integrator that was asked for, {instead}"
+            hint = hint if instead else '; integrator="path" renders it with another'
+        lead = "" if isinstance(error, UnknownPluginError) else "Mitsuba refuses "
+        raise SceneError(f"{lead}{path}: {text}{hint}") from error
+
+
+@contextmanager
+def render_errors(path: Path) -> Iterator[None]:
+    """Turn what Mitsuba throws while it renders into one line: the reason, and not what it led to.
+
+    Some scenes load, and cannot be rendered: a sensor that is never hit by particles, say.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        # Python's own kinds of it, such as RecursionError, are faults, whoever raises them.
+        if type(error) is not RuntimeError or not _is_native(error):
+            raise
+        first: BaseException = error
+        while first.__cause__ is not None:
+            first = first.__cause__
+        text = one_line(_without_places(str(first), path), limit=MAX_SAID)
+        raise SceneError(
+            f'Mitsuba cannot render {path}: {text}; integrator="path" renders most scenes'
+        ) from error
+
+
+def _is_native(error: BaseException) -> bool:
+    """Return whether Mitsuba threw it, and not a listener that heard of the progress."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    module = trace.tb_frame.f_globals.get("__name__", "") if trace is not None else ""
+    return str(module).partition(".")[0] in ("drjit", "lightpaint", "mitsuba")
+
+
+def _without_places(said: str, path: Path) -> str:
+    """Mitsuba's words without places in its source, and without the file where that is `path`."""
+    if "str_from_cstr" in said:  # the binding's word for it
+        return "it, or a file that it refers to, has a name that is not UTF-8"
+    said = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", said)
+    file = re.escape(str(path))
+    said = re.sub(rf"(?:At|(?:Error w|W)hile loading) {file} \((line \d+, col \d+)\)", r"\1", said)
+    said = re.sub(rf'Error while loading XML file "{file}": ', "", said)
+    said = re.sub(rf'Parsing of XML file "{file}" failed', "it is no XML", said)
+    return unnamed(said, path)

@@ -1,0 +1,1 @@
+"""Folders and files of results: published together, and read back with care."""
