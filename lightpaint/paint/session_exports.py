@@ -14,10 +14,10 @@ from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
 from lightpaint.images.denoiser import denoised, how_denoised
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.paint.session.snapshot import Moment
 from lightpaint.paint.subject import Subject, painting_of, picture_of
+from lightpaint.pipeline.answer_folder import LIGHTING, RELIT, write_answer
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.progress import Progress
@@ -29,8 +29,8 @@ from lightpaint.scene.scene import load_scene
 from lightpaint.target.own import write_painting
 from lightpaint.target.template import texts_of
 
-#: Files of an export beside paintings and pictures, and the folder of its report.
-LIGHTING, RELIT, ANSWER = "lighting.json", "relit.xml", "answer"
+#: The folder of the report.
+ANSWER = "answer"
 
 #: What is of a painting, and writes it.
 OF_PAINTING = {"target", "report"}
@@ -66,12 +66,12 @@ def export(
             write_bytes(picture_of(folder, sensor), picture(basis, lighting, moment.transform))
             yield picture_of(folder, sensor)
     if "lighting" in what:
-        write_lighting(folder / LIGHTING, lighting)
+        write_answer(folder, lighting)
         yield folder / LIGHTING
     if "relit" in what:
         if first.scene is None:
             raise PaintError("there is no scene to relight: it was opened from a saved basis")
-        relight(first.loaded, lighting, folder / RELIT)
+        write_answer(folder, lighting, scene=first.loaded, has_lighting=True)
         yield folder / RELIT
     if "report" in what:
         yield from _report(subjects, moment, progress)

@@ -20,6 +20,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.fit import meant_by
+from lightpaint.pipeline.answer_folder import answer_files
 from lightpaint.pipeline.remarks import (
     remarks_of_film,
     remarks_of_memory,
@@ -41,9 +42,7 @@ from lightpaint.pipeline.sources import (
     to_json,
 )
 from lightpaint.placement.suggest import check_suggestible
-from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.export.nuke import spoken_unreadable
-from lightpaint.relit.relight import check_relightable
 from lightpaint.scene.presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import shortly
@@ -228,14 +227,11 @@ class Job:
         self, views: Sequence[PaintedView], scenes: Sequence[Scene], targets: Sequence[Target]
     ) -> ResultFolder:
         """Where results go, with all that is read for them. targets: as they were read."""
-        files = [self.folder / "lighting.json"]
-        if scenes:
-            files += check_relightable(scenes[0], self.folder / "relit.xml")
+        scene = scenes[0] if scenes else None
+        files = answer_files(self.folder, scene=scene, groups=self.groups)
         for view in views:
             check_writable(view.folder)
             files += [view.folder / name for name in (VIEW_RESULTS if scenes else ALWAYS)]
-        if self.groups is not None:
-            files += [self.folder / name for name in EXPORTS]
         reads = [file for target in targets for file in target.files]
         reads += [file for scene in scenes for file in scene.read_files]
         if isinstance(self.basis, BasisFile):

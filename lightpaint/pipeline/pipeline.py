@@ -3,7 +3,6 @@
 import math
 import time
 from dataclasses import replace
-from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
@@ -15,26 +14,24 @@ from lightpaint.images.estimate import write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_findings
 from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
+from lightpaint.pipeline.answer_folder import AnswerFolder, loaded_relit, new_answer
 from lightpaint.pipeline.job import Job, PaintedView
 from lightpaint.pipeline.results import Look, write_predicted, write_report
 from lightpaint.pipeline.settings import Settings
 from lightpaint.placement.suggest import suggest_lights
 from lightpaint.progress import Listener, Progress, labelled, listener, silent
 from lightpaint.relit.budget import Budget, verification_budget
-from lightpaint.relit.export.exports import write_exports
 from lightpaint.relit.power import with_power
-from lightpaint.relit.relight import relight, settle
 from lightpaint.relit.rounds import refine_by_rendering
 from lightpaint.relit.verify import verify
 from lightpaint.report.basis_memo import ahead
 from lightpaint.report.page.page import prepare_page
 from lightpaint.scene.presets import samples
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
 
 
 @keywords()
@@ -51,8 +48,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         A look for each view.
 
     Examples:
-        >>> from pathlib import Path
-        >>> job = lp.Job((), (lp.Painting("painting.exr"),), Path("evening"), basis)
+        >>>         >>> job = lp.Job((), (lp.Painting("painting.exr"),), Path("evening"), basis)
         >>> [look] = lp.run(job)
         >>> np.round(look.lighting.emission["panel"], 3).tolist()
         [2.0, 1.5, 1.0]
@@ -72,20 +68,13 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
             ahead(basis, prepare_page)
     solution = _improved(job, solution_of(problem), listen)
     analyses = analyse(solution)
-    with job.results.filled() as folder:
-        lighting = with_findings(solution, analyses).lighting
-        write_lighting(folder / "lighting.json", lighting)
-        if job.groups is not None:
-            write_exports(folder, job.groups, lighting)
-        relit = None
-        if (scene := job.views[0].scene) is not None:
-            relit = relight(scene, lighting, folder / "relit.xml")
+    lighting, scene = with_findings(solution, analyses).lighting, job.views[0].scene
+    with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
-            _finished(job, folder, view, analysis, relit, _hearing(job, view, listen))
+            _finished(job, answer, view, analysis, _hearing(job, view, listen))
             for view, analysis in zip(job.views, analyses, strict=True)
         ]
-        other = scene and settle(scene, lighting, folder / "relit.xml", job.folder / "relit.xml")
-    return [_loaded_anew(look) for look in looks] if other else looks
+    return [_loaded_anew(look) for look in looks] if answer.has_moved_paths else looks
 
 
 def obtain(
@@ -196,34 +185,23 @@ def _improved(job: Job, solution: Solution, listen: Listener) -> Solution:
 def _loaded_anew(look: Look) -> Look:
     """`look` with its relit scene as it is written by now."""
     assert look.relit is not None
-    path, sensor = look.relit.path, look.relit.sensor
-    return replace(look, relit=_through(look.relit, path, sensor))
-
-
-def _through(relit: Scene, path: Path, sensor: int) -> Scene:
-    """Load a relit scene anew from `path`, with the parameters that it has."""
-    return load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)
+    relit = loaded_relit(look.relit, look.relit.path, look.relit.sensor)
+    return replace(look, relit=relit)
 
 
 def _finished(
-    job: Job,
-    folder: Path,
-    view: PaintedView,
-    analysis: Analysis,
-    relit: Scene | None,
-    listen: Listener,
+    job: Job, answer: AnswerFolder, view: PaintedView, analysis: Analysis, listen: Listener
 ) -> Look:
-    """A view predicted, verified and shown. folder: what takes the place of the job's when done."""
+    """A view predicted, verified and shown."""
     settings, scene, solution = job.settings, view.scene, analysis.solution
     listen.note("analysed, and the lighting written")
     basis = solution.basis
-    place = folder / view.folder.relative_to(job.folder)
+    place = answer.path / view.folder.relative_to(job.folder)
     place.mkdir(exist_ok=True)
     predicted = combine(basis, solution.lighting)
-    verification, suggestions, budget = None, None, None
-    if relit is not None and scene is not None:
-        if relit.sensor != scene.sensor:
-            relit = _through(relit, relit.path, scene.sensor)
+    verification, suggestions, budget, relit = None, None, None, None
+    if scene is not None:
+        relit = answer.seen_through(scene.sensor)
         budget = _budget(settings, basis, relit)
         if relit.parameters and view is job.views[0]:
             given = " ".join(f"-D{name}={value}" for name, value in relit.parameters.items())
@@ -252,7 +230,7 @@ def _finished(
         basis=basis,
         solution=solution,
         predicted=predicted,
-        relit=None if relit is None else relit.moved(folder, job.folder),
+        relit=None if relit is None else relit.moved(answer.path, job.folder),
         verification=verification,
         analysis=analysis,
         suggestions=suggestions,

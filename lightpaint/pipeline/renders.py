@@ -22,12 +22,12 @@ from lightpaint.images.formats.png import png_bytes, png_says, write_png
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
 from lightpaint.lighting.lighting import Lighting
+from lightpaint.pipeline.answer_folder import answer_files, new_answer
 from lightpaint.pipeline.pipeline import obtain
 from lightpaint.pipeline.remarks import remarks_of_pictures
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Listener, Progress, listener, silent
-from lightpaint.relit.relight import check_relightable, relight, settle
 from lightpaint.report.light_sheet import light_sheet
 from lightpaint.scene.presets import Preset, on_film
 from lightpaint.scene.runtime.variant import use_variant
@@ -316,7 +316,7 @@ def relit_folder(
     force: bool = False,
 ) -> ResultFolder:
     """Where `relight_look` writes. lighting: the file whose lighting it is. views: as there."""
-    files = [*check_relightable(scene, folder / "relit.xml")]
+    files = answer_files(folder, scene=scene, has_lighting=True)
     files += [folder / view / name for view in views for name in ("relit.exr", "relit.png")]
     reads = (lighting, *scene.read_files)
     return ResultFolder(folder, tuple(files), reads, (lighting,), adds_to=lighting, force=force)
@@ -343,9 +343,11 @@ def relight_look(
         listener(progress).say(remark)
     results.check()
     how: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
-    with results.filled() as folder:
+    first, *_ = scenes.values()
+    with new_answer(results, lighting, scene=first, has_lighting=True) as answer:
         for view, scene in scenes.items():
-            relit = on_film(relight(scene, lighting, folder / "relit.xml"), None, resolution)
+            folder = answer.path
+            relit = on_film(answer.seen_through(scene.sensor), None, resolution)
             label = f"relit of {view}" if view else "relit"
             image = rendered(relit) if rendered else render(relit, spp=spp, label=label, **how)
             (folder / view).mkdir(exist_ok=True)
@@ -355,4 +357,3 @@ def relight_look(
             texts = how_denoised(features, raw="relit.exr")
             stops = choose_exposure(clean, emitters_seen(relit))
             write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)
-        settle(scene, lighting, folder / "relit.xml", results.folder / "relit.xml")

@@ -8,13 +8,11 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.manifest.variations import SHIFTED, SOLVED, shifted, varied
-from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.pipeline.answer_folder import answer_files, new_answer
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.pipeline.results import write_predicted
-from lightpaint.relit.export.exports import EXPORTS, write_exports
-from lightpaint.relit.relight import check_relightable, relight, settle
 from lightpaint.scene.scene import Scene
 
 
@@ -29,12 +27,11 @@ def made_folder(
 ) -> ResultFolder:
     """Where an answer goes that is made of others. views: folders in it, one for each picture."""
     reads = tuple(map(Path, lightings))
-    files = [folder / "lighting.json", *(folder / view / "predicted.exr" for view in views)]
+    files = answer_files(folder, scene=scene, groups=groups)
+    files += [folder / view / "predicted.exr" for view in views]
     if scene is not None:
-        files += check_relightable(scene, folder / "relit.xml")
         reads += scene.read_files
     if groups is not None:
-        files += [folder / name for name in EXPORTS]
         reads += tuple(groups.files)
     answers = tuple(map(Path, lightings))
     return ResultFolder(folder, tuple(files), reads, answers, force=force)
@@ -56,20 +53,12 @@ def leave_made(
     the answer, too. spp: of a verification.
     """
     results.check()
-    with results.filled() as folder:
-        write_lighting(folder / "lighting.json", lighting)
-        relit = None
-        if scene is not None:
-            relit = relight(scene, lighting, folder / "relit.xml")
+    with new_answer(results, lighting, scene=scene, groups=groups) as answer:
         for basis, view in zip(bases, views, strict=True):
-            (folder / view).mkdir(exist_ok=True)
+            (answer.path / view).mkdir(exist_ok=True)
             predicted, origin = combine(basis, lighting), basis.origin
-            its = folder / view / "predicted.exr"
-            write_predicted(its, predicted, origin=origin, spp=spp or origin.spp, scene=relit)
-        if groups is not None:
-            write_exports(folder, groups, lighting)
-        if scene is not None:
-            settle(scene, lighting, folder / "relit.xml", results.folder / "relit.xml")
+            its, spp_ = answer.path / view / "predicted.exr", spp or origin.spp
+            write_predicted(its, predicted, origin=origin, spp=spp_, scene=answer.relit)
 
 
 def dimmed(basis: Basis) -> set[str]:

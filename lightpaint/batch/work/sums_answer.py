@@ -4,14 +4,13 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
-from lightpaint.lighting.file import write_lighting
 from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.linear import solve_linear
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.lighting.sums import Sums, problem_of_sums, sums_of
+from lightpaint.pipeline.answer_folder import new_answer
 from lightpaint.pipeline.job import Job
-from lightpaint.relit.relight import relight, settle
 
 
 def answer_by_sums(job: Job, basis: Basis) -> None:
@@ -46,8 +45,5 @@ def leave_lighting(job: Job, lighting: Lighting) -> None:
     """Write the lighting, and the scene that has it."""
     [view] = job.views
     lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)
-    with job.results.filled() as folder:
-        write_lighting(folder / "lighting.json", lighting)
-        if view.scene is not None:
-            relight(view.scene, lighting, folder / "relit.xml")
-            settle(view.scene, lighting, folder / "relit.xml", job.folder / "relit.xml")
+    with new_answer(job.results, lighting, scene=view.scene):
+        pass  # no pictures of it
