@@ -24,8 +24,8 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.fit import Fit, meant_by
-from lightpaint.lighting.live import Live
-from lightpaint.lighting.live_view import LiveView
+from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.target.target import Target

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 import lightpaint as lp
-from lightpaint.lighting import approach
+from lightpaint.lighting.loss import warm_start as approach
 from lightpaint.lighting.solution import Solution
 
 

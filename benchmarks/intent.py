@@ -42,7 +42,7 @@ from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.images.denoiser import denoised
-from lightpaint.lighting.analysis import held_back
+from lightpaint.lighting.analysis.appearance import limiting_reasons as held_back
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SIZES = {"gallery": "160x90", "stage": "160x90", "cornell": "64x64"}

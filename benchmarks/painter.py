@@ -46,8 +46,8 @@ import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.fit import resolve_fit
-from lightpaint.lighting.live import Live
-from lightpaint.lighting.live_view import LiveView
+from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.launch import at_hand
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import Store

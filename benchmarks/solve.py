@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint import Basis, Target, load_scene, read_target, render_basis, solve
-from lightpaint.lighting.painting import squares_of
+from lightpaint.lighting.loss.painting import squares_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.scene.scene import Scene
 

@@ -45,24 +45,26 @@ if TYPE_CHECKING:
     from lightpaint.images.estimate import Estimate as Estimate
     from lightpaint.images.formats.png import display_picture as display_picture
     from lightpaint.images.object_map import Objects as Objects
-    from lightpaint.lighting.analysis.analyse import Analysis as Analysis
-    from lightpaint.lighting.analysis.analyse import analyse as analyse
+    from lightpaint.lighting.analysis.analysis import Analysis as Analysis
+    from lightpaint.lighting.analysis.analysis import analyse as analyse
+    from lightpaint.lighting.analysis.appearance.appearance import Seen as Seen
+    from lightpaint.lighting.analysis.appearance.appearance import what_is_seen as what_is_seen
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
-    from lightpaint.lighting.analysis.refine import refine as refine
-    from lightpaint.lighting.analysis.seen import Seen as Seen
-    from lightpaint.lighting.analysis.seen import what_is_seen as what_is_seen
-    from lightpaint.lighting.analysis.uncertainty import Uncertainty as Uncertainty
-    from lightpaint.lighting.analysis.uncertainty import correct_noise as correct_noise
-    from lightpaint.lighting.analysis.uncertainty import error_bars as error_bars
-    from lightpaint.lighting.certificate import Certificate as Certificate
+    from lightpaint.lighting.analysis.noise.refinement import refine as refine
+    from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty as Uncertainty
+    from lightpaint.lighting.analysis.noise.uncertainty import correct_noise as correct_noise
+    from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
+    from lightpaint.lighting.answer.certificate import Certificate as Certificate
+    from lightpaint.lighting.answer.lighting import Lighting as Lighting
+    from lightpaint.lighting.answer.lighting import combine as combine
+    from lightpaint.lighting.answer.lighting_file import read_lighting as read_lighting
+    from lightpaint.lighting.answer.lighting_file import write_lighting as write_lighting
     from lightpaint.lighting.constraints.constraints import Constraints as Constraints
-    from lightpaint.lighting.constraints.file import read_constraints as read_constraints
-    from lightpaint.lighting.file import read_lighting as read_lighting
-    from lightpaint.lighting.file import write_lighting as write_lighting
+    from lightpaint.lighting.constraints.constraints_file import (
+        read_constraints as read_constraints,
+    )
     from lightpaint.lighting.fit import Fit as Fit
-    from lightpaint.lighting.lighting import Lighting as Lighting
-    from lightpaint.lighting.lighting import combine as combine
     from lightpaint.lighting.problem import Problem as Problem
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
@@ -76,24 +78,24 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.settings import Settings as Settings
     from lightpaint.pipeline.sources import Painting as Painting
     from lightpaint.pipeline.sources import SceneFile as SceneFile
-    from lightpaint.placement.suggest import suggest_lights as suggest_lights
+    from lightpaint.placement.light_search import suggest_lights as suggest_lights
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
     from lightpaint.relit.verification import Verification as Verification
-    from lightpaint.relit.verify import verify as verify
+    from lightpaint.relit.verification_render import verify as verify
     from lightpaint.report.verdict import verdict as verdict
     from lightpaint.scene.runtime.variant import use_variant as use_variant
     from lightpaint.scene.scene import Scene as Scene
     from lightpaint.scene.scene import load_scene as load_scene
-    from lightpaint.target.read import read_target as read_target
     from lightpaint.target.target import Target as Target
+    from lightpaint.target.target_reader import read_target as read_target
 
 #: Public name → its module, below this package: what type checkers read above, for Python.
 _HOMES = {
-    "Analysis": "lighting.analysis.analyse",
+    "Analysis": "lighting.analysis.analysis",
     "Basis": "basis.basis",
-    "Certificate": "lighting.certificate",
+    "Certificate": "lighting.answer.certificate",
     "Constraints": "lighting.constraints.constraints",
     "Demo": "demo",
     "Diagnosis": "lighting.analysis.diagnosis",
@@ -101,7 +103,7 @@ _HOMES = {
     "Fit": "lighting.fit",
     "Job": "pipeline.job",
     "LightGroups": "basis.lightgroups.read",
-    "Lighting": "lighting.lighting",
+    "Lighting": "lighting.answer.lighting",
     "LightpaintError": "errors",
     "Look": "pipeline.results",
     "Objects": "images.object_map",
@@ -109,44 +111,44 @@ _HOMES = {
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
     "SceneFile": "pipeline.sources",
-    "Seen": "lighting.analysis.seen",
+    "Seen": "lighting.analysis.appearance.appearance",
     "Settings": "pipeline.settings",
     "Solution": "lighting.solution",
     "Suggestion": "placement.suggestion",
     "Target": "target.target",
     "TransformChoice": "colour.display.view_transform",
-    "Uncertainty": "lighting.analysis.uncertainty",
+    "Uncertainty": "lighting.analysis.noise.uncertainty",
     "Verification": "relit.verification",
     "ViewTransform": "colour.display.view_transform",
-    "analyse": "lighting.analysis.analyse",
-    "combine": "lighting.lighting",
-    "correct_noise": "lighting.analysis.uncertainty",
+    "analyse": "lighting.analysis.analysis",
+    "combine": "lighting.answer.lighting",
+    "correct_noise": "lighting.analysis.noise.uncertainty",
     "diagnose": "lighting.analysis.diagnosis",
     "display_picture": "images.formats.png",
-    "error_bars": "lighting.analysis.uncertainty",
+    "error_bars": "lighting.analysis.noise.uncertainty",
     "load_scene": "scene.scene",
     "paint_with_light": "pipeline.call",
     "read_basis": "basis.file",
-    "read_constraints": "lighting.constraints.file",
+    "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.read",
-    "read_lighting": "lighting.file",
-    "read_target": "target.read",
-    "refine": "lighting.analysis.refine",
+    "read_lighting": "lighting.answer.lighting_file",
+    "read_target": "target.target_reader",
+    "refine": "lighting.analysis.noise.refinement",
     "relight": "relit.relight",
     "render_basis": "basis.render.render",
     "render_template": "pipeline.renders",
     "template_of_basis": "pipeline.renders",
     "run": "pipeline.pipeline",
     "solve": "lighting.solve",
-    "suggest_lights": "placement.suggest",
+    "suggest_lights": "placement.light_search",
     "use_variant": "scene.runtime.variant",
     "verdict": "report.verdict",
-    "verify": "relit.verify",
-    "what_is_seen": "lighting.analysis.seen",
+    "verify": "relit.verification_render",
+    "what_is_seen": "lighting.analysis.appearance.appearance",
     "write_basis": "basis.file",
     "write_demo": "demo",
     "write_exports": "relit.export.exports",
-    "write_lighting": "lighting.file",
+    "write_lighting": "lighting.answer.lighting_file",
 }
 
 #: The same of what needs an extra, and is not part of `import *`.

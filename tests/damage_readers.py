@@ -34,11 +34,11 @@ class Reader:
             estimate, attributes = read_estimate(path)
             return estimate.image.tobytes(), estimate.half_difference.tobytes(), dict(attributes)
         if self.kind == "lighting":
-            from lightpaint.lighting.file import read_lighting
+            from lightpaint.lighting.answer.lighting_file import read_lighting
 
             return read_lighting(path)
         if self.kind == "lights":
-            from lightpaint.lighting.constraints.file import read_constraints
+            from lightpaint.lighting.constraints.constraints_file import read_constraints
             from lightpaint.scene.lights.lights_file import read_lights_file
 
             file = read_lights_file(path)
@@ -116,7 +116,7 @@ class Seen:
 
 def contents(lighting: Any) -> Any:
     """What a lighting says, by way of the file that is written of it."""
-    from lightpaint.lighting.file import write_lighting
+    from lightpaint.lighting.answer.lighting_file import write_lighting
 
     path = Path(os.environ.get("TMPDIR", "/tmp")) / f"lighting.{os.getpid()}.json"
     write_lighting(path, lighting)

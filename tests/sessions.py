@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.paint.store.pixels import Pixels
+from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.steps import Identity, KeptLook, Patch, SeenFrom, Step
 from lightpaint.paint.store.store import Store
 

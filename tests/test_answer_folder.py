@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from renderer import write_room
 
-from lightpaint.lighting.file import read_lighting
-from lightpaint.lighting.lighting import Lighting, LightSetting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.answer_folder import answer_files, new_answer, write_answer
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.scene.scene import Scene, load_scene

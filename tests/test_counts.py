@@ -17,8 +17,8 @@ import lightpaint as lp
 from lightpaint.batch.manifest.manifest import read_manifest
 from lightpaint.errors import BatchError, ConstraintError, LightingError, PaintError, SceneError
 from lightpaint.lighting.algebra.optimum import minimise
+from lightpaint.lighting.answer.lighting_file import MAX_BYTES, read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.file import MAX_BYTES, read_lighting
 from lightpaint.paint.frames import said_of
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.server.session_clients import Line

@@ -22,9 +22,9 @@ from hypothesis import strategies as st
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
 from lightpaint.files import MAX_TEXT
-from lightpaint.lighting.bound import Bound
-from lightpaint.lighting.file import read_lighting, write_lighting
-from lightpaint.lighting.lighting import Certificate, Lighting, LightSetting
+from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.lighting import Certificate, Lighting, LightSetting
+from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.scene.lights.lights_file import read_lights_file
 from lightpaint.target.template import Template, read_template, write_template
 

@@ -14,7 +14,7 @@ import lightpaint as lp
 from lightpaint.batch.cluster.cluster import LEAST_S, PATIENCE
 from lightpaint.cli.commands.rooms import template_lines
 from lightpaint.cli.options.parser import command_parser
-from lightpaint.lighting.constraints.whites import WHITES
+from lightpaint.lighting.constraints.white_lights import WHITES
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint.server.address import PORT
 from lightpaint.scene.lights.similar_emitters import FEW

@@ -12,9 +12,9 @@ import pytest
 
 from lightpaint.batch.plan.journal import Journal, Line
 from lightpaint.files import write_text
-from lightpaint.lighting.file import read_lighting, write_lighting
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.setting import LightSetting
+from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.paint.store.store import Store
 from lightpaint.storage import staging
 from lightpaint.storage.staging import staged

@@ -17,7 +17,7 @@ from command import succeed
 
 import lightpaint as lp
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.relit.export.exports import lights_table
 from lightpaint.report.page.notebook_html import html_of
 

@@ -20,8 +20,8 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.analysis.uncertainty import error_bars
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis

@@ -20,7 +20,7 @@ from lightpaint.batch.work.work import is_full
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
 from lightpaint.errors import ALONE, OutputError
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.result_folder import ResultFolder
 

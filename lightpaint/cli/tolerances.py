@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Seen
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.gamuts import Gamuts
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
-from lightpaint.lighting.constraints.whites import white_where_free
+from lightpaint.lighting.constraints.white_lights import white_where_free
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.gamuts import Gamuts
+from lightpaint.lighting.loss.weight_penalty import pull_of
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.pull import pull_of
 from lightpaint.screen import shortly
 
 

@@ -15,16 +15,15 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import constraints_of
-from lightpaint.lighting.constraints.on_locus import tangent
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.constraints.white_neighbours import tangent
 from lightpaint.lighting.fit import Fit, Space, meant_by
-from lightpaint.lighting.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.linear_problem import LinearProblem, reduced_by
-from lightpaint.lighting.lit_pixels import LitPixels
-from lightpaint.lighting.loss import Loss, Squares
-from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.painting import (
+from lightpaint.lighting.loss.lit_pixels import LitPixels
+from lightpaint.lighting.loss.loss import Loss, Squares
+from lightpaint.lighting.loss.painting import (
     brighter_will_do,
     joint_squares,
     loss_of,
@@ -33,7 +32,8 @@ from lightpaint.lighting.painting import (
     what_counts,
     with_emitters_read,
 )
-from lightpaint.lighting.traces import without_traces
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.round_off import without_traces
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import shortly
 from lightpaint.target.target import Target

@@ -11,12 +11,12 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.dataframes import CHANNELS, by_channel, xarray
 from lightpaint.keywords import keywords
-from lightpaint.lighting.certificate import Certificate
+from lightpaint.lighting.answer.certificate import Certificate
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.fit import Space
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.loss.reweighting import Reweighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.reweighted import Reweighting
 from lightpaint.screen import Shown
 
 

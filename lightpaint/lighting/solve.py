@@ -7,23 +7,23 @@ from typing import Any
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.keywords import keywords
-from lightpaint.lighting.approach import near_optimum
-from lightpaint.lighting.binning import BinnedPixels, binned_pixels, block_side
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.on_locus import next_whites
 from lightpaint.lighting.constraints.reduced_problem import (
     ReducedOptimum,
     solve_reduced,
 )
+from lightpaint.lighting.constraints.white_neighbours import next_whites
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.linear import Answer, answer_of, solve_linear, solve_reduction
-from lightpaint.lighting.lit_pixels import LitPixels
-from lightpaint.lighting.loss import Squares, image_of
+from lightpaint.lighting.linear_solve import Answer, answer_of, solve_linear, solve_reduction
+from lightpaint.lighting.loss.lit_pixels import LitPixels
+from lightpaint.lighting.loss.loss import Squares, image_of
+from lightpaint.lighting.loss.pixel_bins import BinnedPixels, binned_pixels, block_side
+from lightpaint.lighting.loss.reweighting import Asked, Descent, descend, value_of
+from lightpaint.lighting.loss.warm_start import near_optimum
+from lightpaint.lighting.loss.weight_penalty import dimming_of, to_present
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.pull import dimming_of, to_present
-from lightpaint.lighting.reweighted import Asked, Descent, descend, value_of
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 

@@ -11,8 +11,8 @@ from typing import Any, Literal, Protocol
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes, as_halves
 from lightpaint.errors import PaintError
-from lightpaint.lighting.analysis.analyse import analyse, with_findings
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.analysis.analysis import analyse, with_findings
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import StoppedError, Threads
 from lightpaint.paint.protocol import (
@@ -26,7 +26,7 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.session.snapshot import Moment
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.steps import of_view
 from lightpaint.paint.subject import Subject, painting_of
 from lightpaint.progress import Progress, while_wanted

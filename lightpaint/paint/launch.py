@@ -14,7 +14,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import SceneError
 from lightpaint.files import check_writable, file_length
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import constraints_of
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.lazy_scene import Opening
@@ -22,7 +22,7 @@ from lightpaint.paint.server.address import Listening, listen
 from lightpaint.paint.server.server import Server, check_installed
 from lightpaint.paint.session_file import Keeping, check_together, identity_of
 from lightpaint.paint.store.database import set_aside
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject

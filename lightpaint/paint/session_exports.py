@@ -14,7 +14,7 @@ from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
 from lightpaint.images.denoiser import denoised, how_denoised
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.paint.session.snapshot import Moment
 from lightpaint.paint.subject import Subject, painting_of, picture_of
 from lightpaint.pipeline.answer_folder import LIGHTING, RELIT, write_answer
@@ -22,11 +22,11 @@ from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
-from lightpaint.relit.verify import verify
+from lightpaint.relit.verification_render import verify
 from lightpaint.report.clean_pictures import Looks
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.scene import load_scene
-from lightpaint.target.own import write_painting
+from lightpaint.target.painting_file import write_painting
 from lightpaint.target.template import texts_of
 
 #: The folder of the report.

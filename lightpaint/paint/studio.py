@@ -17,8 +17,8 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes
 from lightpaint.errors import PaintError
-from lightpaint.lighting.analysis.analyse import analyse
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
 from lightpaint.paint.background_jobs import Errands
 from lightpaint.paint.background_threads import (
@@ -51,8 +51,8 @@ from lightpaint.paint.session.picture_table import Picture, Pictures
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import Moment
 from lightpaint.paint.session.view_pictures import offer_transforms, offer_view, view_info
-from lightpaint.paint.store.pixels import Pixels
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject, bases_of, transform_of

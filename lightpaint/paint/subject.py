@@ -14,7 +14,7 @@ from lightpaint.colour.display.view_transform import TransformChoice, ViewTransf
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.lazy_scene import Opening
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.presets import samples

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.lighting.file import write_lighting
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.relit.export.exports import EXPORTS, write_exports
 from lightpaint.relit.relight import check_relightable, relight, settle

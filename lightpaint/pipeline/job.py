@@ -17,7 +17,7 @@ from lightpaint.errors import BasisError, ConstraintError, LightpaintError, Targ
 from lightpaint.files import check_writable
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import constraints_of
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.fit import meant_by
 from lightpaint.pipeline.answer_folder import answer_files
@@ -41,7 +41,7 @@ from lightpaint.pipeline.sources import (
     from_json,
     to_json,
 )
-from lightpaint.placement.suggest import check_suggestible
+from lightpaint.placement.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.presets import on_film
 from lightpaint.scene.scene import Scene

@@ -12,9 +12,9 @@ from lightpaint.basis.render.obtain import Render, obtain_basis
 from lightpaint.basis.render.render import render_basis, samples_for
 from lightpaint.images.estimate import write_estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.analyse import Analysis, analyse, with_findings
-from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
+from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
@@ -22,12 +22,12 @@ from lightpaint.pipeline.answer_folder import AnswerFolder, loaded_relit, new_an
 from lightpaint.pipeline.job import Job, PaintedView
 from lightpaint.pipeline.results import Look, write_predicted, write_report
 from lightpaint.pipeline.settings import Settings
-from lightpaint.placement.suggest import suggest_lights
+from lightpaint.placement.light_search import suggest_lights
 from lightpaint.progress import Listener, Progress, labelled, listener, silent
-from lightpaint.relit.budget import Budget, verification_budget
-from lightpaint.relit.power import with_power
-from lightpaint.relit.rounds import refine_by_rendering
-from lightpaint.relit.verify import verify
+from lightpaint.relit.detection_power import with_power
+from lightpaint.relit.render_rounds import refine_by_rendering
+from lightpaint.relit.sample_budget import Budget, verification_budget
+from lightpaint.relit.verification_render import verify
 from lightpaint.report.basis_memo import ahead
 from lightpaint.report.page.page import prepare_page
 from lightpaint.scene.presets import samples

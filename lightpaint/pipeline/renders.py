@@ -21,7 +21,7 @@ from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.formats.png import png_bytes, png_says, write_png
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.answer_folder import answer_files, new_answer
 from lightpaint.pipeline.pipeline import obtain
 from lightpaint.pipeline.remarks import remarks_of_pictures

@@ -13,16 +13,16 @@ from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.images.pixel_blocks import Size, whole_factor
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.analyse import Analysis
+from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.uncertainty import Uncertainty
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
-from lightpaint.relit.verify import verify
+from lightpaint.relit.verification_render import verify
 from lightpaint.report.answer_pictures import residual_of, transform_of
 from lightpaint.report.clean_pictures import Looks
 from lightpaint.report.comparison import comparison_image

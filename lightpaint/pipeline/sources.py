@@ -22,8 +22,8 @@ from lightpaint.pipeline.settings import Settings
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names
 from lightpaint.storage.json_records import strict_json
-from lightpaint.target.read import Paint, read_over_look, read_target
 from lightpaint.target.target import Target
+from lightpaint.target.target_reader import Paint, read_over_look, read_target
 
 FORMAT = "lightpaint-job 1"
 FIELDS = ("scenes", "targets", "basis", "constraints", "settings", "folder", "by_sensor")

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import mix
 from lightpaint.lighting.algebra.optimum import minimise
-from lightpaint.lighting.analysis.noise import pseudo_inverse, without_noise
+from lightpaint.lighting.analysis.noise.noise import pseudo_inverse, without_noise
 from lightpaint.lighting.constraints.reduced_problem import ReducedProblem, problems
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.placement.candidates import Candidates

@@ -17,7 +17,7 @@ from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.keywords import keywords
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.emission_xml import Changes, set_emission
 from lightpaint.relit.xml_edit import XmlFile, tag
 from lightpaint.scene.lights.emission import Scaling

@@ -51,7 +51,7 @@ class Verification(Shown):
         delta_e_mean: CIEDE2000 at an exposure metered on the render, mean.
         delta_e_95: The same, 95th percentile.
         power: By light that shines, the probability that this render would have disagreed, had the
-            light been 5 % off (power.py); None where nobody asked what each light does.
+            light been 5 % off (detection_power.py); None where nobody asked what each light does.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")

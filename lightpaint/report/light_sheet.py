@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.srgb import encode_display, to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.comparison import fitted
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import exposure_of

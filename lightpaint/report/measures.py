@@ -6,7 +6,7 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.page.html import SHOWN, SPARE
 

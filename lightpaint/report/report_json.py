@@ -14,16 +14,16 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.color_choices import Choices, ColorChoice
+from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.elsewhere import Elsewhere
-from lightpaint.lighting.analysis.held_back import Reason
-from lightpaint.lighting.analysis.seen import Seen, what_is_seen
-from lightpaint.lighting.analysis.uncertainty import Uncertainty
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
-from lightpaint.relit.power import ERROR
+from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.answer_pictures import (
     Residual,

@@ -8,14 +8,14 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE, luminance
+from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place, parts_of_miss
-from lightpaint.lighting.analysis.elsewhere import Elsewhere
-from lightpaint.lighting.analysis.held_back import Reason
-from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.lighting.analysis.uncertainty import Uncertainty
-from lightpaint.lighting.bound import Bound
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.setting import LightSetting
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
+from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.measures import energy_shares
 from lightpaint.screen import some_names, some_of

@@ -5,10 +5,10 @@ import numpy as np
 from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.held_back import Reason
-from lightpaint.lighting.analysis.seen import Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.solution import Solution
-from lightpaint.relit.power import ERROR
+from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.sentences import (
     spoken_difference,

@@ -5,7 +5,7 @@ import numpy as np
 from lightpaint.arrays import Bools
 from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.painting import left_out
+from lightpaint.lighting.loss.painting import left_out
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import some_of
 from lightpaint.target.target import Target

@@ -7,13 +7,13 @@ import pytest
 
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import BasisError
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, resolve_fit
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.linear import solve_linear
 from lightpaint.lighting.linear_problem import reduced_by
+from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.sums import Sums, problem_of_sums
+from lightpaint.lighting.problem_sums import Sums, problem_of_sums
 from lightpaint.scene.lights.lights_file import Asked
 
 

@@ -31,7 +31,7 @@ from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import Done
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.progress import Interrupted, silent
 
 

@@ -20,8 +20,8 @@ from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, Row
 from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate, write_estimate
-from lightpaint.lighting.file import read_lighting, write_lighting
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 
 
 @pytest.fixture

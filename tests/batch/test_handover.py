@@ -11,7 +11,7 @@ from light_groups import interleaved, pictures
 from renderer import write_room
 
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 
 LOOKS = """
 [defaults]

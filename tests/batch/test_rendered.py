@@ -12,7 +12,7 @@ from renderer import LIGHTS, write_room
 from lightpaint.batch import run as run_module
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.scene.scene import load_scene
 
 #: A look, and the frame that begins with it.

@@ -12,8 +12,8 @@ from lightpaint.batch.manifest.sequence import DARK, at_frame, between
 from lightpaint.batch.manifest.variations import SHIFTED, SOLVED, VARIATIONS, shifted, varied
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.errors import LightingError
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.lighting import Lighting
 from lightpaint.pipeline.settings import Settings
 
 #: float64 through logarithms, cube roots and the inverse of a 3 x 3 matrix.

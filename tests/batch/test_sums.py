@@ -16,12 +16,12 @@ from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.errors import BatchError, TargetError
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.file import read_lighting
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.linear import solve_linear
+from lightpaint.lighting.linear_solve import solve_linear
+from lightpaint.lighting.problem_sums import Sums, problem_of_sums, sums_of, why_not_by_sums
 from lightpaint.lighting.solve import solve
-from lightpaint.lighting.sums import Sums, problem_of_sums, sums_of, why_not_by_sums
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.target.target import Target
 

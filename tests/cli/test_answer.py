@@ -21,9 +21,9 @@ from lightpaint.cli.output import terminal
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.lighting.analysis.held_back import Loosening, Reason
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
+from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.setting import LightSetting
 
 PRESENT = [[0.5, 0.5, 0.5], [0.4, 0.3, 0.2], [0.2, 0.3, 0.4], [0, 0, 0]]
 WEIGHTS = np.array([[1, 1, 1], [0, 0, 0], [0.2, 0.3, 0.4], [0.6, 0.2, 0.1]], np.float32)

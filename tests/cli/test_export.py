@@ -16,7 +16,7 @@ from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.relit.export.colors import with_own_colors
 from lightpaint.scene.scene import load_scene
 

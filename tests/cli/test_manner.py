@@ -15,7 +15,7 @@ from lightpaint.basis.file import write_basis
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.tolerances import Wanted
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.analysis.seen import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Seen
 
 #: A name that steers a terminal, breaks lines, and would end a text of JSON.
 BAD = 'b\x1b[2J\r\n\t\x7f\x9b\u202e\u2028"\\'

@@ -17,8 +17,8 @@ from lightpaint.cli.options.job_options import basis_of, jobs_of, settings_of
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.lighting.file import write_lighting
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.sources import BasisFile, GroupsFile
 from lightpaint.target.target import Target
 

@@ -33,7 +33,7 @@ from lightpaint.paint.background_threads import Threads
 from lightpaint.paint.frames import of_frame, to_frame
 from lightpaint.paint.launch import subject_of, subjects_of
 from lightpaint.paint.protocol import VERSION
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.steps import Identity, Step
 from lightpaint.paint.store.store import Store
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile

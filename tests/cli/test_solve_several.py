@@ -8,7 +8,7 @@ from batches import write_batch
 from command import refused, run, succeed
 
 from lightpaint.cli.options.solve_options import VARIATIONS
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 
 
 @pytest.fixture

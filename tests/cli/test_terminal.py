@@ -15,8 +15,8 @@ from lightpaint.basis import cache
 from lightpaint.basis.file import write_basis
 from lightpaint.cli.output import lines, terminal
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.file import write_lighting
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.screen import some_names, visible
 
 #: A name that colours, erases, breaks the line, turns the reading order, and speaks rich's markup.

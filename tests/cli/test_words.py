@@ -17,8 +17,8 @@ from lightpaint.cli.output.vocabulary import _SAID, OPTIONS, SPELLINGS, spoken
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import NOT_IN_GROUPS
-from lightpaint.relit.forms import Source
-from lightpaint.target.read import read_target
+from lightpaint.relit.export_forms import Source
+from lightpaint.target.target_reader import read_target
 
 PACKAGE = Path(lightpaint.__file__).parent
 

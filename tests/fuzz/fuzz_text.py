@@ -15,8 +15,8 @@ import atheris
 
 with atheris.instrument_imports(include=["lightpaint", "json", "tomllib"]):
     from lightpaint.errors import LightpaintError
-    from lightpaint.lighting.constraints.file import read_constraints
-    from lightpaint.lighting.file import read_lighting
+    from lightpaint.lighting.answer.lighting_file import read_lighting
+    from lightpaint.lighting.constraints.constraints_file import read_constraints
     from lightpaint.scene.lights.lights_file import read_lights_file
 
 PATH = Path(tempfile.mkdtemp()) / "text"

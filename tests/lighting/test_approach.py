@@ -10,11 +10,13 @@ from scipy.optimize import minimize
 
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting import approach, lit_pixels, pixels
-from lightpaint.lighting.approach import sample
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.lit_pixels import LitPixels
+from lightpaint.lighting.loss import channel_loss as pixels
+from lightpaint.lighting.loss import lit_pixels
+from lightpaint.lighting.loss import warm_start as approach
+from lightpaint.lighting.loss.lit_pixels import LitPixels
+from lightpaint.lighting.loss.warm_start import sample
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve

@@ -8,10 +8,10 @@ import pytest
 import lightpaint as lp
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.lighting.emitters import asks_no_less
 from lightpaint.lighting.fit import meant_by
-from lightpaint.lighting.live import Live
-from lightpaint.lighting.live_view import LiveView
+from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.loss.emitter_paint import asks_no_less
 
 SIZE = (36, 30)
 FLAME = (slice(16, 19), slice(14, 17))

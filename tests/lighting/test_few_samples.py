@@ -16,12 +16,12 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.lighting.binning import binned_pixels, block_side
+from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
 from lightpaint.lighting.fit import meant_by
-from lightpaint.lighting.live import Live
-from lightpaint.lighting.live_view import LiveView
-from lightpaint.lighting.painting_loss import PaintingLoss
+from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.loss.painting_loss import PaintingLoss
+from lightpaint.lighting.loss.pixel_bins import binned_pixels, block_side
 
 SCENES = Path(__file__).parent.parent.parent / "scenes"
 FILMS = {"cornell": "32x32", "stage": "80x45", "gallery": "80x45"}

@@ -10,10 +10,10 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.color_hull import DIRECTIONS, chromaticity
 from lightpaint.colour.white_range import white_range
 from lightpaint.lighting import problem as module
+from lightpaint.lighting.constraints.gamuts import PAINTED_MARGIN
 from lightpaint.lighting.fit import meant_by
-from lightpaint.lighting.gamuts import PAINTED_MARGIN
-from lightpaint.lighting.live import Live
-from lightpaint.lighting.live_view import LiveView
+from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live_view import LiveView
 
 SIZE = (24, 30)
 

@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.errors import LightingError
-from lightpaint.lighting.file import read_lighting, write_lighting
-from lightpaint.lighting.lighting import (
+from lightpaint.lighting.answer.lighting import (
     Certificate,
     Lighting,
     LightSetting,
 )
+from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.validation import BRIGHTEST
 
 AMOUNTS = st.floats(min_value=0, allow_nan=False, allow_infinity=False)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, meant_by
-from lightpaint.lighting.live import Live
-from lightpaint.lighting.live_view import LiveView
-from lightpaint.lighting.painting import weight_of_rest
+from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.loss.painting import weight_of_rest
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.target.target import Target

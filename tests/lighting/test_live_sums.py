@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.lighting.live_sums import PaintedTiles
+from lightpaint.lighting.live.live_sums import PaintedTiles
 from lightpaint.lighting.normal_equations import NormalEquations
 
 SIZE = 40, 70

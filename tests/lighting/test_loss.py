@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.lighting.analysis.analyse import analyse
+from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import Cut, Loss, PixelLoss, planes_of
+from lightpaint.lighting.loss.loss import Cut, Loss, PixelLoss, planes_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.target.target import Target

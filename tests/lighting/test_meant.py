@@ -11,9 +11,9 @@ import lightpaint as lp
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import HOLD, Fit, meant_by
-from lightpaint.lighting.painting import weight_of_rest
+from lightpaint.lighting.loss.painting import weight_of_rest
+from lightpaint.lighting.loss.weight_penalty import DIMMEST, GENTLE
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.pull import DIMMEST, GENTLE
 from lightpaint.lighting.solve import solution_of
 
 SRGB = lp.ViewTransform()

@@ -11,17 +11,17 @@ from scipy.optimize import minimize, nnls
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting import reweighted
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.analysis.refine import refine
-from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars
+from lightpaint.lighting.analysis.noise.refinement import refine
+from lightpaint.lighting.analysis.noise.uncertainty import correct_noise, error_bars
+from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.lighting.loss import image_of, planes_of
+from lightpaint.lighting.loss import reweighting as reweighted
+from lightpaint.lighting.loss.loss import image_of, planes_of
+from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.lighting.normal_equations import inner_products
-from lightpaint.lighting.painting_loss import PaintingLoss
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again, solve

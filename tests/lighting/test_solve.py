@@ -17,9 +17,9 @@ from lightpaint.errors import (
     SizeError,
     TargetError,
 )
+from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.lighting import Lighting, combine
-from lightpaint.lighting.painting import squares_of
+from lightpaint.lighting.loss.painting import squares_of
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lightpaint.errors import SizeError
+from lightpaint.lighting.live.tiles import ROOM, TiledEquations, side_for
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
-from lightpaint.lighting.tiles import ROOM, TiledEquations, side_for
 
 HEIGHT, WIDTH = 21, 30
 

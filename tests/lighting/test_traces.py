@@ -9,8 +9,8 @@ from light_groups import pictures
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.round_off import without_traces
 from lightpaint.lighting.solve import solve
-from lightpaint.lighting.traces import without_traces
 from lightpaint.target.target import Target
 
 SIZE = (24, 32)

@@ -10,7 +10,7 @@ from renderer import write_room
 
 import lightpaint as lp
 from lightpaint.images.denoiser import denoised
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint.launch import subject_of
 from lightpaint.paint.session_exports import picture, verified
 from lightpaint.pipeline.settings import Settings

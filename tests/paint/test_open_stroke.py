@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lightpaint.paint.session import open_stroke
 from lightpaint.paint.session.open_stroke import OpenStroke
-from lightpaint.paint.store.pixels import Pixels, Region, slices
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
 HEIGHT, WIDTH = 21, 34
 

@@ -20,8 +20,8 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint import protocol
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.pixels import Pixels
-from lightpaint.paint.store.requests import OF_ALL, OF_FIT, TITLES, Wishes
+from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.light_requests import OF_ALL, OF_FIT, TITLES, Wishes
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.settings import Settings

@@ -26,9 +26,9 @@ from lightpaint.paint.session.look_library import Looks
 from lightpaint.paint.session.picture_table import Pictures
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store import database
+from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.compression import packed, unpacked
 from lightpaint.paint.store.database import set_aside
-from lightpaint.paint.store.pixels import Pixels
 from lightpaint.paint.store.steps import Identity, KeptLook, Patch, SeenFrom, Step, painted_by
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.pipeline.settings import Settings

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
+from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
 from lightpaint.lighting.analysis.diagnosis import Place
-from lightpaint.lighting.analysis.elsewhere import Elsewhere
-from lightpaint.lighting.analysis.held_back import Loosening, Reason
-from lightpaint.lighting.analysis.seen import Seen
 from lightpaint.paint.protocol import Advice
 from lightpaint.paint.session.answer_messages import (
     HELP,

@@ -29,7 +29,7 @@ from lightpaint.paint import protocol, studio
 from lightpaint.paint.notebook import widget_arguments as cells
 from lightpaint.paint.notebook import widget_files as bundle
 from lightpaint.paint.store import store
-from lightpaint.paint.store.pixels import Pixels
+from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio

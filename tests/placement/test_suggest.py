@@ -19,7 +19,7 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
-from lightpaint.placement.suggest import (
+from lightpaint.placement.light_search import (
     check_suggestible,
     emitter_xml,
     suggest_lights,

@@ -11,8 +11,8 @@ from conftest import BasisFactory
 from scipy.stats import kstest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.uncertainty import correct_noise
-from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.target.target import Target

@@ -10,10 +10,10 @@ from lightpaint.basis.render.render import render_basis
 from lightpaint.basis.render.separate import WHITE
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.relight import relight
-from lightpaint.relit.verify import verify
+from lightpaint.relit.verification_render import verify
 from lightpaint.scene.lights.emission import MULTIPLE, Scaling
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target

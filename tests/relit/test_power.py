@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.relit.power import ERROR, detection_power
+from lightpaint.relit.detection_power import ERROR, detection_power
 from lightpaint.relit.verification import compare
 
 SIZE, SEEDS = (48, 64), range(100)

@@ -8,9 +8,9 @@ import pytest
 from renderer import CORNELL
 
 import lightpaint as lp
-from lightpaint.lighting.analysis.uncertainty import correct_noise, error_bars
+from lightpaint.lighting.analysis.noise.uncertainty import correct_noise, error_bars
 from lightpaint.lighting.solve import solve
-from lightpaint.relit.rounds import refine_by_rendering
+from lightpaint.relit.render_rounds import refine_by_rendering
 from lightpaint.scene.scene_render import Stream, pass_seed
 
 SEEDS = 40

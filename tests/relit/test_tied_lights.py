@@ -11,12 +11,12 @@ from renderer import LIGHTS, mitsuba_render, one_pass, write_room
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError, LightingError, SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.file import read_lighting, write_lighting
-from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.answer.lighting import Lighting, combine
+from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.pipeline.call import paint_with_light
 from lightpaint.relit.relight import check_relightable, relight
-from lightpaint.relit.verify import verify
+from lightpaint.relit.verification_render import verify
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.target.target import Target
 

@@ -13,7 +13,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
-from lightpaint.lighting.lighting import Lighting, LightSetting
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.relight import relight
 from lightpaint.relit.xml_edit import Element, XmlFile, _parse, tag
 from lightpaint.scene.scene import Scene, load_scene

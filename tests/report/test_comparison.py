@@ -17,8 +17,8 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.png import png_bytes
+from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.report import comparison
 from lightpaint.report.answer_pictures import (
@@ -34,8 +34,8 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.comparison import SURROUND, Tile, comparison_image, compose
 from lightpaint.report.report_json import report_numbers
-from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
+from lightpaint.target.target_reader import read_target
 
 SIZE = (24, 32)
 

@@ -13,10 +13,10 @@ from PIL import Image
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
-from lightpaint.lighting.analysis.analyse import analyse
+from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.problem import Problem
 from lightpaint.pipeline.results import Look
-from lightpaint.relit.verify import compare
+from lightpaint.relit.verification_render import compare
 from lightpaint.scene.scene import Scene
 
 MANY = 300

@@ -17,11 +17,11 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import solve as solve_module
-from lightpaint.lighting.analysis.analyse import analyse
+from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints import reduced_problem
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.file import write_lighting
-from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solve import solve
 from lightpaint.pipeline.results import Look, write_report
 from lightpaint.placement.suggestion import Suggestion

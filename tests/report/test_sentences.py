@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Place, diagnose
-from lightpaint.lighting.analysis.held_back import Reason
-from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.lighting.analysis.uncertainty import error_bars
-from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
+from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.sentences import (

@@ -14,12 +14,12 @@ from conftest import BasisFactory
 from lightpaint.basis.file import write_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.limiting_reasons import NAMED, Reason
+from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
 from lightpaint.lighting.analysis.diagnosis import Place
-from lightpaint.lighting.analysis.elsewhere import Elsewhere
-from lightpaint.lighting.analysis.held_back import NAMED, Reason
-from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.lighting.file import read_lighting
-from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.verdict import headline, verdict

@@ -11,7 +11,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.remarks import remarks_of_scene
 from lightpaint.scene.lights.emission import EmissionKind, Scaling
 from lightpaint.scene.lights.emitters import Emitter, point_emitter

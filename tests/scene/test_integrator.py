@@ -14,7 +14,7 @@ import lightpaint as lp
 from lightpaint.basis.file import read_origin
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relight import relit_files
 from lightpaint.scene.integrator import IntegratorChoice
 from lightpaint.scene.scene import Scene, load_scene

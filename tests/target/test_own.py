@@ -8,7 +8,7 @@ import OpenEXR
 import pytest
 
 import lightpaint as lp
-from lightpaint.target.own import KEY, write_painting
+from lightpaint.target.painting_file import KEY, write_painting
 
 
 def _target(**how: Any) -> lp.Target:

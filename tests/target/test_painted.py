@@ -13,7 +13,7 @@ from lightpaint.colour.display.view_transform import TransformChoice, ViewTransf
 from lightpaint.errors import SizeError, TargetError, ViewError
 from lightpaint.images.formats.exr import Part, write_parts, write_rgb
 from lightpaint.images.formats.png import write_png_16
-from lightpaint.target.read import read_target
+from lightpaint.target.target_reader import read_target
 from lightpaint.target.template import Template, write_look, write_template
 
 SIZE = (60, 80)

@@ -10,7 +10,7 @@ import pytest
 
 from lightpaint.errors import ImageError, SizeError, TargetError
 from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
-from lightpaint.target.read import read_target
+from lightpaint.target.target_reader import read_target
 
 SIZE = (6, 5)
 

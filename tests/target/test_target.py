@@ -11,8 +11,8 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.formats.exr import read_parts
 from lightpaint.lighting.solve import solve
-from lightpaint.target.read import read_target
 from lightpaint.target.target import Target
+from lightpaint.target.target_reader import read_target
 from lightpaint.target.template import write_look
 
 # Resampling runs in float32.

@@ -11,7 +11,7 @@ from lightpaint.batch.gallery.summary import Row
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.report.page.mixer import kelvins, told_file, told_transform
 
 #: Mixers of a page, at most: each may be two megabytes. Lights of one that have sliders.

@@ -26,7 +26,7 @@ from lightpaint.files import read_text, replacing
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.storage.json_records import strict_json

@@ -12,11 +12,11 @@ from lightpaint.batch.manifest.variations import SOLVED
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import GroupsFile
 from lightpaint.relit.export.usd import check_usd
-from lightpaint.relit.forms import FORMS
+from lightpaint.relit.export_forms import FORMS
 from lightpaint.screen import some_names
 
 #: What is wanted of a look if nobody says; of a lighting that is there already, and of a frame.

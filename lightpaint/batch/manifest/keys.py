@@ -10,9 +10,9 @@ from lightpaint.batch.manifest.variations import VARIATIONS
 from lightpaint.errors import LightpaintError
 from lightpaint.files import one_line
 from lightpaint.pipeline.settings import Settings
-from lightpaint.relit.forms import FORMS
+from lightpaint.relit.export_forms import FORMS
 from lightpaint.scene.film import MAX_SPP, check_resolution
-from lightpaint.target.read import Paint
+from lightpaint.target.target_reader import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, one_of, whole
 
 #: What can be wanted of a look; `lights` is the lighting and nothing else.

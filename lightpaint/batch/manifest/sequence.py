@@ -12,7 +12,7 @@ from lightpaint.batch.manifest.variations import with_emission
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.colour.hue import WHITE_DUV
 from lightpaint.errors import LightingError
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 
 #: Stops below the brighter end at which a light that is off begins, or ends, in `log`.
 DARK = 10.0

@@ -10,10 +10,10 @@ from lightpaint.arrays import RGB
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.photometry import photometry
 from lightpaint.errors import BatchError
+from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.setting import LightSetting
 from lightpaint.pipeline.settings import Settings
 
 #: Words that ask for another solve, and for what.

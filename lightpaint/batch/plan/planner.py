@@ -24,9 +24,9 @@ from lightpaint.batch.work.task import EXPORT, answer_task, bases_of, export_tas
 from lightpaint.batch.work.worker_cache import Held
 from lightpaint.errors import ALONE, BatchError, LightpaintError
 from lightpaint.files import check_writable
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.file import read_lighting
-from lightpaint.lighting.sums import why_not_by_sums
+from lightpaint.lighting.problem_sums import why_not_by_sums
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.result_folder import is_as_written
 from lightpaint.pipeline.results import view_names

@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.manifest.variations import SHIFTED, SOLVED, shifted, varied
-from lightpaint.lighting.lighting import Lighting, combine
+from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.pipeline.answer_folder import answer_files, new_answer
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.result_folder import ResultFolder

@@ -16,7 +16,7 @@ from lightpaint.batch.work.work import attempted, fields_of
 from lightpaint.batch.work.work_items import Done, Film, SumsOfRows, Wanted
 from lightpaint.batch.work.worker_cache import Held
 from lightpaint.errors import BasisError
-from lightpaint.lighting.sums import Sums
+from lightpaint.lighting.problem_sums import Sums
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.sources import Painting
 from lightpaint.progress import Listener

@@ -8,7 +8,7 @@ from lightpaint.basis.render.sums import mean_and_half_difference
 from lightpaint.batch.work.work_items import SumsOfRows
 from lightpaint.batch.work.worker_cache import Held
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.sums import Sums, sums_of
+from lightpaint.lighting.problem_sums import Sums, sums_of
 
 
 def sums_of_rows(errand: SumsOfRows, held: Held) -> list[Sums]:

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.linear import solve_linear
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.problem_sums import Sums, problem_of_sums, sums_of
 from lightpaint.lighting.solve import solution_of
-from lightpaint.lighting.sums import Sums, problem_of_sums, sums_of
 from lightpaint.pipeline.answer_folder import new_answer
 from lightpaint.pipeline.job import Job
 
@@ -18,7 +18,7 @@ def answer_by_sums(job: Job, basis: Basis) -> None:
     [view] = job.views
     basis = basis if view.scene is None else basis.asking(view.scene.asked)
     if not basis.knows_noise:
-        # Only pixels tell what rounding alone has made (see lighting/traces.py).
+        # Only pixels tell what rounding alone has made (see lighting/round_off.py).
         problem = Problem.of(basis, view.target, constraints=job.asked, fit=job.fit)
         leave_lighting(job, solution_of(problem).lighting)
         return

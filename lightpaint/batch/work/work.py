@@ -22,8 +22,8 @@ from lightpaint.batch.work.worker_cache import Held
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line, write_text
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.file import read_lighting
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.renders import relight_look, relit_folder
@@ -32,7 +32,7 @@ from lightpaint.pipeline.results import view_names
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, content, from_json
 from lightpaint.progress import Listener
-from lightpaint.relit.forms import Source, names_of_forms, writers_of
+from lightpaint.relit.export_forms import Source, names_of_forms, writers_of
 from lightpaint.scene.scene import Scene
 
 #: What the system says of a disk that takes no more.

@@ -13,9 +13,9 @@ from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
-from lightpaint.lighting.analysis.constraint_kinds import KEYS
-from lightpaint.lighting.analysis.held_back import Reason
-from lightpaint.lighting.setting import LightSetting
+from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.pipeline.results import Look
 from lightpaint.pipeline.settings import Settings
 from lightpaint.report.answer_pictures import spoken_view

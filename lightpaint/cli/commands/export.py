@@ -7,9 +7,9 @@ from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.output_mode import Outcome
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_text
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.sources import GroupsFile, SceneFile, content
-from lightpaint.relit.forms import Source, names_of_forms, writers_of
+from lightpaint.relit.export_forms import Source, names_of_forms, writers_of
 from lightpaint.storage.staging import finish
 
 

@@ -19,7 +19,7 @@ from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
     from lightpaint.paint.server.server import Server
-    from lightpaint.paint.store.requests import Wishes
+    from lightpaint.paint.store.light_requests import Wishes
 
 #: What it means that others can.
 RISK = (

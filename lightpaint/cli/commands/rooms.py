@@ -18,7 +18,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.demo import write_demo
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_name, check_writable
-from lightpaint.lighting.file import read_lighting
+from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import obtain
 from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import Any
 
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.light_requests import Wishes
 
 
 def solve_command(

@@ -20,7 +20,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import ALONE, BasisError, BatchError, OutputError, TargetError
 from lightpaint.files import called, check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
-from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, Painting, SceneFile, check_needed
 from lightpaint.screen import some_names

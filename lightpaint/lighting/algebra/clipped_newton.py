@@ -10,7 +10,7 @@ them, and three channels in one call hardly more than one.
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
-from lightpaint.lighting.algebra.nearest import is_suspect
+from lightpaint.lighting.algebra.nearest_optimum import is_suspect
 from lightpaint.lighting.algebra.quadratic import EPSILON, kkt_step
 from lightpaint.progress import wanted
 
@@ -40,7 +40,8 @@ def clipped_newton(
     size: (c,), what the KKT residuals are relative to.
     Returns x, to the last bit at the bounds that hold it, the KKT residuals, (c,), how many steps
     were taken, and whether the last was of a matrix that may be singular: there are then other x
-    that are as good (see nearest.py). Where a residual is more than `tolerance`, x is of no use.
+    that are as good (see nearest_optimum.py). Where a residual is more than `tolerance`, x is of no
+    use.
     """
     matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0
     check = wanted()

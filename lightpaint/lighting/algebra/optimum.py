@@ -12,7 +12,7 @@ from lightpaint.lighting.algebra.active_set import polish
 from lightpaint.lighting.algebra.capped_newton import capped_newton
 from lightpaint.lighting.algebra.clipped_newton import clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
-from lightpaint.lighting.algebra.nearest import nearest_equal
+from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED, Cap, Quadratic, scaled
 from lightpaint.progress import wanted
 from lightpaint.threads import one_thread, side_by_side
@@ -78,8 +78,8 @@ def minimise(
     result.
 
     If M is singular, as with two lights at one place, many x are optimal: the answer is near
-    `start` (nearest.py), but which one it is, is not promised. Unknowns with M_ii = 0 keep their
-    start.
+    `start` (nearest_optimum.py), but which one it is, is not promised. Unknowns with M_ii = 0
+    keep their start.
 
     Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
     """

@@ -20,12 +20,12 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.colour.color import luminance
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.directions import all_columns
-from lightpaint.lighting.analysis.grain import grain
-from lightpaint.lighting.analysis.noise import pseudo_inverse
-from lightpaint.lighting.analysis.release import bounds_of
-from lightpaint.lighting.bound import Bound
-from lightpaint.lighting.lighting import combine
+from lightpaint.lighting.analysis.bound_release import bounds_of
+from lightpaint.lighting.analysis.noise.directions import all_columns
+from lightpaint.lighting.analysis.noise.grain import grain
+from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
+from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
 from lightpaint.screen import shortly

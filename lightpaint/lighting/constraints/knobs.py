@@ -13,7 +13,7 @@ from lightpaint.colour.color_hull import ColorHull
 from lightpaint.colour.white_range import WhiteRange
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.constraints.constraints import LightConstraint, Tie
-from lightpaint.lighting.constraints.limits import (
+from lightpaint.lighting.constraints.emission_limits import (
     ROUND_OFF,
     check_grey,
     check_room,
@@ -38,9 +38,9 @@ class Knob:
 
     limit: coefficients, least and most of a sum over its unknowns, if one is limited.
     whites: the range of white of a light that keeps to one. window: between which of these its two
-    unknowns mix at present (on_locus.py).
+    unknowns mix at present (white_neighbours.py).
     gamut: the colours that the light mixes, if it would otherwise leave them: all of them, or those
-    towards one `side` (near_sides.py).
+    towards one `side` (gamut_bounds.py).
     """
 
     lights: tuple[int, ...]

@@ -13,9 +13,9 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.optimum import Method, Optimum, minimise, minimise_each
 from lightpaint.lighting.algebra.quadratic import Cap, moved_along
-from lightpaint.lighting.constraints.blocks import Block
 from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.constraints.unknown_blocks import Block
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import side_by_side
 

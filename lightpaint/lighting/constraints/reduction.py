@@ -4,7 +4,7 @@ A light that may have any colour has three unknowns; one of fixed colour, or sev
 dimmer, a single one; one that mixes primaries, an unknown for each. What is locked is in w₀
 and moves to the right-hand side. Limits are bounds on x, or on its luminance. So whatever is
 asked for, the problem stays one convex quadratic; with ranges of white it is one for each choice
-of neighbouring whites (on_locus.py).
+of neighbouring whites (white_neighbours.py).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -17,9 +17,8 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.algebra.quadratic import Cap
-from lightpaint.lighting.constraints.addressing import of_each_light, tied_lights
-from lightpaint.lighting.constraints.blocks import Alike, Block, Entries, Kind, Stack
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.gamuts import Gamuts
 from lightpaint.lighting.constraints.knobs import (
     Knob,
     Unknown,
@@ -28,7 +27,8 @@ from lightpaint.lighting.constraints.knobs import (
     mix_of,
     tie_of,
 )
-from lightpaint.lighting.gamuts import Gamuts
+from lightpaint.lighting.constraints.light_patterns import of_each_light, tied_lights
+from lightpaint.lighting.constraints.unknown_blocks import Alike, Block, Entries, Kind, Stack
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ from weakref import WeakValueDictionary
 
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
-from lightpaint.lighting.analysis.analyse import analyse, with_findings
+from lightpaint.lighting.analysis.analysis import analyse, with_findings
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.file import write_lighting
-from lightpaint.lighting.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import told
 from lightpaint.paint.notebook import widget_arguments as cells
@@ -34,7 +34,7 @@ from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio
 from lightpaint.pipeline.settings import SettingsByName
-from lightpaint.target.own import write_painting
+from lightpaint.target.painting_file import write_painting
 from lightpaint.target.target import Target
 
 try:

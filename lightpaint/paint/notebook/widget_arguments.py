@@ -14,15 +14,15 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import called
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.painting import what_counts
+from lightpaint.lighting.loss.painting import what_counts
 from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session_file import check_together
+from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.database import AFRESH, ELSEWHERE
-from lightpaint.paint.store.pixels import Pixels
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import check_nothing_idle

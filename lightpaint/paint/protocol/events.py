@@ -20,7 +20,7 @@ from lightpaint.paint.protocol.parts import (
     TransformInfo,
     ViewInfo,
 )
-from lightpaint.paint.store.pixels import Region
+from lightpaint.paint.store.canvas_pixels import Region
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

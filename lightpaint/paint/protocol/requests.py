@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, get_args
 
 from lightpaint.paint.protocol.base import Message
-from lightpaint.paint.store.pixels import Region
+from lightpaint.paint.store.canvas_pixels import Region
 
 #: Of this protocol; a page of another one is told to load itself anew.
 VERSION = 2

@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB
 from lightpaint.paint.protocol import events, parts, requests
-from lightpaint.paint.store.pixels import Region
+from lightpaint.paint.store.canvas_pixels import Region
 
 #: Where the types lie, beside the scripts that use them.
 FILE = Path(__file__).parents[1] / "page" / "engine" / "messages.d.ts"

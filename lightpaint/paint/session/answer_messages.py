@@ -10,11 +10,11 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.photometry import photometry
-from lightpaint.lighting.analysis.analyse import Analysis
+from lightpaint.lighting.analysis.analysis import Analysis
+from lightpaint.lighting.analysis.appearance.appearance import UNSEEN, Seen
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
 from lightpaint.lighting.analysis.diagnosis import parts_of_miss
-from lightpaint.lighting.analysis.elsewhere import Elsewhere
-from lightpaint.lighting.analysis.held_back import Reason
-from lightpaint.lighting.analysis.seen import UNSEEN, Seen
 from lightpaint.paint.protocol import Advice, Closeness, Findings, LightAnswer, LightInfo
 from lightpaint.report.sentences import (
     MET,

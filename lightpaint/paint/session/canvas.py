@@ -9,9 +9,9 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import PaintError
-from lightpaint.lighting.live_view import LiveView
+from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.session.open_stroke import OpenStroke
-from lightpaint.paint.store.pixels import Pixels, Region, slices
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.steps import Patch, Step, painted_by
 
 #: Importance of a pixel beyond which it is a slip, and light, beside the present look's brightest.

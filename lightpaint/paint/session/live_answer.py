@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.file import constraints_of
+from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.linear_problem import reduced_by
-from lightpaint.lighting.live import Live
-from lightpaint.lighting.live_view import LiveView
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.pipeline.settings import Settings
 
 

@@ -23,8 +23,8 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.session.picture_table import Pictures, small_picture
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.pixels import Pixels
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.steps import KeptLook, of_view
 
 #: Characters of a name, at most.

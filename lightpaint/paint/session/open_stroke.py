@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from lightpaint.paint.store.pixels import Pixels, Region, slices
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
 #: Side of the squares that are kept from the first time that a stroke touches them.
 SIDE = 64

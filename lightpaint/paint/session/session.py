@@ -30,9 +30,9 @@ from lightpaint.paint.session.answer_messages import Judgement, answer_findings,
 from lightpaint.paint.session.canvas import Canvases
 from lightpaint.paint.session.live_answer import Answering
 from lightpaint.paint.session.snapshot import Moment
+from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.database import DamagedError
-from lightpaint.paint.store.pixels import Pixels, Region
-from lightpaint.paint.store.requests import TITLES, Wishes
+from lightpaint.paint.store.light_requests import TITLES, Wishes
 from lightpaint.paint.store.steps import Step
 from lightpaint.paint.store.store import Store
 from lightpaint.pipeline.settings import Settings

@@ -10,18 +10,18 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.analyse import analyse
-from lightpaint.lighting.analysis.elsewhere import what_changes
-from lightpaint.lighting.analysis.looking import Looking
-from lightpaint.lighting.analysis.seen import NOTICED
-from lightpaint.lighting.analysis.uncertainty import correct_noise
+from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.appearance.appearance import NOTICED
+from lightpaint.lighting.analysis.appearance.display_difference import Looking
+from lightpaint.lighting.analysis.appearance.unpainted_change import what_changes
+from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.paint.session.answer_messages import foreseen, why_not_closer
 from lightpaint.paint.session.picture_table import Picture, small_picture
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.pipeline.settings import Settings
 from lightpaint.target.target import Target
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.store.pixels import Pixels, Region
+from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.steps import Patch
 
 #: Of zlib: quick, which is what counts under the hand.

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.files import first_line
+from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import packed, unpacked
-from lightpaint.paint.store.pixels import Pixels, Region
 from lightpaint.paint.store.steps import Patch
 from lightpaint.storage.json_records import strict_json
 

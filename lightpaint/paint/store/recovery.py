@@ -28,7 +28,7 @@ from lightpaint.paint.store.database import (
     transaction,
 )
 from lightpaint.paint.store.lazy_arrays import DTYPES
-from lightpaint.paint.store.requests import Wishes
+from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.steps import Identity, of_view
 from lightpaint.screen import some_names
 from lightpaint.storage.json_records import strict_json

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
-from lightpaint.paint.store.pixels import Pixels, Region, slices
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.storage.json_records import read_record
 
 

@@ -26,6 +26,7 @@ from typing import Any
 
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line
+from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import is_marked, packed_patches, unpacked_patch
 from lightpaint.paint.store.database import (
     DamagedError,
@@ -44,7 +45,6 @@ from lightpaint.paint.store.lazy_arrays import (
     PackedArrays,
     packed_arrays,
 )
-from lightpaint.paint.store.pixels import Pixels, Region
 from lightpaint.paint.store.steps import Identity, KeptLook, Patch, Step
 from lightpaint.storage.json_records import strict_json
 

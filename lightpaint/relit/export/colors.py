@@ -6,8 +6,8 @@ import numpy as np
 
 from lightpaint.arrays import RGB, as_rgb
 from lightpaint.colour.color import luminance
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.setting import LightSetting
+from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
 
 #: Width of a 95 % interval, beside the brightest channel, from which on a light is hardly known.
 WIDE = 1.0

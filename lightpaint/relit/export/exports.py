@@ -15,8 +15,8 @@ from lightpaint.colour.color import luminance
 from lightpaint.files import write_text
 from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
 from lightpaint.keywords import keywords
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.setting import LightSetting
+from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_script
 
 #: Everything that `write_exports` may write.

@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from lightpaint.arrays import RGB
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.setting import LightSetting
+from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.version import __version__
 

@@ -21,7 +21,7 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.files import one_line
 from lightpaint.images.formats.exr import Part, rgb_channels
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 
 #: What needs a backslash in a quoted word of Tcl that itself stands in braces.
 SPECIAL = re.compile(r'[\\"\[\]${}]')

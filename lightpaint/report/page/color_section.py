@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.colour.color import cct_and_duv
 from lightpaint.colour.hue import spoken_hue
-from lightpaint.lighting.analysis.color_choices import Choices, ColorChoice
+from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.fit import Colors
 from lightpaint.report.page.html import row, table
 from lightpaint.screen import some_names

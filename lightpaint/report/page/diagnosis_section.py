@@ -8,10 +8,10 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.lighting.analysis.appearance.appearance import Seen
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.lighting.analysis.uncertainty import Uncertainty
-from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
+from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (
     FINEST_SCALE,

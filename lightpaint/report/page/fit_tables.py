@@ -9,10 +9,10 @@ import numpy as np
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.painting import left_out
-from lightpaint.lighting.software import Software, version
+from lightpaint.lighting.answer.software_versions import Software, version
+from lightpaint.lighting.loss.painting import left_out
 from lightpaint.lighting.solution import Solution
-from lightpaint.relit.power import ERROR
+from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import LIMIT, Verification
 from lightpaint.report.measures import (
     brighter_as_allowed,

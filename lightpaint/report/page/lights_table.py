@@ -14,9 +14,9 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.photometry import Photometry
-from lightpaint.lighting.analysis.uncertainty import Uncertainty
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.setting import ALL_REACHED, LightSetting
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
+from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.basis_memo import once
 from lightpaint.report.clean_pictures import MOST_THUMBNAILS

@@ -24,9 +24,9 @@ from lightpaint.colour.photometry import photometry
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.page_picture import Compact, compact
 from lightpaint.images.pixel_blocks import block_mean
-from lightpaint.lighting.file import lighting_fields
-from lightpaint.lighting.lighting import Lighting
-from lightpaint.lighting.setting import ALL_REACHED
+from lightpaint.lighting.answer.light_setting import ALL_REACHED
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.answer.lighting_file import lighting_fields
 from lightpaint.report.basis_memo import once, planes_of
 from lightpaint.report.measures import that_do_most
 from lightpaint.report.page.figures import ENOUGH, data_uri

@@ -23,8 +23,8 @@ from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.images.pixel_blocks import covered, enlarged
-from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import coverage, transform_of, unpainted_look

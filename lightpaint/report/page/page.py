@@ -17,10 +17,10 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import covered
-from lightpaint.lighting.analysis.color_choices import Choices
+from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.color_choices import Choices
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
-from lightpaint.lighting.analysis.seen import Seen
-from lightpaint.lighting.analysis.uncertainty import Uncertainty
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification

@@ -1,7 +1,7 @@
 """The lights file: which lights to adjust and which go together, in a TOML beside the scene.
 
 For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. What it asks of the
-lights in the solve is kept as it stands (lighting/constraints/file.py makes something of it).
+lights in the solve is kept as it stands; lighting/constraints/constraints_file.py reads it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping

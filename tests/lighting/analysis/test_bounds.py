@@ -13,11 +13,12 @@ from scipy.optimize import lsq_linear
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.white_range import white_range
 from lightpaint.errors import LightingError
-from lightpaint.lighting.analysis import held, release
+from lightpaint.lighting.analysis import active_bounds as held
+from lightpaint.lighting.analysis import bound_release as release
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.bound import Bound
+from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.file import read_lighting, write_lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 

@@ -5,9 +5,9 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from lightpaint.lighting.analysis import color_choices as module
-from lightpaint.lighting.analysis.color_choices import color_choices
-from lightpaint.lighting.analysis.seen import what_is_seen
+from lightpaint.lighting.analysis.appearance import color_choices as module
+from lightpaint.lighting.analysis.appearance.appearance import what_is_seen
+from lightpaint.lighting.analysis.appearance.color_choices import color_choices
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.solve import solve

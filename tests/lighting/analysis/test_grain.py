@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from lightpaint.lighting.analysis.diagnosis import diagnose
-from lightpaint.lighting.analysis.grain import grain
+from lightpaint.lighting.analysis.noise.grain import grain
 from lightpaint.lighting.solve import solve
 from lightpaint.report.sentences import what_is_missed
 from lightpaint.target.target import Target

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.lighting.analysis.peaks import PEAK, TWO_PATHS, WIDER, Peaks
-from lightpaint.lighting.analysis.uncertainty import error_bars, with_error_bars
+from lightpaint.lighting.analysis.noise.peaks import PEAK, TWO_PATHS, WIDER, Peaks
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.lights_table import lights_table
 from lightpaint.report.page.notebook_html import html_of

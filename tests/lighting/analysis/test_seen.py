@@ -9,13 +9,13 @@ import pytest
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis import held_back
-from lightpaint.lighting.analysis.analyse import analyse
-from lightpaint.lighting.analysis.elsewhere import what_changes
-from lightpaint.lighting.analysis.looking import Looking
-from lightpaint.lighting.analysis.seen import CLOSE, Seen, what_is_seen
+from lightpaint.lighting.analysis.analysis import analyse
+from lightpaint.lighting.analysis.appearance import limiting_reasons as held_back
+from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.display_difference import Looking
+from lightpaint.lighting.analysis.appearance.unpainted_change import what_changes
+from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.lighting import combine
 from lightpaint.lighting.solve import solve
 from lightpaint.report.verdict import headline
 from lightpaint.target.target import Target

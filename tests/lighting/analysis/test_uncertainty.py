@@ -11,9 +11,9 @@ from scipy.stats import truncnorm
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.noise import pseudo_inverse
-from lightpaint.lighting.analysis.refine import refine
-from lightpaint.lighting.analysis.uncertainty import (
+from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
+from lightpaint.lighting.analysis.noise.refinement import refine
+from lightpaint.lighting.analysis.noise.uncertainty import (
     SIDES,
     _one_sided,
     correct_noise,

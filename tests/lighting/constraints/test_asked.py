@@ -10,7 +10,7 @@ from renderer import LIGHTS, write_room
 import lightpaint as lp
 from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.constraints.file import read_constraints
+from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.scene.lights.lights_file import Asked, read_lights_file
 

@@ -8,12 +8,12 @@ import pytest
 import lightpaint as lp
 from lightpaint.colour.color_hull import ColorHull, reach_of
 from lightpaint.colour.white_range import white_range
-from lightpaint.lighting.constraints import near_sides
-from lightpaint.lighting.constraints.near_sides import solve_near_sides
-from lightpaint.lighting.constraints.on_locus import next_whites
+from lightpaint.lighting.constraints import gamut_bounds as near_sides
+from lightpaint.lighting.constraints.gamut_bounds import solve_near_sides
+from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.constraints.reduced_problem import nearest, solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.constraints.white_neighbours import next_whites
 from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.normal_equations import NormalEquations
 

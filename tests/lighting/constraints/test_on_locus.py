@@ -9,11 +9,11 @@ from scipy.optimize import nnls
 
 import lightpaint as lp
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
-from lightpaint.lighting.constraints.on_locus import next_whites
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
+from lightpaint.lighting.constraints.white_neighbours import next_whites
 from lightpaint.lighting.fit import meant_by
-from lightpaint.lighting.live import Live
-from lightpaint.lighting.live_view import LiveView
+from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 

@@ -14,7 +14,7 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.transform_table import curve_of, lattice_of
 from lightpaint.images.page_picture import BRIGHTEST, DROPPED, compact, expanded
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.page.html import SHOWN
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
 from lightpaint.report.page.page import report_page

@@ -22,7 +22,7 @@ import lightpaint as lp
 from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis.uncertainty import correct_noise
+from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
 from lightpaint.paint.launch import subject_of
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.steps import of_view

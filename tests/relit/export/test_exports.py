@@ -22,7 +22,7 @@ from light_groups import channels, interleaved, multi_part, pictures, write
 import lightpaint as lp
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
 from lightpaint.colour.primaries import to_rec709
-from lightpaint.lighting.lighting import Lighting
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.exports import (
     EXPORTS,
     blender_script,

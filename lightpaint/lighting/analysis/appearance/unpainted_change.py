@@ -1,0 +1,87 @@
+"""How much what nobody painted changes its look."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.color_difference import ciede2000
+from lightpaint.lighting.analysis.appearance.display_difference import Looking
+from lightpaint.lighting.analysis.appearance.object_miss import NO_NAME
+
+#: Part of the picture that a place must have of what is not painted, to be spoken of.
+LARGE_ENOUGH = 0.01
+
+#: Regions along each side of the picture: left, middle, right.
+REGIONS = 3
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """How much of the picture that is not painted changes, in CIEDE2000.
+
+    Attributes:
+        delta_e: Its mean over all that is not painted.
+        worst: Its mean over the object, or the ninth of the picture, that changes most.
+        object: The name of that object; "" where it has none.
+        region: Row and column of that ninth, 0 to 2, where there is no object.
+    """
+
+    delta_e: float
+    worst: float
+    object: str = ""
+    region: tuple[int, int] = (1, 1)
+
+
+def what_changes(
+    look: Looking, basis: Basis, painted: Bools, before: Floats, after: Floats
+) -> Elsewhere | None:
+    """Return how far the unpainted part looks from how it did; None if all is painted.
+
+    look: at the painting. painted: (h, w). before, after: (h, w, 3) linear, the two pictures.
+    """
+    every = (slice(None, None, look.step), slice(None, None, look.step))
+    rest = ~painted[every]
+    if not rest.any():
+        return None
+    labs = (look.lab(x[every][rest].astype(np.float64)) for x in (before, after))
+    changed = ciede2000(*labs)
+    worst, name, region = _worst(basis, every, rest, changed)
+    return Elsewhere(float(changed.mean()), worst, name, region)
+
+
+def _worst(
+    basis: Basis, every: tuple[slice, slice], rest: Bools, changed: Doubles
+) -> tuple[float, str, tuple[int, int]]:
+    """Return the largest mean of `changed` over one place: its ΔE, object and region."""
+    rows, columns = (REGIONS * np.arange(n) // n for n in rest.shape)
+    ninth = (REGIONS * rows[:, None] + columns[None, :])[rest]
+    enough = LARGE_ENOUGH * rest.size
+    at, most = _largest_mean(ninth, changed, REGIONS**2, enough)
+    region = (at // REGIONS, at % REGIONS)
+    objects = basis.objects
+    if objects is None:
+        return most, "", region
+    named = np.array([not NO_NAME.fullmatch(name) for name in objects.names], dtype=bool)
+    index = objects.index[every][rest].astype(np.int64)
+    known = index >= 0
+    if not (known.any() and named.any()):
+        return most, "", region
+    its, mean = _largest_mean(index[known], changed[known], len(named), enough, named)
+    return (mean, objects.names[its], region) if mean > 0 else (most, "", region)
+
+
+def _largest_mean(
+    index: Indices, values: Doubles, count: int, enough: float, among: Bools | None = None
+) -> tuple[int, float]:
+    """Return which of `count` places has the largest mean, and that mean.
+
+    index, values: (p,), the place of each pixel, and its value. enough: pixels that a place must
+    have. among: (count,), places that may be named; None for all.
+    """
+    sizes = np.bincount(index, minlength=count)
+    means = np.bincount(index, weights=values, minlength=count) / np.maximum(sizes, 1)
+    means = np.where((sizes >= enough) & (True if among is None else among), means, 0)
+    at = int(np.argmax(means))
+    return at, float(means[at])

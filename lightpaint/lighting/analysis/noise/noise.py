@@ -1,0 +1,251 @@
+"""What the half differences of a basis say of its normal equations, and of a prediction.
+
+The two halves of the samples give two gradients of the objective at the solved weights. Half
+their difference, pixel by pixel, has the covariance of the gradient's noise (docs/method.md,
+"How sure").
+"""
+
+from contextlib import nullcontext
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.basis.basis import mix
+from lightpaint.lighting.analysis.noise.peaks import Peaks
+from lightpaint.lighting.normal_equations import BLOCK, FEW_LIGHTS, NormalEquations
+from lightpaint.lighting.solution import Solution
+from lightpaint.threads import one_thread, side_by_side
+
+#: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
+#: the estimate of it is itself noise, and what is left of M would soon be indefinite.
+LARGEST_NOISE = 0.5
+
+#: Parts of the pixels whose sums are made side by side.
+PARTS = 4
+
+#: Rows of matrices that several threads only wait for.
+SMALL = 256
+
+#: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
+SINGULAR = 1e-12
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Sums over pixels of products of half differences, per channel.
+
+    power: (3, n, n), N_ij = Σ D h_i h_j, what the noise adds to M. drawn: (3, n), what the
+    noise of the current look, where that is solved for, adds to b.
+    gradient: (3, n, 3, n), covariance of the gradient. objective: as in `Uncertainty`.
+    hidden: (3, n), what few pixels may add to a light's own, that they do not show (peaks.py).
+    """
+
+    power: Doubles
+    drawn: Doubles
+    gradient: Doubles
+    objective_error: Doubles
+    objective_noise: Doubles
+    hidden: Doubles
+
+    @property
+    def is_hidden(self) -> Bools:
+        """(n, 3), whether most of what pushes a light is what few pixels may hide."""
+        return np.asarray(self.hidden > np.einsum("cici->ci", self.gradient)).T
+
+    @property
+    def whole(self) -> Doubles:
+        """(3, n, 3, n), covariance of the gradient with what is hidden."""
+        made, lights = self.gradient.copy(), np.arange(self.hidden.shape[1])
+        deviation = np.sqrt(self.hidden)
+        # Where channels are coupled, one path carries all three.
+        coupled = made.any(axis=(1, 3))
+        for c, d in zip(*np.nonzero(coupled), strict=True):
+            made[c, lights, d, lights] += deviation[c] * deviation[d]
+        return made
+
+
+def noise_sums(solution: Solution) -> Noise:
+    """One pass over the pixels that count, by parts of them side by side."""
+    basis, problem, weights = solution.basis, solution.problem, solution.weights
+    # (pixels, 1), or (pixels, 3) where channels differ.
+    squares = problem.squares
+    weight, share = (x.reshape(-1, x.shape[2]) for x in (squares.weight, squares.share))
+    residual, mixed = residual_and_noise(solution)
+    # The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by: of a
+    # pixel it adds Φᵢ hᵢ times this.
+    pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
+    unseen = ~basis.emitters_seen.ravel()
+    counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
+    of_all = _Pixels(
+        basis.images.reshape(len(weights), -1, 3),
+        basis.half_differences.reshape(len(weights), -1, 3),
+        weight,
+        share,
+        residual,
+        mixed,
+        mix(basis.half_differences, basis.present_weights).reshape(-1, 3),
+        unseen,
+    )
+    # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
+    is_coupled = len(problem.full.channel_groups) < 3
+    # As many parts on every machine, whose sums are added in order: the bits are the same.
+    length = BLOCK * max(1, -(-counted.size // (BLOCK * PARTS)))
+    parts = [counted[k : k + length] for k in range(0, counted.size, length)]
+    sums = [_Sums.none(len(weights))] + (
+        side_by_side(lambda its: of_all.sums(its, weights, pulled, is_coupled=is_coupled), parts)
+        if len(weights) <= FEW_LIGHTS
+        else [of_all.sums(its, weights, pulled, is_coupled=is_coupled) for its in parts]
+    )
+    return Noise(
+        power=np.asarray(sum(x.power for x in sums)),
+        drawn=np.asarray(sum(x.drawn for x in sums)),
+        gradient=np.asarray(sum(x.gradient for x in sums)),
+        objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
+        objective_noise=(weight * np.square(mixed)).sum(axis=0),
+        hidden=np.array([Peaks.together([x.peaks[c] for x in sums]).hidden() for c in range(3)]),
+    )
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Over some pixels. power, drawn, gradient: as in `Noise`. peaks: of each channel."""
+
+    power: Doubles
+    drawn: Doubles
+    gradient: Doubles
+    peaks: tuple[Peaks, ...]
+
+    @classmethod
+    def none(cls, n: int) -> "_Sums":
+        peaks = tuple(Peaks.none(n) for _ in range(3))
+        return cls(np.zeros((3, n, n)), np.zeros((3, n)), np.zeros((3, n, 3, n)), peaks)
+
+
+@dataclass(frozen=True)
+class _Pixels:
+    """What is known of all pixels.
+
+    images, halves: (n, p, 3). weight, share: (p, 1) or (p, 3). residual, mixed: (p, 3), as of
+    `residual_and_noise`. present: (p, 3), noise of the current look. unseen: (p,), where no emitter
+    is.
+    """
+
+    images: Floats
+    halves: Floats
+    weight: Floats
+    share: Floats
+    residual: Doubles
+    mixed: Doubles
+    present: Floats
+    unseen: Bools
+
+    def sums(
+        self, counted: Indices, weights: Doubles, pulled: Doubles, *, is_coupled: bool
+    ) -> _Sums:
+        """Over some of them. pulled: (n, 3), by how much noise moves the pull."""
+        made = _Sums.none(len(weights))
+        for start in range(0, counted.size, BLOCK):
+            its = counted[start : start + BLOCK]
+            # Pixels in one run are looked at where they are; others have to be gathered.
+            in_one_run = its[-1] - its[0] + 1 == its.size
+            pixels = slice(int(its[0]), int(its[-1]) + 1) if in_one_run else its
+            rows = [self._rows(made, pixels, c, weights, pulled) for c in range(3)]
+            for c in range(3):
+                made.gradient[c, :, c] += rows[c] @ rows[c].T
+            if is_coupled:
+                # One path carries all three channels, so their noise goes together.
+                for c, d in ((0, 1), (0, 2), (1, 2)):
+                    product = rows[c] @ rows[d].T
+                    made.gradient[c, :, d] += product
+                    made.gradient[d, :, c] += product.T
+        return made
+
+    def _rows(
+        self, made: _Sums, pixels: slice | Indices, c: int, weights: Doubles, pulled: Doubles
+    ) -> Doubles:
+        """(n, pixels), what noise adds to the gradient of a channel; all else goes to `made`."""
+        D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
+        h, lit = (x[:, pixels, c].astype(np.float64) for x in (self.halves, self.images))
+        residual, mixed = self.residual[pixels, c], self.mixed[pixels, c]
+        rows = D * (h * residual - lit * mixed)
+        size = np.abs(residual) + weights[:, c, None] * lit
+        made.peaks[c].see(D * lit * size, rows)
+        if pulled.any():
+            rows += pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
+        made.power[c] += (D * h) @ h.T
+        shared = D * self.share[pixels, c % self.share.shape[1]]
+        made.drawn[c] += h @ (shared * self.present[pixels, c])
+        return np.asarray(rows)
+
+
+def residual_and_noise(solution: Solution) -> tuple[Doubles, Doubles]:
+    """What the answer misses, and half the difference of what its two halves predict.
+
+    Returns two (pixels, 3): Ψ − Σ w_i Φ_i and Σ w_i h_i, less the noise that Ψ shares where
+    it holds the current look.
+    """
+    basis, weights, r = solution.basis, solution.weights, solution.problem.refinement
+    residual = solution.image.astype(np.float64) - basis.mix(weights)
+    if r is not None:
+        noise = r.noise + mix(basis.half_differences, weights - r.before)
+    else:
+        noise = mix(basis.half_differences, weights).astype(np.float64)
+        present = mix(basis.half_differences, basis.present_weights)
+        noise = noise - solution.problem.squares.share * present
+    return residual.reshape(-1, 3), np.asarray(noise, np.float64).reshape(-1, 3)
+
+
+def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
+    """Some weights, (n, 3), and what noise made b − M w lack there on average, (3, n)."""
+    removed, r = solution.problem.noise_removed, solution.problem.refinement
+    if r is not None:
+        return r.before, r.lacking
+    n = noise.power.shape[1]
+    # At no light at all the noise of the basis lacks nothing in M: all of it is still to come.
+    nothing = np.zeros((n, 3))
+    if removed == 0:
+        return nothing, -noise.drawn
+    weights = solution.weights
+    lack = np.einsum("cij,jc->ci", noise.power, weights) - noise.drawn
+    return weights, (1 - removed) * lack
+
+
+def without_noise(
+    equations: NormalEquations, power: Doubles, *, most: float = LARGEST_NOISE
+) -> Doubles:
+    """M without the noise in it, (3, n, n), positive semidefinite.
+
+    power: (3, n, n), N. M − N, but in no direction less than 1 − `most` of M.
+    """
+    made = np.empty_like(equations.M)
+    for c in range(3):
+        root, inverse = _roots(equations.M[c])
+        values, vectors = eigh(inverse @ power[c] @ inverse.T)
+        values = np.clip(values, 0, most)
+        made[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
+    return made
+
+
+def eigh(M: Doubles) -> tuple[Doubles, Doubles]:
+    """Eigenvalues and vectors; of small matrices by one thread, which is done before two meet."""
+    with one_thread() if len(M) <= SMALL else nullcontext():
+        values, vectors = np.linalg.eigh(M)
+    return values, vectors
+
+
+def pseudo_inverse(M: Doubles) -> Doubles:
+    """Of a positive semidefinite matrix, whatever the sizes of its unknowns."""
+    _, inverse = _roots(M)
+    return np.asarray(inverse.T @ inverse)
+
+
+def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
+    """R with R Rᵀ = M and its pseudo-inverse, without the directions that change nothing."""
+    scale = np.sqrt(np.diag(M))
+    safe = np.where(scale > 0, scale, 1)
+    values, vectors = eigh(M / safe[:, None] / safe)
+    seen = values > SINGULAR * values.max(initial=0)
+    root = np.sqrt(values[seen])
+    inverse = (vectors[:, seen] / root).T / safe
+    return np.asarray(safe[:, None] * vectors[:, seen] * root), np.asarray(inverse)

@@ -1,0 +1,128 @@
+"""A better answer from an independent render of the present one: a Newton step.
+
+The noise of the basis biases M and with it the weights. A render V of the mix at the present
+weights has noise of its own, which is independent of the basis, so ⟨Φ, Ψ − V⟩ is the gradient
+without that bias; the noisy M only decides how far to go. V may well be noisier than the basis,
+which is rendered with more care than a plain picture: how much of it to believe is decided by
+what the half differences of both say.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.errors import BasisError, SizeError
+from lightpaint.images.estimate import Estimate
+from lightpaint.keywords import keywords
+from lightpaint.lighting.analysis.noise.directions import moving
+from lightpaint.lighting.analysis.noise.noise import (
+    lacking_gradient,
+    noise_sums,
+    pseudo_inverse,
+    residual_and_noise,
+)
+from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
+from lightpaint.lighting.problem import Refinement
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import again
+
+
+@keywords()
+def refine(solution: Solution, mixed: Estimate) -> Solution:
+    """One step from the weights w: minimise (w' − w)ᵀM(w' − w) − 2 gᵀ(w' − w) over w' >= 0.
+
+    g = t ⟨Φ, Ψ − V⟩ + (1 − t)(b − M w), of the render of the mix and of what was solved.
+
+    Args:
+        solution: Of one view or of several.
+        mixed: V, a render of the scene under solution.lighting, of the size of the basis, with
+            random numbers that the basis does not use.
+
+    Raises:
+        SizeError: If it has another size.
+        BasisError: Where nothing is known of the basis' noise: then nothing says how much of the
+            render to believe.
+
+    Examples:
+        >>> scene = lp.load_scene("room.xml")
+        >>> solution = lp.solve(basis, target)
+        >>> relit = lp.relight(scene, solution.lighting, "relit.xml")
+        >>> mixed = lp.verify(lp.combine(basis, solution.lighting), relit, spp=4).verified
+        >>> 0 <= lp.refine(solution, mixed).problem.refinement.share <= 1
+        True
+    """
+    basis, problem, w = solution.basis, solution.problem, solution.weights
+    if not basis.knows_noise:
+        raise BasisError(
+            f"{basis.origin.scene} says nothing of its noise, so that a render of the mix cannot "
+            "be weighed against it: use refine=0"
+        )
+    if mixed.size != basis.size:
+        raise SizeError(
+            f"the render of the mix is {mixed.size[1]}x{mixed.size[0]} but the basis is "
+            f"{basis.size[1]}x{basis.size[0]}: render it on the film of the basis"
+        )
+    missed = solution.image.astype(np.float64) - mixed.image
+    _, rendered, _ = inner_products(basis.images, missed, solution.weight)
+    M = problem.solved.M
+    known = problem.solved.b - np.einsum("cij,jc->ci", M, w)
+
+    sums = noise_sums(solution)
+    before, lacking = lacking_gradient(solution, sums)
+    # What the gradient lacked there, and what the noise in M makes it lack on the way here.
+    remains = 1 - problem.noise_removed
+    lacking = lacking + remains * np.einsum("cij,jc->ci", sums.power, w - before)
+    _, noise = residual_and_noise(solution)
+    noise = noise.reshape(mixed.image.shape)
+    # The painting's own noise, where it holds the current look, is not the render's to change.
+    t = _share(solution, lacking, noise, mixed.half_difference.astype(np.float64))
+
+    gradient = t * rendered + (1 - t) * known
+    refinement = Refinement(
+        before=w,
+        noise=t * mixed.half_difference + (1 - t) * noise,
+        lacking=(1 - t) * lacking,
+        share=t,
+    )
+    right = np.einsum("cij,jc->ci", M, w) + gradient
+    corrected = NormalEquations(M, right, problem.equations.target_norm2)
+    return again(solution, replace(problem, corrected=corrected, refinement=refinement))
+
+
+def _share(solution: Solution, lacking: Doubles, known: Floats, rendered: Floats) -> float:
+    """The t that makes the expected excess (1 − t)² (B + K) + t² R least: (B + K) / (B + K + R).
+
+    B: excess by what is lacking in the known gradient; K, R: by the noise of the prediction,
+    as known so far and as rendered. All measured by M⁻¹ along what nothing holds.
+    """
+    bias, spread = 0.0, np.zeros(2)
+    M = solution.problem.pulled(solution.problem.solved).whole
+    for to in moving(solution):
+        inverse = pseudo_inverse(to.T @ M @ to)
+        lacks = to.T @ lacking.ravel()
+        bias += float(lacks @ inverse @ lacks)
+        for k, noise in enumerate((known, rendered)):
+            C = _pushed(solution, noise, to)
+            spread[k] += np.einsum("ij,ij->", inverse, C)
+    total = bias + spread.sum()
+    return float((bias + spread[0]) / total) if total > 0 else 1.0
+
+
+def _pushed(solution: Solution, noise: Floats, to: Doubles) -> Doubles:
+    """(k, k), covariance of the push that the noise of a prediction gives along `to`, (3 n, k)."""
+    basis = solution.basis
+    n = len(basis.lights)
+    along = to.reshape(3, n, -1)
+    images, noise = basis.images.reshape(n, -1, 3), noise.reshape(-1, 3)
+    weight = solution.weight.reshape(len(noise), -1)
+    covariance = np.zeros((to.shape[1], to.shape[1]))
+    counted = np.flatnonzero(solution.importance)
+    for start in range(0, counted.size, BLOCK):
+        pixels = counted[start : start + BLOCK]
+        push = np.zeros((to.shape[1], pixels.size))
+        for c in np.flatnonzero(along.any(axis=(1, 2))):
+            pulls = weight[pixels, c % weight.shape[1]] * noise[pixels, c]
+            push += along[c].T @ (images[:, pixels, c] * pulls)
+        covariance += push @ push.T
+    return covariance

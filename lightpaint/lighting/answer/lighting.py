@@ -1,0 +1,346 @@
+"""The answer: named lights with their emissions."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
+from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.colour.photometry import Photometry, photometry
+from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
+from lightpaint.errors import LightingError, UnknownLightError
+from lightpaint.images.estimate import Estimate
+from lightpaint.keywords import keywords
+from lightpaint.lighting.answer.certificate import Certificate
+from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
+from lightpaint.screen import Shown, some_names, some_of
+from lightpaint.validation import BRIGHTEST
+
+
+@keywords()
+@dataclass(frozen=True)
+class Lighting(Shown, Mapping[str, LightSetting]):
+    """Emissions for named lights: a mapping of their names to their settings, in their order.
+
+    Attributes:
+        lights: Each with its emission, in the order of the basis.
+        target: Name of what was painted.
+        scene_identity: Of the scene it is for.
+        certificate: Of the solve they come from, if they do.
+        cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
+
+    Examples:
+        >>> lighting = lp.read_lighting("lighting.json")
+        >>> lighting["panel"].emission
+        (2.0, 1.5, 1.0)
+        >>> "window" in lighting, len(lighting), list(lighting)
+        (False, 2, ['panel', 'bulb'])
+        >>> lighting.with_emission("panel", (1, 1, 1)).emission["panel"]
+        (1, 1, 1)
+    """
+
+    lights: tuple[LightSetting, ...]
+    target: str = ""
+    scene_identity: str = ""
+    certificate: Certificate | None = None
+    cd_per_unit: float | None = None
+
+    def __repr__(self) -> str:
+        rgb = [" ".join(f"{v:.4g}" for v in light.emission) for light in self.lights]
+        told = [f"{light.name} {its}" for light, its in zip(self.lights, rgb, strict=True)]
+        target = f" for {self.target}" if self.target else ""
+        return f"Lighting({len(told)} lights{target}: {some_of(told, room=600)})"
+
+    def __post_init__(self) -> None:
+        names = [light.name for light in self.lights]
+        if len(set(names)) != len(names):
+            raise LightingError(f"light names repeat: {some_names(names)}")
+        members = [name for light in self.lights for name in light.members]
+        if len(set(members)) != len(members):
+            raise LightingError(f"an emitter is in two lights: {some_names(sorted(members))}")
+        scale = self.cd_per_unit
+        if scale is not None and not 0 < scale <= BRIGHTEST:
+            raise LightingError(
+                f"a radiance of 1 stands for {scale:g} cd/m²: need a number > 0, at most "
+                f"{BRIGHTEST:g}"
+            )
+
+    def __getitem__(self, name: str) -> LightSetting:
+        """The light of that name. Raises UnknownLightError, a KeyError, if there is none."""
+        if name not in self._by_name:
+            raise UnknownLightError(
+                f"no light {name!r} in the lighting: it has {some_of([*self], room=400)}"
+            )
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self.lights)
+
+    @cached_property
+    def _by_name(self) -> dict[str, LightSetting]:
+        return {light.name: light for light in self.lights}
+
+    @property
+    def members(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the emitters of each light, by its name."""
+        return {light.name: light.members for light in self.lights}
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Names of the lights that stay as they are."""
+        return frozenset(light.name for light in self.lights if light.is_fixed)
+
+    @property
+    def emission(self) -> Mapping[str, RGB]:
+        """RGB emission by name of light."""
+        return {light.name: light.emission for light in self.lights}
+
+    def photometry(self, light: LightSetting) -> Photometry:
+        """Colour, temperature and flux of one of its lights.
+
+        One that reaches something in some channels only has no colour: nobody knows it.
+        """
+        seen = photometry(
+            light.emission,
+            unit=light.unit,
+            unit_flux=light.unit_flux,
+            cd_per_unit=self.cd_per_unit,
+        )
+        return seen.without_colour() if light.is_partly_reached else seen
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas.DataFrame with a row for each light, by its name.
+
+        red, green, blue: its emission, linear Rec.709 in `unit`, with error_… and the ends
+        lower_… and upper_… of the 95 % interval where they are known. y: luminance of the emission.
+        kelvin, duv, hex: its colour, where it has one. Raises LightpaintError without pandas.
+        """
+        rows = [self._row(light) for light in self.lights]
+        return pandas().DataFrame(rows, index=pandas().Index([*self], name="light"))
+
+    def _row(self, light: LightSetting) -> dict[str, Any]:
+        seen, nothing = self.photometry(light), (None, None, None)
+        errors = [number(x) for x in light.standard_error or nothing]
+        ends = [x or (math.nan, math.nan) for x in light.interval or nothing]
+        return {
+            **by_channel("", light.emission),
+            "unit": light.unit,
+            "y": seen.y,
+            "kelvin": number(seen.kelvin),
+            "duv": number(seen.duv),
+            "hex": seen.hex,
+            **by_channel("error", errors),
+            **by_channel("lower", [x[0] for x in ends]),
+            **by_channel("upper", [x[1] for x in ends]),
+            "constraint": light.constraint,
+            "is_active": light.is_active,
+            "is_fixed": light.is_fixed,
+            "untold": light.untold,
+            "plugin": light.plugin,
+            "members": ", ".join(light.members),
+        }
+
+    def to_xarray(self) -> Any:
+        """Return an xarray.Dataset: emission, weight and error, (light, channel).
+
+        error: standard error of the emission, NaN where nothing tells. Raises LightpaintError
+        without xarray.
+        """
+        errors = [light.standard_error or (None, None, None) for light in self.lights]
+        dims = ("light", "channel")
+        return xarray().Dataset(
+            {
+                "emission": (dims, np.array([x.emission for x in self.lights], np.float64)),
+                "weight": (dims, np.array([x.weight for x in self.lights], np.float64)),
+                "error": (dims, np.array(errors, np.float64)),
+            },
+            coords={
+                "light": [*self],
+                "channel": list(CHANNELS),
+                "unit": ("light", [x.unit for x in self.lights]),
+            },
+            attrs={"target": self.target},
+        )
+
+    def with_emission(self, name: str, emission: RGB) -> "Lighting":
+        """This lighting with another RGB emission for one light, and no claim to be optimal.
+
+        Raises UnknownLightError if there is no such light.
+        """
+        changed = self[name]
+        lights = tuple(
+            replace(
+                light,
+                emission=emission,
+                weight=emission,
+                constraint="",
+                is_active=False,
+                reached=ALL_REACHED,
+                standard_error=None,
+                interval=None,
+                untold=False,
+            )
+            if light is changed
+            else light
+            for light in self.lights
+        )
+        return replace(self, lights=lights, certificate=None)
+
+    def named(self, target: str) -> "Lighting":
+        """The same, as the answer to that target."""
+        return replace(self, target=target)
+
+    def with_certificate(self, certificate: Certificate | None) -> "Lighting":
+        """The same, with what shows how good it is."""
+        return replace(self, certificate=certificate)
+
+    @classmethod
+    @keywords()
+    def of_weights(
+        cls,
+        lights: Basis | Lights,
+        weights: Doubles,
+        *,
+        asked: Sequence[tuple[str, bool]] | None = None,
+        reached: Bools | None = None,
+        **about: Any,
+    ) -> "Lighting":
+        """From weights (n, 3) in the order of `lights`, which may be those of a basis.
+
+        asked: of each light its `constraint` and whether that `is_active`. reached: (n, 3).
+        """
+        if isinstance(lights, Basis):
+            about.setdefault("scene_identity", lights.origin.scene_identity)
+            lights = lights.lights
+        count = len(lights)
+        told = np.ones((count, 3), dtype=bool) if reached is None else reached
+        settings = tuple(
+            _setting(light, as_rgb(weight), one, (bool(its[0]), bool(its[1]), bool(its[2])))
+            for light, weight, one, its in zip(
+                lights, weights, asked or [("", False)] * count, told, strict=True
+            )
+        )
+        return cls(settings, **about)
+
+    @classmethod
+    @keywords()
+    def present(cls, basis: Basis) -> "Lighting":
+        """The scene's lighting as it is."""
+        return cls.of_weights(basis, basis.present_weights)
+
+    def weights_for(self, lights: Basis | Lights) -> Doubles:
+        """(n, 3) weights in the order of `lights`, which may be those of a basis.
+
+        Raises LightingError if the two do not name the same lights.
+        """
+        given = {light.name: light.weight for light in self.lights}
+        if isinstance(lights, Basis):
+            lights = lights.lights
+        if set(given) != set(lights.names):
+            missing = sorted(set(lights.names) - set(given))
+            unknown = sorted(set(given) - set(lights.names))
+            raise LightingError(
+                "lighting and basis name different lights: "
+                f"missing {some_names(missing) or 'none'}; unknown {some_names(unknown) or 'none'}"
+            )
+        for light in lights:
+            if set(light.members) != set(self.members[light.name]):
+                raise LightingError(
+                    f"light {light.name!r} is not the same in both: of "
+                    f"{some_names(self.members[light.name])} in the lighting, of "
+                    f"{some_names(light.members)} in the basis"
+                )
+        return np.array([given[name] for name in lights.names], dtype=np.float64)
+
+
+@keywords()
+def combine(
+    basis: Basis, lighting: Lighting | Mapping[str, float | Sequence[float]] | npt.ArrayLike
+) -> Estimate:
+    """The predicted image Σ w_i Φ_i, with the noise that the basis gives it.
+
+    Args:
+        basis: Of n lights.
+        lighting: Of the same lights; or weights >= 0 of some of them by name, a number or RGB each,
+            the others being off; or (n,) or (n, 3) weights in the order of the basis. What is kept
+            has the weight 1.
+
+    Raises:
+        LightingError: If the two do not name the same lights, or for what are no such weights.
+
+    Examples:
+        >>> solution = lp.solve(basis, target)
+        >>> bool(np.abs(lp.combine(basis, solution.lighting).image - target.image).max() < 1e-4)
+        True
+        >>> twice = lp.combine(basis, {"bulb": 2}).image
+        >>> bool(np.abs(twice - 2 * basis.image("bulb")).max() < 1e-6)
+        True
+    """
+    given = lighting
+    weights = given.weights_for(basis) if isinstance(given, Lighting) else _weights(basis, given)
+    return Estimate(basis.mix(weights), mix(basis.half_differences, weights))
+
+
+def _weights(basis: Basis, given: Mapping[str, Any] | npt.ArrayLike) -> Doubles:
+    """(n, 3), from weights by name, or of all lights in their order."""
+    n, names = len(basis.lights), basis.names
+    weights = np.where(basis.is_fixed[:, None], np.ones(3), np.zeros(3))
+    if isinstance(given, Mapping):
+        if unknown := [str(name) for name in given if name not in names]:
+            raise UnknownLightError(
+                f"no light {some_of(unknown, room=400)} in the basis: it has "
+                f"{some_of(names, room=400)}"
+            )
+        for name, weight in given.items():
+            weights[names.index(name)] = _numbers(weight, f"light {name!r}", ((), (3,)))
+    else:
+        whole = _numbers(given, f"a lighting of {n} lights", ((n,), (n, 3)))
+        weights = np.broadcast_to(whole.reshape(n, -1), (n, 3)).copy()
+    for k in np.flatnonzero(basis.is_fixed & (weights != 1).any(axis=1)):
+        raise LightingError(f"light {names[k]!r} is kept as it is: its weight is 1")
+    return weights
+
+
+def _numbers(given: Any, what: str, shapes: tuple[tuple[int, ...], ...]) -> Doubles:
+    """Weights in an array of one of these shapes. Raises LightingError for anything else."""
+    expected = " or ".join(str(shape) if shape else "one number" for shape in shapes)
+    try:
+        weights = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise LightingError(
+            f"{what}: weights of the type {type(given).__name__}: expected {expected}"
+        ) from None
+    if weights.shape not in shapes:
+        raise LightingError(f"{what}: weights of the shape {weights.shape}: expected {expected}")
+    if (wrong := weights[~(np.isfinite(weights) & (weights >= 0))]).size:
+        raise LightingError(f"{what}: a weight of {wrong[0]:g}: expected finite numbers >= 0")
+    return weights
+
+
+def _setting(
+    light: BasisLight, weight: RGB, asked: tuple[str, bool], reached: tuple[bool, bool, bool]
+) -> LightSetting:
+    # One unit of weight is unit-white emission, so that here the two are the same numbers.
+    return LightSetting(
+        light.name,
+        light.plugin,
+        light.parameter,
+        light.unit,
+        emission=weight,
+        weight=weight,
+        is_fixed=light.is_fixed,
+        members=light.members,
+        unit_flux=light.unit_flux,
+        constraint=asked[0],
+        is_active=asked[1],
+        reached=reached,
+    )

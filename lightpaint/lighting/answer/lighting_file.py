@@ -1,0 +1,143 @@
+"""The file of a lighting, lighting.json (docs/formats.md)."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from lightpaint.errors import LightingError
+from lightpaint.files import one_line, read_text, write_text
+from lightpaint.keywords import keywords
+from lightpaint.lighting.answer.certificate import Certificate
+from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.storage.json_records import fields_of, read_record, strict_json
+from lightpaint.version import __version__
+
+FORMAT = "lightpaint-lighting 1"
+
+#: Longest lighting file that is read, in bytes: some 2 kB are written for a light.
+MAX_BYTES = 2**23
+
+#: Fields of a lighting that stand in its file under their own names.
+READ_AS_THEY_STAND = ("target", "scene_identity", "cd_per_unit")
+
+#: Fields of a certificate that say how the lighting was found, where it is not the paper's way.
+FIT = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basis_spp")
+
+#: And how far it looks from the painting, where somebody has looked.
+SEEN = ("delta_e", "delta_e_noise", "delta_e_asked")
+
+
+@keywords()
+def write_lighting(path: str | Path, lighting: Lighting) -> None:
+    """Write lighting.json (docs/formats.md), whole or not at all.
+
+    Args:
+        path: Of the file.
+        lighting: To keep.
+
+    Examples:
+        >>> lp.write_lighting("evening.json", lp.solve(basis, target).lighting)
+        >>> len(lp.read_lighting("evening.json").lights)
+        2
+    """
+    data = lighting_fields(lighting)
+    write_text(Path(path), json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def lighting_fields(lighting: Lighting) -> dict[str, Any]:
+    """What a lighting.json has of it, as plain values."""
+    data: dict[str, Any] = {
+        "format": FORMAT,
+        "lightpaint": __version__,
+        "target": lighting.target,
+        "scene_identity": lighting.scene_identity,
+        **({} if lighting.cd_per_unit is None else {"cd_per_unit": lighting.cd_per_unit}),
+        "lights": {
+            light.name: {
+                "plugin": light.plugin,
+                "parameter": light.parameter,
+                "unit": light.unit,
+                "emission": light.emission,
+                "weight": light.weight,
+                **_ties(light),
+                **_photometry(lighting, light),
+            }
+            for light in lighting.lights
+        },
+    }
+    if (q := lighting.certificate) is not None:
+        data["solve"] = fields_of(q, "curve", "bounds", "objective_error", *FIT, *SEEN)
+    return data
+
+
+@keywords()
+def read_lighting(path: str | Path) -> Lighting:
+    """Read what `write_lighting` wrote.
+
+    Args:
+        path: A lighting.json.
+
+    Raises:
+        LightingError: For anything else.
+
+    Examples:
+        >>> lp.read_lighting("lighting.json").emission["panel"]
+        (2.0, 1.5, 1.0)
+    """
+    path = Path(path)
+    text = read_text(path, "lighting file", LightingError, limit=MAX_BYTES)
+    try:
+        data = strict_json(text)
+    except ValueError as error:
+        raise LightingError(f"{path} is not a JSON file: {one_line(str(error))}") from None
+    found = data.get("format") if isinstance(data, dict) else None
+    if found != FORMAT:
+        raise LightingError(f"{path} has the format {one_line(repr(found))}: expected {FORMAT!r}")
+    try:
+        about = {key: data[key] for key in READ_AS_THEY_STAND if key in data}
+        lighting = read_record(Lighting, {"lights": [], **about})
+        lights = tuple(_read_setting(name, light) for name, light in data["lights"].items())
+        certificate = None
+        if "solve" in data:
+            its = data["solve"]
+            certificate = read_record(Certificate, its, required=["unreached"], others=True)
+        return replace(lighting, lights=lights, certificate=certificate)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise LightingError(f"{path} is no complete lighting: {one_line(repr(error))}") from None
+    except LightingError as error:
+        raise LightingError(f"{path}: {one_line(str(error))}") from None
+
+
+def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
+    if data.get("members") == []:
+        raise ValueError("members is a list of names, not empty")
+    return read_record(LightSetting, {**data, "name": name}, others=True)
+
+
+def _ties(light: LightSetting) -> dict[str, Any]:
+    """What the file says of a light only where it does not go without saying."""
+    ties: dict[str, Any] = {}
+    if light.reached != ALL_REACHED:
+        ties["reached"] = light.reached
+    if light.standard_error is not None:
+        ties["standard_error"] = light.standard_error
+    if light.interval is not None:
+        ties["interval"] = light.interval
+    if light.untold:
+        ties["untold"] = True
+    if light.is_fixed:
+        ties["is_fixed"] = True
+    if light.members != (light.name,):
+        ties["members"] = light.members
+    if light.constraint:
+        ties |= {"constraint": light.constraint, "is_active": light.is_active}
+    return ties
+
+
+def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:
+    """What follows from the emission, for people and programs; only `unit_flux` is read back."""
+    known: dict[str, Any] = {} if light.unit_flux is None else {"unit_flux": light.unit_flux}
+    return known if light.is_fixed else {**known, "photometry": lighting.photometry(light).fields()}

@@ -1,0 +1,1 @@
+"""The answer while the brush moves, and the sums that follow it."""

@@ -1,0 +1,122 @@
+"""The loss of a painting that knows "at least this bright", and what a display shows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.lighting.loss.channel_loss import PaintedPixels
+from lightpaint.lighting.loss.loss import STRIP, Cut, Loss, image_of, planes_of
+
+
+@dataclass(frozen=True)
+class PaintingLoss(Loss):
+    """What pictures cost by a painting, as a display shows both, or as light.
+
+    With the importance D, the part q of it that is for the current look C, and the view
+    transform V:
+
+        F(x) = Σ D [(1 − q) ‖V(ψ) − V(x)‖² + q ‖V(C) − V(x)‖²]
+
+    ψ is the painting Ψ; but where Ψ says only "at least this bright", it is x if that is brighter.
+    V is the identity in linear light, and F then is convex.
+
+    painted: (h, w, 3), Ψ, linear. importance: (h, w), D. share: (h, w), q. current: (h, w, 3), C,
+    linear. at_least: (h, w, 3), where brighter is as good. transform: V, None for linear light.
+    """
+
+    painted: Floats
+    importance: Floats
+    share: Floats
+    current: Floats
+    at_least: Bools
+    transform: ViewTransform | None = None
+
+    def cut(self, part: Cut) -> "PaintingLoss":
+        return replace(
+            self,
+            painted=part(self.painted),
+            importance=part(self.importance),
+            share=part(self.share),
+            current=part(self.current),
+            at_least=part(self.at_least),
+        )
+
+    @cached_property
+    def pixels(self) -> PaintedPixels:
+        """All of them, channel by channel."""
+        return PaintedPixels(
+            planes_of(self.painted),
+            np.asarray(self.importance, np.float64).ravel(),
+            np.asarray(self.share, np.float64).ravel(),
+            planes_of(self.current),
+            planes_of(self.at_least, bool) if self._may_exceed else None,
+            self.transform,
+        )
+
+    def shown(self, image: Floats) -> Doubles:
+        """Return V of linear pixels, (…, 3)."""
+        if self.transform is None:
+            return np.array(image, np.float64)
+        planes = planes_of(image)
+        out = np.empty_like(planes)
+        for start in range(0, planes.shape[1], STRIP):
+            where = slice(start, start + STRIP)
+            out[:, where] = self.transform.encode_planes(planes[:, where])
+        return image_of(out, image.shape[:-1])
+
+    def meant(self, x: Floats) -> Doubles:
+        """Return (1 − q) ψ + q C at a picture x, (h, w, 3) linear."""
+        q = self.share[..., None]
+        return np.asarray((1 - q) * self._moved(x) + q * self.current, np.float64)
+
+    def missed(self, x: Floats) -> Doubles:
+        """Return V(ψ) − V(x), (h, w, 3)."""
+        return np.asarray(self.shown(self._moved(x)) - self.shown(x))
+
+    def exceeds(self, x: Floats | float) -> Bools:
+        return self.at_least & (x > self.painted) if self._may_exceed else self.at_least
+
+    @cached_property
+    def _may_exceed(self) -> bool:
+        return bool(self.at_least.any())
+
+    def _moved(self, x: Floats) -> Doubles:
+        """Return ψ at x, (h, w, 3)."""
+        return np.asarray(np.where(self.exceeds(x), x, self.painted), np.float64)
+
+    def of_blocks(self, parts: Sequence[tuple[Cut, Doubles]], side: int) -> "PaintingLoss":
+        each = [self.cut(cut)._averaged(counts, side) for cut, counts in parts]
+
+        def row(name: str) -> npt.NDArray[Any]:
+            arrays = [getattr(part, name) for part in each]
+            return np.concatenate([x.reshape(-1, *x.shape[2:]) for x in arrays])[None]
+
+        names = ("painted", "importance", "share", "current", "at_least")
+        rows: dict[str, Any] = {name: row(name) for name in names}
+        return replace(self, **rows)
+
+    def _averaged(self, counts: Doubles, side: int) -> "PaintingLoss":
+        """Return the loss of means over blocks of one view. counts: (h, w), the importance."""
+        total = block_sums(counts, side)
+        painted, held = (1 - self.share) * counts, self.share * counts
+
+        def mean(image: Floats, weight: Floats) -> Doubles:
+            some = block_sums(weight.astype(np.float64), side)
+            its = block_sums(image * weight[..., None].astype(np.float64), side)
+            return np.asarray(its / np.where(some > 0, some, 1)[..., None])
+
+        return replace(
+            self,
+            painted=mean(self.painted, painted),
+            importance=total,
+            share=block_sums(held.astype(np.float64), side) / np.where(total > 0, total, 1),
+            current=mean(self.current, held),
+            at_least=mean(self.at_least.astype(np.float64), painted) > 0.5,
+        )

@@ -1,0 +1,158 @@
+"""The forms in which an answer goes elsewhere, by one word each: what each needs, and its text."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.progress import Listener
+from lightpaint.relit.export.colors import with_own_colors
+from lightpaint.relit.export.exports import blender_script
+from lightpaint.relit.export.fixtures import fixtures_csv, fixtures_json
+from lightpaint.relit.export.nuke import needs_copy, nuke_script, spoken_unreadable
+from lightpaint.relit.export.scene_script import scene_script
+from lightpaint.relit.export.usd import check_usd, usd_overrides
+from lightpaint.relit.relight import scene_of
+from lightpaint.relit.xml_patch import emitters_of, scene_patch
+from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
+
+#: Name of the file in each form, of a scene and of light groups; None where there is no such thing.
+FORMS: dict[str, tuple[str | None, str | None]] = {
+    "csv": ("fixtures.csv", "fixtures.csv"),
+    "json": ("fixtures.json", "fixtures.json"),
+    "mitsuba": ("relit.patch", None),
+    "usd": ("lights.usda", None),
+    "blender": ("set_scene.py", "set_lights.py"),
+    "nuke": (None, "relit.nk"),
+}
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a lighting is of: a scene, light groups, or none of them is known.
+
+    stage: of USD, whose lights have the names of the scene's.
+    """
+
+    scene: Scene | None = None
+    light_groups: LightGroups | None = None
+    stage: Path | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """That it was read from."""
+        files = [] if self.stage is None else [self.stage]
+        if self.scene is not None:
+            files += self.scene.read_files
+        return files + (self.light_groups.files if self.light_groups is not None else [])
+
+
+def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
+    """The name of the file of each form, checked for what it needs.
+
+    Raises LightpaintError for a form that there is none of, or that lacks something.
+    """
+    names = {}
+    for form in forms:
+        if form not in FORMS:
+            raise LightpaintError(f"there is no form {form!r}: known are {', '.join(FORMS)}")
+        name = FORMS[form][source.light_groups is not None]
+        if name is None:
+            raise LightpaintError(
+                "nuke multiplies the layers of light groups: give them with light_groups=..."
+                if form == "nuke"
+                else f"{form} is of a scene: give it with scene=..., and leave light_groups=... out"
+            )
+        if source.light_groups is None and source.scene is None and form not in ("csv", "json"):
+            raise LightpaintError(f"{form} needs the scene: give it with scene=...")
+        if form == "usd":
+            check_usd()
+        names[form] = name
+    if source.stage is not None and "usd" not in names:
+        raise LightpaintError("stage=... is of the form usd: leave it out, or add that")
+    return names
+
+
+def writers_of(
+    names: Mapping[str, str], lighting: Lighting, source: Source, folder: Path, listen: Listener
+) -> tuple[dict[str, Callable[[], str]], str]:
+    """Return what makes the text of each file, by its name, and a remark; "" where there is none.
+
+    names: of the files, by form, as of `names_of_forms`. folder: where they are to lie. listen:
+    hears what a form leaves out. Mitsuba gets the lighting itself, other programs what `_exported`
+    makes of it.
+
+    Raises LightpaintError where the lighting is of something else.
+    """
+    elsewhere, remark = lighting, ""
+    if set(names) != {"mitsuba"}:
+        elsewhere, remark = _exported(lighting, source)
+    return {
+        name: _writer_of(form, lighting if form == "mitsuba" else elsewhere, source, folder, listen)
+        for form, name in names.items()
+    }, remark
+
+
+def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
+    """Return the lighting as other programs get it: what cannot be told keeps its own colour.
+
+    And what is to be said of that; "" where nothing is. Raises LightingError for a lighting of
+    another scene.
+    """
+    if source.scene is None:
+        return lighting, ""
+    tied = scene_of(source.scene, lighting)
+    made, names = with_own_colors(lighting, {light.name: light.emission for light in tied.lights})
+    if not names:
+        return made, ""
+    return made, (
+        f"the painting does not tell the colour of {some_names(names)}: other programs get the "
+        "one in the scene"
+    )
+
+
+def _writer_of(
+    form: str, lighting: Lighting, source: Source, folder: Path, listen: Listener
+) -> Callable[[], str]:
+    """Return what makes the text of one form; arguments as of `writers_of`."""
+    if form in ("csv", "json"):
+        return lambda: (fixtures_csv if form == "csv" else fixtures_json)(lighting)
+    if source.light_groups is not None:
+        return _of_groups(form, lighting, source.light_groups, folder, listen)
+    scene = source.scene
+    assert scene is not None
+    if form == "mitsuba":
+        return lambda: scene_patch(scene, lighting)
+    emitters, name = emitters_of(scene, lighting), scene.files[0].name
+    if form == "blender":
+        return lambda: scene_script(lighting.target, name, emitters)
+
+    def overrides() -> str:
+        about = f"lightpaint: the lights of {name} as solved for {lighting.target}"
+        made = usd_overrides(emitters, source.stage, folder, about=about)
+        if made.left:
+            where = source.stage or "USD"
+            listen.say(f"no one light of {where} takes {some_names(made.left)}: set it by hand")
+        return made.text
+
+    return overrides
+
+
+def _of_groups(
+    form: str, lighting: Lighting, groups: LightGroups, folder: Path, listen: Listener
+) -> Callable[[], str]:
+    """Return the same, of light groups."""
+    lighting.weights_for(groups.basis)
+    if form == "blender":
+        return lambda: blender_script(groups, lighting)
+    if needs_copy(groups):
+        raise OutputError(
+            f"Nuke cannot tell the layers of {groups.path} apart: solve writes a copy of them "
+            "beside its relit.nk"
+        )
+    for remark in spoken_unreadable(groups, folder):
+        listen.say(remark)
+    return lambda: nuke_script(groups, lighting, folder)

@@ -1,0 +1,64 @@
+"""Rendering the scene as solved, to improve the answer by what that shows."""
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from lightpaint.basis.basis import Basis
+from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.noise.refinement import refine
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.views import joint_estimate
+from lightpaint.progress import Progress, silent
+from lightpaint.relit.relight import relight
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, pass_seed, render, view_seed
+
+
+def refine_by_rendering(
+    views: Sequence[tuple[Scene, Basis]],
+    solution: Solution,
+    *,
+    rounds: int,
+    spp: int | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Solution:
+    """`rounds` times: render the scene under the solution's lighting and take a Newton step.
+
+    views: scene and basis of each view; the solution is of all of them. spp: samples per pixel
+    of each render, on the film of the basis; as many as the basis has by default. Every round
+    draws random numbers of its own, which neither the basis nor a verification uses.
+    """
+    for k in range(rounds):
+        mixed = []
+        for scene, basis in views:
+            its_seed = pass_seed(view_seed(seed, scene.sensor), Stream.REFINEMENT, k)
+            label = f"refinement {k + 1}"
+            samples = max(2, basis.origin.spp) if spp is None else spp
+            mixed.append(_mixed(scene, basis, solution, samples, its_seed, label, progress))
+        solution = refine(solution, joint_estimate(mixed))
+    return solution
+
+
+def _mixed(
+    scene: Scene,
+    basis: Basis,
+    solution: Solution,
+    spp: int,
+    seed: int,
+    label: str,
+    progress: Progress,
+) -> Estimate:
+    """One view of the scene as solved, of the size of its basis."""
+    height, width = basis.size
+    with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
+        relit = relight(scene, solution.lighting, Path(folder) / "relit.xml")
+        return render(
+            relit.reduced(f"{width}x{height}"),
+            spp=spp,
+            seed=seed,
+            stream=Stream.REFINEMENT,
+            label=label,
+            progress=progress,
+        )

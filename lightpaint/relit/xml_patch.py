@@ -1,0 +1,74 @@
+"""A lighting as a patch of the scene's own XML, for `patch` and for who reads what changes."""
+
+import difflib
+import os
+import re
+from pathlib import Path
+
+from lightpaint.arrays import RGB
+from lightpaint.errors import OutputError, SceneError
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.relit.relight import relit_files, scene_of, settings_of
+from lightpaint.relit.xml_edit import tag
+from lightpaint.scene.lights.emission import Scaling
+from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.scene import Scene
+
+#: A folder that is not there, and stands for wherever the relit scene might be.
+ELSEWHERE = ".lightpaint-patch"
+
+
+def scene_patch(scene: Scene, lighting: Lighting) -> str:
+    """A unified diff of the scene's files, from its folder, in which only the lights change.
+
+    `patch -p1 < relit.patch` in the folder of the scene applies it.
+
+    Raises SceneError where images are scaled, which no patch of text can hold; LightingError if the
+    two name different emitters.
+    """
+    scene = scene_of(scene, lighting)
+    root = scene.files[0].resolve()
+    place = root.parent / ELSEWHERE / root.name
+    lines: list[str] = []
+    for file, content in relit_files(scene, lighting.emission, place).items():
+        if not isinstance(content, bytes):
+            raise SceneError(
+                f"{file.name} is an image that this lighting scales, and no patch of text holds "
+                "it: use lightpaint relight"
+            )
+        name = file.relative_to(place.parent).as_posix()
+        try:
+            old = (root.parent / name).read_text(encoding="utf-8")
+        except OSError as error:
+            raise OutputError(f"cannot read {name}: {error.strerror or error}") from error
+        # Where it stays, it finds its meshes as before.
+        origin = os.path.relpath((root.parent / name).parent, file.parent)
+        gone = r"\r?\n[ \t]*" + re.escape(tag("path", value=Path(origin).as_posix()))
+        new = re.sub(gone, "", content.decode("utf-8"), count=1)
+        lines += difflib.unified_diff(_lines(old), _lines(new), f"a/{name}", f"b/{name}")
+    return "".join(lines)
+
+
+def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
+    """Name, Mitsuba's parameter and emission of every emitter that is adjusted.
+
+    The parameter is "" where the emission is a multiple of what the scene has, as of a sky.
+    """
+    tied = scene_of(scene, lighting)
+    return [
+        (emitter.name, _quantity(emitter), rgb)
+        for emitter, rgb in settings_of(tied, lighting.emission)
+    ]
+
+
+def _quantity(emitter: Emitter) -> str:
+    kind = emitter.kind
+    return kind.parameter if kind is not None and kind.scaling is Scaling.COLOUR else ""
+
+
+def _lines(text: str) -> list[str]:
+    """Lines with their ends, the last one as the others."""
+    lines = text.splitlines(keepends=True)
+    if lines and not lines[-1].endswith("\n"):
+        lines[-1] += "\n"
+    return lines

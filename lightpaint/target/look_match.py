@@ -1,0 +1,95 @@
+"""Whether a picture was painted over a look that is known, and through which view it shows it.
+
+A picture that another program made of its light says nothing of the view. But most of a painting
+is not painted: there it is the look itself, through one view, to the rounding of its file.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.arrays import Floats, largest
+from lightpaint.colour.color import luminance
+from lightpaint.colour.display.tone_curves import BUILT_IN
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.images.picture import Picture
+from lightpaint.target.painted_pixels import LOSSY, ROUNDING, compressed_like, lossy_difference
+
+#: Share of what can tell that has to be the look itself.
+MOST = 0.5
+
+#: Display values of what can tell: between black and white, where many pictures are alike; and
+#: how much of a picture that has to be.
+TELLING, ENOUGH = (0.04, 0.96), 0.01
+
+#: Stops that are one exposure, but for the rounding of a file.
+BIN = 0.04
+
+
+def view_of_look(
+    path: Path, picture: Picture, look: Floats, asked: TransformChoice
+) -> ViewTransform | None:
+    """Return the view through which most of `picture` is `look`; None if most of it is not.
+
+    path: the file of the picture. look: (h, w, 3) linear. asked: what somebody said of the view,
+    which holds; the rest is sought, the exposure too. A file that holds light was seen through
+    none, and is compared as sRGB shows it.
+    """
+    if picture.size != look.shape[:2]:
+        return None
+    views = [ViewTransform()]
+    display = (picture.transform or views[0]).encode(picture.image)
+    if picture.transform is not None:
+        views = list(_plausible(display, look, asked))
+    found = [_agreement(path, picture, display, view.encode(look)) for view in views]
+    best = max(range(len(views)), key=found.__getitem__)
+    return views[best] if found[best][0] > MOST else None
+
+
+def _plausible(display: Floats, look: Floats, asked: TransformChoice) -> Iterator[ViewTransform]:
+    """Views, each at the exposure that brings the look to most of what is displayed."""
+    for name in [asked.name] if asked.name is not None else [n for n in BUILT_IN if n != "linear"]:
+        view = TransformChoice(name, asked.stops or 0.0).over(None)
+        yield view
+        if asked.stops is None:
+            stops = _stops_between(view, display, look)
+            # Somebody chose a round number.
+            for digits in (1, 2, 4):
+                yield ViewTransform(view.name, round(stops, digits))
+
+
+def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
+    """Return the exposure at which that view shows most of `look` as displayed, about."""
+    light, there = luminance(view.decode(display)), luminance(look)
+    low, high = TELLING
+    known = (display > low).all(axis=-1) & (display < high).all(axis=-1)
+    known &= (light > 0) & (there > 0)
+    if not known.any():
+        return 0.0
+    stops = np.log2(light[known] / there[known])
+    # What was not painted has one exposure, which is the commonest, and paint has many.
+    counts = np.bincount(np.floor((stops - stops.min()) / BIN).astype(np.intp))
+    around = np.convolve(counts, [1, 1, 1], "same")
+    commonest = stops.min() + BIN * (np.argmax(around) + 0.5)
+    return float(np.clip(np.median(stops[np.abs(stops - commonest) < 1.5 * BIN]), -60, 60))
+
+
+def _agreement(path: Path, picture: Picture, display: Floats, shown: Floats) -> tuple[float, float]:
+    """Return the share of what can tell that is the same, and how near it is, to be greatest.
+
+    display, shown: (h, w, 3), display values of the picture and of the look.
+    """
+    low, high = TELLING
+    tells = (largest(shown) > low) & (shown.min(axis=-1) < high)
+    if tells.mean() < ENOUGH:
+        return 0.0, 0.0
+    if picture.lossy:
+        off, tolerance = lossy_difference(display, compressed_like(path, shown)), LOSSY
+    else:
+        off, tolerance = largest(np.abs(display - shown)), ROUNDING
+    is_same = off[tells] <= tolerance
+    if not is_same.any():
+        return 0.0, 0.0
+    # In fiftieths, and tenths of a code: of equals the first is meant.
+    return round(50 * float(is_same.mean())) / 50, -round(2550 * float(off[tells][is_same].mean()))

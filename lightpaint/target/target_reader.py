@@ -1,0 +1,293 @@
+"""From files that people paint to targets: what was meant, and where."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from lightpaint.arrays import Floats, largest
+from lightpaint.colour.color import luminance
+from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
+from lightpaint.errors import SizeError, TargetError
+from lightpaint.images.estimate import box_mean
+from lightpaint.images.picture import Picture, read_mask, read_picture
+from lightpaint.keywords import keywords
+from lightpaint.target.look_match import view_of_look
+from lightpaint.target.lost_template import what_became_of
+from lightpaint.target.painted_pixels import SHARP_RADIUS, painted_where
+from lightpaint.target.painting_file import painted_of
+from lightpaint.target.target import Target, share_of, spoken_share
+from lightpaint.target.template import (
+    CLEAN,
+    LIGHT,
+    SHOWN,
+    Template,
+    find_template,
+    read_template,
+    template_files,
+)
+
+#: What a brush puts down: how the picture is to look, or the light that is to fall there.
+Paint = Literal["look", "light"]
+
+#: Share of the picture beyond which it is asked whether that is paint or a conversion.
+NEARLY_ALL = 0.97
+
+#: Times the light of the brightest parts of the template that no lamp is meant to give, and the
+#: share of the paint that may ask for that without a word.
+BEYOND, FEW = 10.0, 0.01
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What is known on the way.
+
+    template, folder: what it was painted on, if that is known. transform: what it was seen through.
+    look: what messages call a template that has no folder.
+    """
+
+    path: Path
+    picture: Picture
+    template: Template | None
+    folder: Path | None
+    transform: ViewTransform | None
+    notes: tuple[str, ...]
+    look: str = ""
+
+    @property
+    def painted_on(self) -> str:
+        """How messages call the template: by the file in it that the painting is like."""
+        if self.look:
+            return self.look
+        name = LIGHT if self.picture.codes is None else SHOWN
+        return name if self.folder is None else str(self.folder / name)
+
+
+@keywords()
+def read_target(
+    path: str | Path,
+    *,
+    mask: str | Path | None = None,
+    layer: str | None = None,
+    transform: ViewTransform | TransformChoice | None = None,
+    template: str | Path | None = None,
+    find: bool = True,
+    paint: Paint = "look",
+) -> Target:
+    """Read a painting: an EXR in linear light, or a PNG, TIFF, JPEG or layered file.
+
+    What counts is, in this order: `mask`; an EXR's W channel; alpha; where the picture differs from
+    the template it was painted on; without any of them, every pixel alike. Where alpha is 0 no
+    colour was painted, and a mask does not make one.
+
+    Args:
+        path: The painting.
+        mask: Picture of what counts, black for nothing.
+        layer: Which layer, part or view of an EXR.
+        transform: What 8 and 16 bits were encoded by. What it leaves open is what `template` says,
+            else the file, else a template that was found for it, else sRGB.
+        template: Folder that `lightpaint template` wrote.
+        find: Whether one is looked for beside the painting if none is given.
+        paint: `light` takes colours for the light that falls on a surface, and multiplies them by
+            its albedo: 1 makes white look like 1 (Schoeneman et al. 1993, section 3).
+
+    Raises:
+        ImageError: For files that cannot be read.
+        TargetError: For what cannot be solved for.
+        SizeError: If target and mask or template differ in size.
+
+    Examples:
+        >>> lp.read_target("painting.exr").size
+        (16, 16)
+    """
+    return _target_of(_opened(Path(path), layer, transform, template, find=find), mask, paint)
+
+
+def read_over_look(
+    path: Path, look: Floats, name: str, *, layer: str | None, transform: TransformChoice
+) -> Target | None:
+    """Return the painting at `path` if it was painted over `look`; None if it was not.
+
+    Only for a painting that does not say itself what counts, and of which no template is known.
+
+    look: (h, w, 3) linear, what a basis or light groups show as they are. name: what messages call
+    it. layer, transform: as of `read_target`.
+    """
+    picture = read_picture(path, layer=layer, transform=transform)
+    view = view_of_look(path, picture, look, transform)
+    if view is None:
+        return None
+    if picture.transform is not None:
+        picture = read_picture(path, layer=layer, transform=view)
+    template = Template(look, view)
+    if not painted_where(path, picture, template).any():
+        return None  # the look itself, of which all counts
+    shown = None if picture.transform is None else view
+    through = "" if shown is None else f" through {shown.spoken}"
+    return _target_of(_Reading(path, picture, template, None, shown, (), f"{name}{through}"))
+
+
+def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint = "look") -> Target:
+    """What was painted, and where. Arguments as of `read_target`."""
+    picture, made = reading.picture, reading.template
+    importance, notes = _importance(reading, mask)
+    # Pixels that the file does not store were not painted, whatever a mask says.
+    there = picture.finite if picture.stored is None else picture.finite & picture.stored
+    counted = np.where(there, 1 if importance is None else importance, 0)
+    image, own = picture.image, painted_of(picture.attributes, reading.path)
+    if paint == "light":
+        image, counted, note = _lit(reading, counted)
+    else:
+        note = _beyond(reading, counted)
+    return Target(
+        name=reading.path.stem,
+        image=image,
+        importance=counted.astype(np.float32),
+        everything=importance is None,
+        not_finite=int(picture.finite.size - picture.finite.sum()),
+        at_least=picture.saturated,
+        notes=(*picture.notes, *reading.notes, *notes, *note),
+        content="" if made is None else made.content,
+        sensor="" if made is None else made.sensor,
+        transform=reading.transform,
+        through_view=picture.transform is not None or (own is not None and own.through_view),
+        # A layer that was saved alone lay over something; what a mask leaves out does not count.
+        over_look=made is not None
+        or (own is not None and own.over_look)
+        or (picture.transform is not None and picture.alpha is not None and mask is None),
+        files=(
+            reading.path,
+            *([] if mask is None else [Path(mask)]),
+            *([] if reading.folder is None else template_files(reading.folder)),
+        ),
+        full_size_share=None if importance is None else share_of(importance),
+    )
+
+
+def _opened(
+    path: Path,
+    layer: str | None,
+    transform: ViewTransform | TransformChoice | None,
+    template: str | Path | None,
+    *,
+    find: bool,
+) -> _Reading:
+    """The picture, and the template it was painted on. Arguments as of `read_target`."""
+    asked, made = TransformChoice.of(transform), None
+    notes: tuple[str, ...] = ()
+    folder = None if template is None else Path(template)
+    if folder is not None:
+        # Whoever names a file in it means the folder.
+        folder = folder.parent if folder.is_file() else folder
+        made = read_template(folder)
+        asked = TransformChoice.of(asked.over(made.transform))
+    elif find and (folder := find_template(path)) is not None:
+        made = read_template(folder)
+    otherwise = None if made is None else made.transform
+    picture = read_picture(path, layer=layer, transform=asked, otherwise=otherwise)
+    if made is not None and folder is not None and made.size != picture.size:
+        if template is not None:
+            raise SizeError(
+                f"{path} is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN} is "
+                f"{made.size[1]}x{made.size[0]}: give the template it was painted on"
+            )
+        notes = (f"not compared with {folder / SHOWN}, which has another size",)
+        # It was painted on something else, and so was not shown through its transform either.
+        made, otherwise = None, None
+        picture = read_picture(path, layer=layer, transform=asked)
+    own = painted_of(picture.attributes, path)
+    if own is not None:
+        otherwise = own.transform
+    shown = picture.transform or (otherwise if asked.is_open else asked.over(otherwise))
+    return _Reading(path, picture, made, folder, shown, notes)
+
+
+def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | None, list[str]]:
+    """(h, w), what counts; None if nobody says. And what is to be said of it."""
+    path, picture, template = reading.path, reading.picture, reading.template
+    if mask is not None:
+        importance = read_mask(mask)
+        if importance.shape != picture.size:
+            raise SizeError(
+                f"mask {mask} is {importance.shape[1]}x{importance.shape[0]} but the target {path} "
+                f"is {picture.size[1]}x{picture.size[0]}: export both at one size"
+            )
+        if picture.alpha is not None and picture.weight is None:
+            importance = np.where(picture.alpha > 0, importance, np.float32(0))
+        return importance, []
+    if picture.weight is not None:
+        return picture.weight, []
+    is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
+    if template is None and picture.alpha is None and picture.transform is not None:
+        # Numbers of a display, and nobody said what they mean: a template would know.
+        seen = f"{picture.transform.name} at {picture.transform.stops:+g} stops"
+        return None, [f"no template is known: all of it counts, as seen through {seen}"]
+    if template is None or not is_opaque:
+        return picture.alpha, []
+    importance = painted_where(path, picture, template)
+    share = share_of(importance)
+    if share == 0:
+        folder = Path(reading.painted_on).parent
+        if path.resolve() in [(folder / name).resolve() for name in (LIGHT, SHOWN, CLEAN)]:
+            raise TargetError(f"{path} is the template itself: give what was painted over it")
+        raise TargetError(
+            f"nothing in {path} differs from {reading.painted_on}: paint over it, or pass "
+            "find=False if all of it counts"
+        )
+    note = f"{spoken_share(share)} painted: what differs from {reading.painted_on}"
+    if share > NEARLY_ALL and (said := _of_all(picture, template)):
+        note += f"; {said}"
+    return importance, [note]
+
+
+def _of_all(picture: Picture, template: Template) -> str:
+    """What was done to a template of which next to nothing is left, but for painting over it."""
+    transform = picture.transform or template.transform
+    mine, its = (transform.encode(x) for x in (picture.image, template.image))
+    if picture.lossy:  # which leaves the means of a few pixels as they are
+        mine, its = (box_mean(x, SHARP_RADIUS) for x in (mine, its))
+    return what_became_of(mine, its)
+
+
+def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]:
+    """The look of surfaces under the light that was painted: image and importance."""
+    if reading.template is None or reading.template.albedo is None:
+        raise TargetError(
+            f"to read {reading.path} as light its template is needed, which knows what surfaces "
+            "reflect: give the folder that lightpaint template wrote as template=..."
+        )
+    albedo = reading.template.albedo
+    # Metals, glass and what is not there reflect no diffuse light: nothing can be said of it.
+    blind = (largest(albedo) <= 0) & (counted > 0)
+    seen = np.where(blind, 0, counted)
+    if not seen.any():
+        raise TargetError(f"{reading.path}: no painted pixel shows a surface that reflects light")
+    lost = int(blind.sum())
+    note = [f"{lost} painted pixels show no surface that reflects light"] if lost else []
+    return (reading.picture.image * albedo).astype(np.float32), seen, note
+
+
+def _beyond(reading: _Reading, counted: Floats) -> list[str]:
+    """Says so where paint asks a surface for a colour that it hardly reflects."""
+    template = reading.template
+    if template is None or template.albedo is None:
+        return []
+    albedo = np.maximum(template.albedo, 1e-3)
+    there_is = largest(template.albedo) > 0
+    painted = (counted > 0) & there_is
+    if not painted.any():
+        return []
+    light = np.maximum(reading.picture.image, 0) / albedo
+    there = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
+    bright = float(np.percentile(there[there_is], 95))
+    # What is nearly black anyway needs little, however it is divided.
+    asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.transform.white)
+    share = float((asks.any(axis=-1) & painted).sum() / painted.sum())
+    if share <= FEW:
+        return []
+    return [
+        f"{100 * share:.0f} % of the paint asks surfaces for a colour that they hardly reflect, so "
+        f"for more than {BEYOND:g} times the light of the template's brightest parts: "
+        'paint="light" paints the light instead'
+    ]
