@@ -58,7 +58,7 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
         warnings.simplefilter("ignore", SlowBackendWarning)
         with speaking(Manner(options.as_json, options.is_quiet, options.is_verbose)):
             outcome = command(**values_of(options, given))
-            if options.as_json:
+            if options.as_json and outcome.told is not None:
                 terminal.write_json(outcome.told())
             terminal.note("done")
         return outcome.code

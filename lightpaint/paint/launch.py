@@ -11,7 +11,7 @@ from typing import Any
 
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice
-from lightpaint.errors import SceneError
+from lightpaint.errors import OutputError, SceneError
 from lightpaint.files import check_writable, file_length
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
@@ -19,6 +19,7 @@ from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.lazy_scene import Opening
 from lightpaint.paint.server.address import Listening, listen
+from lightpaint.paint.server.connection_file import ConnectionFile
 from lightpaint.paint.server.server import Server, check_installed
 from lightpaint.paint.session_file import Keeping, check_together, identity_of
 from lightpaint.paint.store.database import set_aside
@@ -146,7 +147,19 @@ def _paint_at(
     try:
         server = Server(studio, keeping.store, listening=listening, say=say)
         keeping.server = server
+        connection = ConnectionFile(path.parent, server.connection)
+
+        def offer() -> None:  # once the folder is known to be this painter's
+            try:
+                connection.write()
+            except OutputError as error:
+                say(str(error))
+
         try:
+            if keeping.store is None:
+                keeping.on_opened = offer
+            else:
+                offer()
             studio.on_failure = partial(_failed, server)
             opened(server)
             with interruptible_between_pieces():  # who is being started cannot be waited for
@@ -155,6 +168,7 @@ def _paint_at(
                 server.run()
         finally:
             server.close()
+            connection.remove()
         if studio.failure is not None and studio.store is None:
             raise studio.failure
     finally:

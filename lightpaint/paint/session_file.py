@@ -60,11 +60,13 @@ class Keeping:
     Attributes:
         store: The session; None as long as there is none, and nobody knows what it is of.
         server: Told once it is known.
+        on_opened: Called when there is a store that was not there at first.
     """
 
     def __init__(self, subjects: Sequence[Subject], path: Path, say: Callable[[str], None]) -> None:
         self.store: Store | None = None
         self.server: Server | None = None
+        self.on_opened: Callable[[], None] = lambda: None
         self._subjects, self._path, self._say = subjects, path, say
         self._loaded: dict[int, Scene] = {}
         self._said: set[str] = set()
@@ -100,6 +102,7 @@ class Keeping:
         check_together([view.sensor for view in identity.views])
         if self.store is None:
             self.store = Store.open(self._path, identity)
+            self.on_opened()
         else:
             self.store.becomes(identity)
         if self.server is not None:

@@ -199,7 +199,7 @@ class Studio:
             match message:
                 case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
                     return [looks.said(message)]
-                case protocol.MixLooks() | protocol.DropLook():
+                case protocol.MixLooks() | protocol.DropLook() | protocol.Propose():
                     return [looks.said(message)]
                 case protocol.Export() | protocol.Verify() | protocol.Explain():
                     return self._errands.said(message)

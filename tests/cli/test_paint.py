@@ -1,5 +1,6 @@
 """`lightpaint paint`: what it paints, where it says the page is, and how it ends."""
 
+import json
 import os
 import re
 import shlex
@@ -37,6 +38,7 @@ from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.steps import Identity, Step
 from lightpaint.paint.store.store import Store
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.version import __version__
 
 
 @pytest.fixture
@@ -206,6 +208,51 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         assert "the earlier session is kept as room.paint/session-1.db" in process.stderr.read()
     with Store.open(path.with_name("session-1.db"), identity) as store:
         assert [step.label for step in store.steps] == ["mine"]
+
+
+def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(here: Path) -> None:
+    file = here / "room.paint" / "painter.json"
+    options = ("room.basis.exr", "--no-browser", "--port", "0", "--json")
+    killed = ""
+    for ends in (signal.SIGKILL, signal.SIGTERM):
+        with subprocess.Popen(
+            [sys.executable, "-m", "lightpaint", "paint", *options],
+            cwd=here,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            try:
+                assert process.stdout is not None
+                told = json.loads(process.stdout.readline())
+                assert told.keys() >= {"address", "token", "version", "protocol"}
+                assert told["version"] == __version__
+                with connect(
+                    f"{told['address'].replace('http', 'ws')}live",
+                    additional_headers={"Authorization": f"Bearer {told['token']}"},
+                    max_size=None,
+                ) as socket:
+                    state = said(socket, 0, "observe", version=VERSION)
+                    if state["kind"] == "waiting":
+                        state = of_frame(bytes(socket.recv(timeout=60)))[0]
+                    assert state["kind"] == "state"
+                    names = [light["name"] for light in state["lights"]]
+                    lights = {names[0]: [1.0, 1.0, 1.0]}
+                    kept = said(socket, 1, "propose", name="evening", lights=lights)
+                    assert kept["looks"][-1]["is_proposal"]
+                    assert said(socket, 2, "undo")["kind"] == "failed"
+                # That of the killed painter was replaced.
+                found = json.loads(file.read_text())
+                assert found == {key: told[key] for key in found}
+                assert found["token"] != killed
+                assert file.stat().st_mode & 0o777 == 0o600
+                killed = found["token"]
+                process.send_signal(ends)
+                process.wait(timeout=60)
+                assert process.stdout.read() == ""
+            finally:
+                process.kill()
+        assert file.exists() == (ends == signal.SIGKILL)
 
 
 @pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM])

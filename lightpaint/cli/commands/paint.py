@@ -1,5 +1,6 @@
 """`lightpaint paint`: opens the painter in a browser, and says where it is."""
 
+import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -85,7 +86,11 @@ def paint(
             is_open = server.address.reach is not Reach.MACHINE
             (partial(terminal.complain, "paint") if is_open else terminal.say)(about)
         said = f"painting {subject.name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
-        (lines.err if manner().as_json else terminal.write)(said)
+        if manner().as_json:  # now, in one line: programs connect while it runs
+            lines.err(said)
+            lines.out(json.dumps({**server.connection, **told()}))
+        else:
+            terminal.write(said)
         if with_browser and _has_browser():
             # Some browsers keep who starts them waiting.
             given = (server.url_once(),)
@@ -101,8 +106,8 @@ def paint(
         terminal.say(f"the painter has ended; what was painted is kept in {folder}")
     except OutputError as error:  # also where an interrupt has ended it
         terminal.complain("paint", str(error))
-        return Outcome(told, 2)
-    return Outcome(told)
+        return Outcome(None, 2)
+    return Outcome(None)
 
 
 def _say(text: str) -> None:

@@ -171,7 +171,8 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
     terminal.write(f"Open {made.answer / 'report.html'} in a browser. Then paint your own:")
     terminal.write(f"lightpaint template {shlex.quote(str(made.scene))}")
     about = {"scene": str(made.scene), "painting": str(made.painting), "command": command}
-    return replace(solved, told=lambda: about | solved.told())
+    results = solved.told
+    return replace(solved, told=lambda: about | (results() if results is not None else {}))
 
 
 def relight(

@@ -36,9 +36,11 @@ class Manner:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a command came to. told: the document for programs, made if asked for."""
+    """What a command came to. told: the document for programs, made if asked for; None where
+    they were told already.
+    """
 
-    told: Callable[[], dict[str, Any]]
+    told: Callable[[], dict[str, Any]] | None
     code: int = 0
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, get_args
 
+from lightpaint.arrays import RGB
 from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.store.canvas_pixels import Region
 
@@ -214,6 +215,28 @@ class Fetch(Message, kind="fetch"):
     name: str
 
 
+@dataclass(frozen=True)
+class Observe(Message, kind="observe"):
+    """The first message of an observer: a client that is told lighting, looks and progress, and
+    never has the session. It may then send `fetch`, `export` and `propose`, and nothing else.
+    Answered by `state` or `waiting`.
+    """
+
+    version: int
+
+
+@dataclass(frozen=True)
+class Propose(Message, kind="propose"):
+    """Offer a lighting to who paints: it becomes a look, in which each light is held where it is
+    proposed, and takes the place of an earlier proposal of that name. Answered by `looks`.
+
+    lights: emission by name of light; of others that of the answer now.
+    """
+
+    name: str
+    lights: Mapping[str, RGB]
+
+
 #: What a page may say, by kind.
 Said = (
     Hello
@@ -237,6 +260,8 @@ Said = (
     | Explain
     | TakeOver
     | Fetch
+    | Observe
+    | Propose
 )
 
 #: The same by kind.

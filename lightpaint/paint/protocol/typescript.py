@@ -62,22 +62,32 @@ def _is_record_of(value: Any, module: Any) -> bool:
 def _interface(record: type[Any], *, is_request: bool) -> str:
     """Return one interface. is_request: whether fields with a default may be left out."""
     hints = get_type_hints(record)
-    lines, arrays = [], []
-    for one in fields(record):
-        if get_origin(hints[one.name]) is np.ndarray:
-            arrays.append(f"{one.name}: Picture")
-            continue
-        may_lack = _is_optional(one) or (is_request and _has_default(one))
-        mark = "?" if may_lack else ""
-        # Left out where it is None; a request may give null all the same.
-        hint = _without_none(hints[one.name]) if _is_optional(one) else hints[one.name]
-        lines.append(f"  {one.name}{mark}: {typed(hint)};\n")
+    found = [one.name for one in fields(record) if get_origin(hints[one.name]) is np.ndarray]
+    arrays = [f"{name}: Picture" for name in found]
+    lines = [f"  {name}: {kind};\n" for name, kind in field_types(record, is_request=is_request)]
     if record.__name__ in {one.__name__ for one in events.EVENTS.values()}:
         lines.insert(0, f"  kind: '{record.kind}';\n  reply?: number;\n")
         lines.append(f"  arrays: {{ {'; '.join(arrays)} }};\n")
     said = (inspect.getdoc(record) or "").replace("*/", "* /").split("\n")
     comment = "/**\n" + "".join(f" * {line}".rstrip() + "\n" for line in said) + " */\n"
     return f"{comment}export interface {record.__name__} {{\n{''.join(lines)}}}\n"
+
+
+def field_types(record: type[Any], *, is_request: bool = True) -> list[tuple[str, str]]:
+    """Return name and type of each field that is no array; `name?` for one that may be left out.
+
+    is_request: whether those with a default may.
+    """
+    hints, made = get_type_hints(record), []
+    for one in fields(record):
+        if get_origin(hints[one.name]) is np.ndarray:
+            continue
+        is_told = record in events.EVENTS.values() or not is_request
+        may_lack = _is_optional(one) or (not is_told and _has_default(one))
+        # Left out where it is None; a request may give null all the same.
+        hint = _without_none(hints[one.name]) if _is_optional(one) else hints[one.name]
+        made.append((f"{one.name}?" if may_lack else one.name, typed(hint)))
+    return made
 
 
 def typed(hint: Any) -> str:

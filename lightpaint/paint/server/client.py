@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy.typing as npt
@@ -21,6 +21,8 @@ from lightpaint.paint.protocol import (
     PictureUpdate,
     ProgressReport,
     Said,
+    SessionState,
+    Standing,
     TakeOver,
 )
 
@@ -73,6 +75,7 @@ class Client:
     after a dropped connection; "" if it has none.
 
     Attributes:
+        observes: Whether it has begun as an observer, which it stays.
         has_left: Whether it says no more; what it has said may wait to be answered.
     """
 
@@ -87,7 +90,7 @@ class Client:
         self._is_sent.set()
         self._is_answered.set()
         self._is_gone = False
-        self.has_left = False
+        self.has_left = self.observes = False
 
     async def keep_hearing(self) -> None:
         """Take what the page says until it leaves, but no more than waits already."""
@@ -230,7 +233,9 @@ def _heard(frame: bytes | None) -> Heard:
 def _is_other_version(content: Mapping[str, Any]) -> bool:
     """Whether it is the first message of a page of another version, whatever else it says."""
     version = content.get("version")
-    return content.get("kind") == "hello" and type(version) is int and version != VERSION
+    return (
+        content.get("kind") in ("hello", "observe") and type(version) is int and version != VERSION
+    )
 
 
 def _number(content: Mapping[str, Any]) -> list[int]:
@@ -247,11 +252,15 @@ def _sort(message: Message) -> tuple[Any, ...] | None:
     """Of messages that nobody asked for: those of which only the newest counts."""
     if isinstance(message, ProgressReport):
         return "progress", message.what
-    is_newest = isinstance(message, AnswerUpdate | PictureUpdate | LookList)
+    is_newest = isinstance(message, AnswerUpdate | PictureUpdate | LookList | SessionState)
     return (message.kind,) if is_newest else None
 
 
 def _merged(old: Message, new: Message) -> Message:
     if isinstance(old, PictureUpdate) and isinstance(new, PictureUpdate):
         return PictureUpdate(resources={**old.resources, **new.resources})
+    if isinstance(old, AnswerUpdate) and isinstance(new, AnswerUpdate):
+        # Live answers leave out what is asked, which the one that is replaced may have said.
+        names = [one for one in Standing.__dataclass_fields__ if getattr(new, one) is None]
+        return replace(new, **{name: getattr(old, name) for name in names})
     return new

@@ -60,11 +60,13 @@ class Guard:
 
     Attributes:
         token: Opens pages for as long as the server runs, as often as somebody likes.
+        program_token: Lets programs in that are no browser, in a header; it opens no page.
     """
 
     def __init__(self, app: App, *, address: Address, public: Container[str] = ()) -> None:
         self.app, self.public, self._address = app, public, address
         self.token, self._key = secrets.token_urlsafe(24), secrets.token_urlsafe(24)
+        self.program_token = secrets.token_urlsafe(24)
         self._once: dict[str, float] = {}
 
     def once(self) -> str:
@@ -95,11 +97,26 @@ class Guard:
             await _answer(_headed(send, scope), status, reason)
 
     def knows(self, scope: Scope) -> bool:
-        """Return whether a request shows the key, and comes from a page of this server."""
+        """Return whether a request shows the key, and comes from a page of this server; or the
+        programs' token, and comes from no page.
+        """
+        if self.is_program(scope):
+            return True
         is_socket = scope["type"] == "websocket"
         given = _offered(scope) if is_socket else _bearer(scope)
         is_right = given is not None and _same(given, self._key)
         return is_right and self._refusal(scope, is_socket=is_socket) is None
+
+    def is_program(self, scope: Scope) -> bool:
+        """Return whether a request comes from a program that is no browser, and may.
+
+        Browsers name the origin of every socket, and give none a header of a script's; a page of
+        another origin is refused the header of what it fetches, since nothing here allows it. So a
+        request that names an origin is a page's, whatever else it shows.
+        """
+        given = _bearer(scope)
+        is_right = given is not None and _same(given, self.program_token)
+        return is_right and not _header(scope, b"origin") and self._refusal(scope) is None
 
     def _refusal(self, scope: Scope, *, is_socket: bool = False) -> str | None:
         """Why the names in a request are wrong, or None."""

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from lightpaint.errors import PaintError
 from lightpaint.paint.frames import MAX_FRAME
+from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.server.address import Listening, listen
 from lightpaint.paint.server.client import Client
 from lightpaint.paint.server.guard import PROTOCOL, App, Guard
 from lightpaint.paint.server.page_files import PageFile, page_files
 from lightpaint.paint.server.session_clients import Line, Painted, pictured
 from lightpaint.paint.store.store import Store
+from lightpaint.version import __version__
 
 if TYPE_CHECKING:
     import uvicorn
@@ -37,8 +39,13 @@ def check_installed() -> None:
             )
 
 
-def page_app(line: Line, *, files: dict[str, PageFile] | None = None) -> App:
-    """What is answered to those who may ask."""
+def page_app(
+    line: Line,
+    *,
+    files: dict[str, PageFile] | None = None,
+    is_program: Callable[[Any], bool] = lambda _: False,
+) -> App:
+    """What is answered to those who may ask. is_program: whether a request is of no page."""
     from starlette.applications import Starlette
     from starlette.responses import Response
     from starlette.routing import Route, WebSocketRoute
@@ -53,6 +60,8 @@ def page_app(line: Line, *, files: dict[str, PageFile] | None = None) -> App:
 
     async def data(request: "Request") -> "Response":
         name, asked = request.path_params["name"], request.query_params.get("g")
+        if is_program(request.scope):
+            await line.at_rest()
         before = line.generations.get(name)
         try:
             picture = await pictured(line, name)
@@ -71,7 +80,8 @@ def page_app(line: Line, *, files: dict[str, PageFile] | None = None) -> App:
         return Response(content, headers=headers)
 
     async def live(websocket: "WebSocket") -> None:
-        await websocket.accept(PROTOCOL)
+        # A program may have offered none, and is not answered with what it did not offer.
+        await websocket.accept(PROTOCOL if PROTOCOL in websocket.scope["subprotocols"] else None)
         await line.serve(Client(websocket, websocket.query_params.get("page", "")))
 
     @asynccontextmanager
@@ -128,6 +138,13 @@ class Server:
         """Where the page is, with the token that opens it: in the fragment, which stays there."""
         return f"{self.address.url}#token={self._guard.token}"
 
+    @property
+    def connection(self) -> dict[str, Any]:
+        """What a program of this machine has to know to connect."""
+        token = self._guard.program_token
+        about = {"version": __version__, "protocol": VERSION}
+        return {"address": self.address.url_here, "token": token, **about}
+
     def url_once(self) -> str:
         """Return the same for a browser that is started now: good once."""
         self.is_expected = True
@@ -160,7 +177,10 @@ class Server:
         from lightpaint.paint.server.shutdown import EndingServer, PageSocket, hanging_up
 
         files = page_files()
-        self._guard.app, self._guard.public = page_app(self._line, files=files), files
+        self._guard.app, self._guard.public = (
+            page_app(self._line, files=files, is_program=self._guard.is_program),
+            files,
+        )
         config = uvicorn.Config(
             self._guard,
             http=bounded_http(self._guard.knows),

@@ -22,13 +22,26 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import told, tone_of
 from lightpaint.paint.protocol import (
     Acknowledgement,
+    AnswerUpdate,
+    Ask,
+    CanvasPatch,
     Closing,
+    Export,
+    ExportResult,
     Failure,
+    Fetch,
+    LookList,
     Message,
+    Notice,
+    Observe,
+    Paint,
     PictureData,
     PictureUpdate,
+    ProgressReport,
+    Propose,
     Said,
     SessionState,
+    VerificationResult,
 )
 from lightpaint.paint.server.client import Client, Heard
 from lightpaint.paint.store.store import Store
@@ -37,8 +50,26 @@ from lightpaint.progress import while_wanted
 #: Pages that are told that another has the session, at most.
 MOST_PAGES = 16
 
+#: Clients that only observe, at most.
+MOST_OBSERVERS = 8
+
+#: Seconds that a program's download waits for the brush to rest, at most.
+REST_S = 10.0
+
 #: Seconds for pages to hear the end.
 GOODBYE_S = 1.0
+
+#: What observers are told of what goes on.
+OBSERVED = (
+    SessionState,
+    AnswerUpdate,
+    LookList,
+    PictureUpdate,
+    ProgressReport,
+    ExportResult,
+    VerificationResult,
+    Notice,
+)
 
 _Made = TypeVar("_Made")
 
@@ -53,6 +84,9 @@ class Painted(Protocol):
 
     def greet(self, *, is_back: bool) -> Message:
         """All that a page has to know; is_back: it had the session before, and nobody since."""
+
+    def state(self) -> Message:
+        """Return all that there is to know, and change nothing."""
 
     def resource(self, name: str) -> npt.NDArray[Any]:
         """A picture. Raises PaintError if there is none of that name."""
@@ -76,6 +110,8 @@ class Line:
         self._worker = ThreadPoolExecutor(1, "lightpaint-session")
         self._is_over = False
         self._leaving: asyncio.Future[None] | None = None
+        self._rest = asyncio.Event()  # set while no brush is down
+        self._rest.set()
 
     def begin(self) -> None:
         """Hear the session from now on, in the running loop."""
@@ -94,6 +130,7 @@ class Line:
 
     async def end(self) -> None:
         """Finish what pages have said, tell them, and finish what the session is at."""
+        self._rest.set()
         await _all([client.answered() for client in self._clients])
         self._is_over = True
         self.session.on_message = None
@@ -120,6 +157,7 @@ class Line:
             self._clients.discard(client)
             if self._holder is client:
                 self._holder = None
+                self._rest.set()
             client.give_up()  # a task may be at the end of a wait, which swallows the cancelling
             for task in (sending, answering):
                 task.cancel()
@@ -152,6 +190,8 @@ class Line:
             answers = await self._answers(client, heard)
             for message in answers:
                 self._note(message)
+                if client is self._holder and not isinstance(message, SessionState):
+                    self._tell_observers(message)
             first, *others = answers or [Acknowledgement()]
             for seq in heard.replies or (None,):
                 client.send(first, seq)
@@ -163,6 +203,8 @@ class Line:
         try:
             if heard.refusal is not None:
                 return [heard.refusal]
+            if isinstance(heard.said, Observe) or client.observes:
+                return await self._answers_to_observer(client, heard.said)
             if heard.asks_for_session:
                 holder = await self._present_holder(client)
                 if holder not in (None, client) and not (
@@ -175,6 +217,8 @@ class Line:
             if self._holder is not client:
                 return [_taken("this tab does not have the session")]
             assert heard.said is not None
+            is_live = isinstance(heard.said, Paint | Ask) and not heard.said.done
+            (self._rest.clear if is_live else self._rest.set)()
             return await self._done(self.session.said, heard.said, heard.arrays)
         except LightpaintError as error:
             return [Failure(text=str(error), tone=tone_of(error))]
@@ -182,6 +226,49 @@ class Line:
             # A mistake of lightpaint's own: whoever paints goes on, and whoever mends it is told.
             self.say("".join(traceback.format_exception(error)))
             return [Failure(text=told(error, at_length=False))]
+
+    async def _answers_to_observer(self, client: Client, said: Said | None) -> list[Message]:
+        """Answer one that never has the session, once no brush is down.
+
+        Raises LightpaintError for what observers may not do.
+        """
+        if isinstance(said, Observe):
+            if client is self._holder:
+                raise PaintError("this client has the session: observe with a client of its own")
+            others = [one for one in self._clients if one.observes and one is not client]
+            if len(others) >= MOST_OBSERVERS:
+                raise PaintError(f"{MOST_OBSERVERS} observers are there already: close one of them")
+            client.observes = True
+            await self._rest.wait()
+            return [await self._done(self.session.state)]
+        is_export = isinstance(said, Export) and said.run
+        if not (is_export or isinstance(said, Fetch | Propose)):
+            raise PaintError(
+                "an observer may fetch, export and propose: to paint, connect another client"
+            )
+        await self._rest.wait()
+        answers = await self._done(self.session.said, said, {})
+        if isinstance(said, Propose):
+            for message in answers:
+                self._tell_observers(message, but=client)
+                if self._holder is not None:
+                    self._holder.send(message)
+            if self._holder is not None:
+                self._holder.send(Notice(text=f"{said.name[:80]} was proposed: see the looks"))
+        return answers
+
+    async def at_rest(self) -> None:
+        """Wait until no brush is down, but not for ever: who waits may hold it."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._rest.wait(), REST_S)
+
+    def _tell_observers(self, message: Message, but: Client | None = None) -> None:
+        """Pass on what concerns them. What waits for a slow one is replaced by what is newer."""
+        told = message.answer if isinstance(message, CanvasPatch) else message
+        if isinstance(told, OBSERVED):
+            for client in self._clients:
+                if client.observes and client is not but:
+                    client.send(told)
 
     async def _present_holder(self, client: Client) -> Client | None:
         """Who has the session when `client` asks: what one that has left had said is done first."""
@@ -194,6 +281,7 @@ class Line:
     def _give(self, client: Client) -> None:
         """`client` has the session from now on."""
         before, self._holder, self._last = self._holder, client, client
+        self._rest.set()
         if before is None or before is client:
             return
         if _same_page(before, client):  # it is at the other end of a lost connection
@@ -204,6 +292,7 @@ class Line:
     def _post(self, message: Message) -> None:
         """What the session says by itself."""
         self._note(message)
+        self._tell_observers(message)
         if self._holder is not None:
             self._holder.send(message)
 

@@ -1,5 +1,6 @@
 """Looks of a session: a painting and its answer, kept under a name."""
 
+import math
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -18,6 +19,7 @@ from lightpaint.paint.protocol import (
     LookList,
     Message,
     MixLooks,
+    Propose,
     RenameLook,
     SaveLook,
 )
@@ -26,14 +28,18 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.steps import KeptLook, of_view
+from lightpaint.screen import some_names
 
 #: Characters of a name, at most.
 LONGEST = 80
 
+#: Proposals of observers among the looks, at most: each keeps a painting of all views.
+MOST_PROPOSALS = 16
+
 #: What says where brighter is as good.
 MARKS = "at_least"
 
-OfLooks = SaveLook | RenameLook | CopyLook | MixLooks | DropLook
+OfLooks = SaveLook | RenameLook | CopyLook | MixLooks | DropLook | Propose
 
 
 class Looks:
@@ -59,6 +65,7 @@ class Looks:
                 stamp=look.fields.get("stamp"),
                 weights=tuple(map(as_rgb, np.asarray(look.arrays["weights"]))),
                 thumbnail=f"look/{look.id}",
+                is_proposal=bool(look.fields.get("is_proposal", False)),
             )
             for look in self._session.store.looks()
         )
@@ -71,14 +78,17 @@ class Looks:
                 self._put(self._now(self._named(name)))
             case RenameLook(number, name):
                 look = self._look(number)
-                fields = {**look.fields, "name": self._named(name)}
+                fields = {**look.fields, "name": self._named(name), "is_proposal": False}
                 self._put(KeptLook(look.id, fields, look.arrays))
             case CopyLook(number):
                 look = self._look(number)
                 fields = {**look.fields, "name": f"{look.fields['name']} copy"[:LONGEST]}
+                fields["is_proposal"] = False
                 self._put(KeptLook(self._free(), fields, look.arrays))
             case MixLooks():
                 self._put(self._between(message))
+            case Propose():
+                self._put(self._proposal(message))
             case DropLook(number):
                 store.drop_look(self._look(number).id)
                 for k in range(len(self._session.views)):
@@ -123,13 +133,44 @@ class Looks:
         )
         both = zip(*(self._paintings(look) for look in looks), strict=True)
         paintings = [_mixed(pair, shares) for pair in both]
+        return self._made(name, paintings, self._held(np.asarray(weights)), np.asarray(weights))
+
+    def _held(self, weights: npt.NDArray[Any]) -> Wishes:
+        """Return wishes that hold every light at a lighting, (n, 3)."""
         lights = self._session.basis.lights
         held = {
             light.name: {"lock": float(w[0]) if light.is_scalar else w.tolist()}
-            for light, w in zip(lights, np.asarray(weights), strict=True)
+            for light, w in zip(lights, weights, strict=True)
             if not light.is_fixed
         }
-        return self._made(name, paintings, Wishes(held), np.asarray(weights))
+        return Wishes(held)
+
+    def _proposal(self, message: Propose) -> KeptLook:
+        """Return the painting as it is with a lighting that somebody proposes."""
+        name, session = self._named(message.name), self._session
+        weights, lights = session.weights.copy(), session.basis.lights
+        names = list(session.basis.names)
+        for light, emission in message.lights.items():
+            if light not in names:
+                raise PaintError(
+                    f"no light is called {light!r}: expected one of {some_names(names)}"
+                )
+            its = lights[names.index(light)]
+            if its.is_fixed:
+                raise PaintError(f"{light} is kept as it is: leave it out of the proposal")
+            if not all(math.isfinite(x) and x >= 0 for x in emission):
+                raise PaintError(f"{light} is proposed at {list(emission)}: expected numbers >= 0")
+            if its.is_scalar and len(set(emission)) > 1:
+                raise PaintError(f"{light} has one number for all channels: give it three times")
+            weights[names.index(light)] = emission
+        kept = [look for look in session.store.looks() if look.fields.get("is_proposal")]
+        same = [look for look in kept if look.fields["name"] == name]
+        if not same and len(kept) >= MOST_PROPOSALS:
+            raise PaintError(f"{len(kept)} proposals are there already: let who paints drop some")
+        paintings = [view.pixels(view.whole) for view in session.views]
+        made = self._made(name, paintings, self._held(weights), weights)
+        number = same[0].id if same else made.id
+        return KeptLook(number, {**made.fields, "is_proposal": True}, made.arrays)
 
     def _made(
         self, name: str, paintings: Sequence[Pixels], wishes: Wishes, weights: npt.NDArray[Any]

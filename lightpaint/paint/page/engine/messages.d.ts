@@ -643,6 +643,26 @@ export interface Fetch {
   name: string;
 }
 
+/**
+ * The first message of an observer: a client that is told lighting, looks and progress, and
+ * never has the session. It may then send `fetch`, `export` and `propose`, and nothing else.
+ * Answered by `state` or `waiting`.
+ */
+export interface Observe {
+  version: number;
+}
+
+/**
+ * Offer a lighting to who paints: it becomes a look, in which each light is held where it is
+ * proposed, and takes the place of an earlier proposal of that name. Answered by `looks`.
+ *
+ * lights: emission by name of light; of others that of the answer now.
+ */
+export interface Propose {
+  name: string;
+  lights: Record<string, RGB>;
+}
+
 /** What clients are told, by kind. */
 export interface Events {
   state: SessionState;
@@ -688,6 +708,8 @@ export interface Requests {
   explain: Explain;
   take_over: TakeOver;
   fetch: Fetch;
+  observe: Observe;
+  propose: Propose;
 }
 
 export type AnyEvent = Events[keyof Events];

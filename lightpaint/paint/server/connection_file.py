@@ -1,0 +1,41 @@
+"""The file by which programs find a painter that runs: its address and token, for its owner."""
+
+import json
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from lightpaint.files import replacing
+
+#: Its name, in the session's folder.
+CONNECTION = "painter.json"
+
+
+class ConnectionFile:
+    """The file of one painter, in the folder of its session.
+
+    about: what it says, as JSON, with a `token` that is of this painter alone.
+    """
+
+    def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
+        self.path, self._about = folder / CONNECTION, dict(about)
+
+    def write(self) -> None:
+        """Put it there, in the place of one that a killed painter has left.
+
+        Raises OutputError for whatever the system refuses.
+        """
+        with replacing(self.path) as beside:
+            # Nobody else may read it, not even before it has its name; nor is a link followed.
+            number = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with open(number, "w", encoding="utf-8") as file:
+                file.write(json.dumps(self._about) + "\n")
+
+    def remove(self) -> None:
+        """Take it away, unless it is another painter's by now."""
+        with suppress(OSError, ValueError, AttributeError):
+            found = json.loads(self.path.read_text(encoding="utf-8"))
+            if found.get("token") == self._about["token"]:
+                self.path.unlink()

@@ -1,0 +1,391 @@
+"""Observers of a session, and programs that are no browser: what they hear, and may not do."""
+
+import asyncio
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_messages import fake_answer, fake_progress, fake_state
+from fake_session import FakeSession
+from keys import bearer, offered
+from lightpaint.settings import Settings
+from raw_message import RawMessage
+from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
+from starlette.websockets import WebSocketDisconnect
+
+import lightpaint as lp
+from lightpaint.errors import PaintError
+from lightpaint.paint.frames import of_frame, to_frame
+from lightpaint.paint.protocol import (
+    VERSION,
+    CanvasPatch,
+    HistoryInfo,
+    LoadLook,
+    LookList,
+    Message,
+    PictureUpdate,
+    Propose,
+    RenameLook,
+    SaveLook,
+)
+from lightpaint.paint.server import client, session_clients
+from lightpaint.paint.server.address import Address, Reach
+from lightpaint.paint.server.guard import Guard
+from lightpaint.paint.server.server import page_app
+from lightpaint.paint.server.session_clients import Line
+from lightpaint.paint.session.look_library import MOST_PROPOSALS, Looks
+from lightpaint.paint.session.picture_table import Pictures
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.steps import Identity
+from lightpaint.paint.store.store import MemoryStore
+
+HOST = "127.0.0.1:8421"
+HERE = Address("127.0.0.1", 8421, Reach.MACHINE, frozenset({"127.0.0.1"}))
+REFUSED = (WebSocketDisconnect, WebSocketDenialResponse)
+
+
+class Served:
+    """A session behind its guard; what is shown to it is a test's."""
+
+    def __init__(self) -> None:
+        self.session = FakeSession()
+        self.line = Line(self.session, None)
+        self.guard = Guard(_nothing, address=HERE)
+        self.guard.app = page_app(self.line, files={}, is_program=self.guard.is_program)
+        self.browser = TestClient(self.guard, base_url=f"http://{HOST}")
+
+    def program(self, token: str | None = None, **headers: str) -> WebSocketTestSession:
+        shown = bearer(self.guard.program_token if token is None else token)
+        return self.browser.websocket_connect(f"ws://{HOST}/live", headers={**shown, **headers})
+
+    def page(self) -> WebSocketTestSession:
+        key = self.browser.get("/key", headers=bearer(self.guard.token)).text
+        origin = {"origin": f"http://{HOST}"}
+        return self.browser.websocket_connect(
+            f"ws://{HOST}/live", headers=origin, subprotocols=offered(key)
+        )
+
+
+async def _nothing(scope: Any, receive: Any, send: Any) -> None:
+    """Nobody is served yet."""
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    made = Served()
+    with made.browser:
+        yield made
+
+
+def say(socket: WebSocketTestSession, kind: str, seq: int = 1, **fields: Any) -> None:
+    arrays = {k: fields.pop(k) for k in ("image", "importance") if k in fields}
+    message = RawMessage(kind, {"seq": seq, **fields}, arrays)
+    socket.send_bytes(to_frame(message.content(), message.buffers()))
+
+
+def hear(socket: WebSocketTestSession) -> dict[str, Any]:
+    return of_frame(socket.receive_bytes())[0]
+
+
+def paint(socket: WebSocketTestSession, seq: int, *, done: bool) -> None:
+    pixel = {"image": np.ones((1, 1, 3), np.float32), "importance": np.ones((1, 1), np.float32)}
+    say(socket, "paint", seq, stroke=1, region=[0, 1, 0, 1], done=done, **pixel)
+
+
+# Who is let in
+
+
+def test_a_program_shows_its_token_in_a_header_and_names_no_origin(served: Served) -> None:
+    with served.program() as program:
+        say(program, "observe", version=VERSION)
+        assert hear(program)["kind"] == "state"
+    answer = served.browser.get("/data/present", headers=bearer(served.guard.program_token))
+    assert answer.status_code == 200
+
+
+@pytest.mark.parametrize("token", ["", "x", "x" * 5000, "Bearer"])
+def test_a_wrong_token_is_refused(served: Served, token: str) -> None:
+    with pytest.raises(REFUSED), served.program(token):
+        pass
+    assert served.browser.get("/data/present", headers=bearer("x")).status_code == 410
+
+
+def test_what_opens_pages_opens_no_program_and_the_other_way_round(served: Served) -> None:
+    guard = served.guard
+    key = served.browser.get("/key", headers=bearer(guard.token)).text
+    for token in (guard.token, guard.once(), key):
+        with pytest.raises(REFUSED), served.program(token):
+            pass
+    assert len({guard.token, guard.program_token, key}) == 3
+    assert served.browser.get("/key", headers=bearer(guard.program_token)).text != key
+    with (
+        pytest.raises(REFUSED),
+        served.browser.websocket_connect(
+            f"ws://{HOST}/live",
+            headers={"origin": f"http://{HOST}"},
+            subprotocols=offered(guard.program_token),
+        ),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"origin": f"http://{HOST}"},
+        {"origin": "http://evil.example"},
+        {"origin": "null"},
+        {"host": "evil.example:8421"},
+    ],
+)
+def test_a_page_gets_in_by_no_programs_token(served: Served, headers: dict[str, str]) -> None:
+    """Neither of this server, nor of another one by whatever name it leads here."""
+    with pytest.raises(REFUSED), served.program(**headers):
+        pass
+    shown = bearer(served.guard.program_token)
+    assert served.browser.get("/data/present", headers={**shown, **headers}).status_code != 200
+
+
+# What they hear
+
+
+def test_observers_hear_what_comes_of_painting_and_the_painter_keeps_the_session(
+    served: Served,
+) -> None:
+    with served.page() as page, served.program() as one, served.program() as other:
+        say(page, "hello", version=VERSION)
+        assert hear(page)["kind"] == "state"
+        for program in (one, other):
+            say(program, "observe", version=VERSION)
+            assert hear(program)["kind"] == "state"
+        paint(page, 2, done=True)
+        assert hear(page)["reply"] == 2
+        for program in (one, other):
+            told = hear(program)
+            assert told["kind"] == "answer"
+            assert "reply" not in told
+        served.session.on_message(fake_progress("basis", 3))  # type: ignore[misc]
+        assert [hear(x)["kind"] for x in (page, one, other)] == ["progress"] * 3
+        paint(page, 3, done=True)
+        assert hear(page)["reply"] == 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        ("hello", {"version": VERSION}),
+        ("take_over", {}),
+        ("undo", {}),
+        ("ask", {"light": 0, "asked": {"off": True}}),
+        ("set", {"values": {"hold": 0}}),
+        ("save_look", {"name": "mine"}),
+        ("load_look", {"look": 1}),
+        ("drop_look", {"look": 1}),
+        ("verify", {}),
+        ("export", {"what": [], "run": False}),
+    ],
+)
+def test_an_observer_neither_paints_nor_takes_the_session(
+    served: Served, kind: str, fields: Any
+) -> None:
+    with served.page() as page, served.program() as program:
+        say(page, "hello", version=VERSION)
+        hear(page)
+        say(program, "observe", version=VERSION)
+        hear(program)
+        say(program, kind, 5, **fields)
+        told = hear(program)
+        assert (told["kind"], told["reply"]) == ("failed", 5)
+        assert told["text"].startswith("an observer may fetch, export and propose")
+        paint(program, 6, done=True)
+        assert hear(program)["kind"] == "failed"
+        assert served.session.heard == []
+        paint(page, 2, done=True)
+        assert hear(page)["kind"] == "answer"
+
+
+def test_who_has_the_session_does_not_become_an_observer(served: Served) -> None:
+    with served.page() as page:
+        say(page, "hello", version=VERSION)
+        hear(page)
+        say(page, "observe", 2, version=VERSION)
+        assert hear(page)["kind"] == "failed"
+        paint(page, 3, done=True)
+        assert hear(page)["kind"] == "answer"
+
+
+def test_observers_are_few_and_speak_this_version(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session_clients, "MOST_OBSERVERS", 1)
+    with served.program() as one, served.program() as other:
+        say(one, "observe", version=VERSION + 1)
+        assert hear(one)["reason"] == "version"
+        say(one, "observe", version=VERSION)
+        assert hear(one)["kind"] == "state"
+        say(other, "observe", version=VERSION)
+        assert hear(other)["text"] == "1 observers are there already: close one of them"
+
+
+def test_what_observers_ask_for_waits_while_a_brush_is_down(served: Served) -> None:
+    with served.page() as page, served.program() as program:
+        say(page, "hello", version=VERSION)
+        hear(page)
+        say(program, "observe", version=VERSION)
+        hear(program)
+        paint(page, 2, done=False)
+        hear(page)
+        assert hear(program)["kind"] == "answer"
+        say(program, "export", 7, what=["lighting"])
+        paint(page, 3, done=True)
+        assert hear(page)["reply"] == 3
+        assert [hear(program).get("reply") for _ in range(2)] == [None, 7]
+    kinds = [said.kind for said in served.session.heard]
+    assert kinds == ["paint", "paint", "export"]
+
+
+def test_the_brush_of_who_leaves_is_down_no_more(served: Served) -> None:
+    with served.program() as program:
+        with served.page() as page:
+            say(page, "hello", version=VERSION)
+            hear(page)
+            paint(page, 2, done=False)
+            hear(page)
+        say(program, "observe", version=VERSION)
+        assert hear(program)["kind"] == "state"
+
+
+def test_a_proposal_is_heard_of_where_somebody_paints(served: Served) -> None:
+    def said(said: Any, arrays: Any) -> list[Message]:
+        return [LookList(looks=(), resources={})]
+
+    served.session.said = said  # type: ignore[method-assign]
+    with served.page() as page, served.program() as program:
+        say(page, "hello", version=VERSION)
+        hear(page)
+        say(program, "observe", version=VERSION)
+        hear(program)
+        say(program, "propose", 9, name="evening", lights={"lamp 0": [1, 1, 1]})
+        assert (hear(program)["kind"], hear(page)["kind"]) == ("looks", "looks")
+        assert hear(page)["text"] == "evening was proposed: see the looks"
+
+
+class Deaf:
+    """A socket that takes nothing."""
+
+    async def receive(self) -> Any:
+        await asyncio.Event().wait()
+
+    async def send_bytes(self, data: bytes) -> None:
+        await asyncio.Event().wait()
+
+    async def close(self, code: int = 1000) -> None:
+        """Nobody hears it."""
+
+
+def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() -> None:
+    line = Line(FakeSession(), None)
+    slow = client.Client(Deaf())
+    slow.observes = True
+    line._clients.add(slow)
+    history = HistoryInfo(("stroke",), (), 1)
+    line._tell_observers(fake_answer(version=0, history=history, asked={"lamp": {"off": True}}))
+    for k in range(1, 2000):
+        line._tell_observers(fake_answer(version=k))
+        line._tell_observers(fake_progress("basis", k))
+        line._tell_observers(fake_state({"present": k}))
+        line._tell_observers(PictureUpdate(resources={"present": k}))
+    unsent = [message.fields for message, _ in slow._unsent]
+    assert [one.get("version") for one in unsent] == [1999, None, VERSION, None]
+    assert unsent[0]["history"]["count"] == 1
+    assert unsent[0]["asked"] == {"lamp": {"off": True}}
+
+
+def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
+    line, slow = Line(FakeSession(), None), client.Client(Deaf())
+    slow.observes = True
+    line._clients.add(slow)
+    pixels = np.zeros((1, 1, 3), np.float32)
+    patch = CanvasPatch(
+        region=(0, 1, 0, 1),
+        view=0,
+        views=(0,),
+        version=4,
+        stroke=2,
+        exact=False,
+        mode="linear",
+        image=pixels,
+        importance=pixels[..., 0],
+        weights=np.ones((2, 3)),
+    )
+    line._tell_observers(patch)
+    [(told, _)] = slow._unsent
+    assert told.kind == "answer"
+    assert list(told.arrays) == ["weights"]
+
+
+# Proposals
+
+
+@pytest.fixture
+def looks(make_basis: Any) -> tuple[Session, Looks]:
+    basis = make_basis(3)
+    session = Session(
+        [basis],
+        [basis.present_look],
+        MemoryStore(Identity.of([basis])),
+        settings=Settings(),
+        transform=lp.ViewTransform(),
+    )
+    return session, Looks(session, Pictures())
+
+
+def test_a_proposal_is_a_look_that_holds_its_lighting(looks: tuple[Session, Looks]) -> None:
+    session, its = looks
+    first, second, third = session.basis.names
+    before = session.weights.copy()
+    told = its.said(Propose("evening", {first: (1.0, 2.0, 3.0), second: (0.0, 0.0, 0.0)}))
+    assert isinstance(told, LookList)
+    [look] = told.looks
+    assert look.is_proposal
+    np.testing.assert_array_equal(session.weights, before)
+    wanted = np.array([[1, 2, 3], [0, 0, 0], before[2]])
+    np.testing.assert_allclose(look.weights, wanted)
+    its.load(LoadLook(look.id))
+    np.testing.assert_allclose(session.weights, wanted)
+    assert third in session.wishes.lights
+
+
+def test_a_later_proposal_of_the_name_takes_its_place_but_never_that_of_a_look(
+    looks: tuple[Session, Looks],
+) -> None:
+    session, its = looks
+    name = session.basis.names[0]
+    its.said(SaveLook("evening"))
+    for level in (1.0, 2.0):
+        its.said(Propose("evening", {name: (level, level, level)}))
+    kept, proposed = its.listed()
+    assert (kept.is_proposal, proposed.is_proposal) == (False, True)
+    assert proposed.weights[0] == (2.0, 2.0, 2.0)
+    its.said(RenameLook(proposed.id, "evening"))
+    its.said(Propose("evening", {}))
+    assert [look.is_proposal for look in its.listed()] == [False, False, True]
+
+
+def test_a_proposal_that_cannot_be_is_refused(looks: tuple[Session, Looks]) -> None:
+    session, its = looks
+    name = session.basis.names[0]
+    for lights, words in (
+        ({"nothing": (1.0, 1.0, 1.0)}, "no light is called 'nothing'"),
+        ({name: (-1.0, 1.0, 1.0)}, "expected numbers >= 0"),
+        ({name: (float("nan"), 1.0, 1.0)}, "expected numbers >= 0"),
+    ):
+        with pytest.raises(PaintError, match=words):
+            its.said(Propose("x", lights))
+    assert its.listed() == ()
+    for k in range(MOST_PROPOSALS):
+        its.said(Propose(f"look {k}", {}))
+    with pytest.raises(PaintError, match="are there already"):
+        its.said(Propose("one more", {}))
+    its.said(Propose("look 0", {}))
