@@ -9,7 +9,6 @@ import pytest
 from fake_messages import fake_answer, fake_progress, fake_state
 from fake_session import FakeSession
 from keys import bearer, offered
-from lightpaint.settings import Settings
 from raw_message import RawMessage
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
@@ -39,6 +38,7 @@ from lightpaint.paint.session.picture_table import Pictures
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
+from lightpaint.pipeline.settings import Settings
 
 HOST = "127.0.0.1:8421"
 HERE = Address("127.0.0.1", 8421, Reach.MACHINE, frozenset({"127.0.0.1"}))

@@ -1,8 +1,10 @@
 """Messages of page and session: round trips, and junk that is refused in one line."""
 
 import json
+import re
 import struct
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,14 +20,18 @@ from lightpaint.paint.frames import DTYPES, MAX_TEXT, of_frame, said_of, to_fram
 from lightpaint.paint.protocol import (
     EVENTS,
     KINDS,
+    VERSION,
     Findings,
     LightAnswer,
     Paint,
     Set,
     TakeOver,
     Tie,
+    document,
     typescript,
 )
+from lightpaint.paint.server.session_clients import MOST_OBSERVERS
+from lightpaint.paint.session.look_library import MOST_PROPOSALS
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 PLAIN = st.recursive(
@@ -214,3 +220,16 @@ def test_what_is_left_out_and_what_is_null() -> None:
             "share": 1.0,
         }
     ]
+
+
+def test_the_document_has_every_message_as_it_is() -> None:
+    """Run `python -m lightpaint.paint.protocol.document docs/protocol.md` after a change."""
+    text = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
+    assert document.with_sections(text) == text
+    for kind in (*KINDS, *EVENTS):
+        assert f"### `{kind}`" in text
+    assert f'"protocol": {VERSION}' in text
+    for most in (MOST_OBSERVERS, MOST_PROPOSALS):
+        assert re.search(rf"\b{most}\b", text)
+    for dtype in DTYPES:
+        assert f"`{dtype}`" in text
