@@ -19,6 +19,7 @@ from scipy.optimize import nnls
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.planes import BLOCK
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
@@ -26,7 +27,7 @@ from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.fit import Fit, meant_by
 from lightpaint.lighting.live.live import Live
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
+from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.target.target import Target
 from lightpaint.threads import one_thread

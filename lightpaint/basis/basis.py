@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, read_only
 from lightpaint.basis.lights import Lights
+from lightpaint.basis.planes import BLOCK, Planes, as_planes
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.dataframes import CHANNELS, by_channel, pandas, xarray
@@ -20,9 +21,6 @@ from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import Asked
 from lightpaint.screen import Shown, some_names, some_of
 from lightpaint.version import __version__
-
-#: Pixels of all lights that are brought to double precision at a time.
-BLOCK = 2**13
 
 #: Most samples of a pixel, which is beyond any render.
 MAX_SAMPLES = 2**40
@@ -76,10 +74,12 @@ class Basis(Shown):
     Attributes:
         lights: The table of n lights, which may be given as a sequence of them; their order is the
             order of everything else.
-        images: (n, h, w, 3) float32, linear Rec.709 radiance at unit emission.
-        half_differences: (n, h, w, 3) float32, half the difference of two independent halves of the
-            samples: the noise of `images`. Where an interrupt left the halves unequal, it
-            overstates the noise a little. Zeros where nothing is known of it (see `knows_noise`).
+        planes: Linear Rec.709 radiance of each light at unit emission; an array (n, h, w, 3)
+            float32 may be given. `images` is that array.
+        noise: Half the difference of two independent halves of the samples: the noise of `planes`;
+            given as these are. Where an interrupt left the halves unequal, it overstates the noise
+            a little. Zeros where nothing is known of it (see `knows_noise`). `half_differences` is
+            the array.
         emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
         origin: Where it comes from: scene, sensor, seed, samples.
         learned: (2, cells, emitters) float32, what the renderer found out on the way about which
@@ -99,8 +99,8 @@ class Basis(Shown):
     """
 
     lights: Lights
-    images: Floats
-    half_differences: Floats
+    planes: Planes
+    noise: Planes
     emitters_seen: Bools
     origin: Origin
     learned: Floats | None = None
@@ -112,10 +112,13 @@ class Basis(Shown):
     def __post_init__(self) -> None:
         n = len(self.lights)
         object.__setattr__(self, "lights", Lights.of(self.lights))
-        if self.images.ndim != 4 or self.images.shape[0] != n or self.images.shape[3] != 3:
-            shape = self.images.shape
-            raise BasisError(f"images of shape {shape} for {n} lights: need (n, h, w, 3)")
-        if self.half_differences.shape != self.images.shape:
+        for name in ("planes", "noise"):
+            given = getattr(self, name)
+            shape = given.shape if isinstance(given, np.ndarray) else (given.count, *given.size, 3)
+            if len(shape) != 4 or shape[0] != n or shape[3] != 3:
+                raise BasisError(f"images of shape {shape} for {n} lights: need (n, h, w, 3)")
+            object.__setattr__(self, name, as_planes(given))
+        if self.noise.size != self.planes.size:
             raise BasisError("half differences and images differ in shape")
         if self.emitters_seen.shape != self.size:
             raise BasisError("the mask of seen emitters has another size than the images")
@@ -138,7 +141,8 @@ class Basis(Shown):
         red, green, blue: its present emission, linear Rec.709 in `unit`. mean: luminance of its
         image at that emission, over all pixels. Raises LightpaintError without pandas.
         """
-        means = self.images.mean(axis=(1, 2), dtype=np.float64) * self.present_weights
+        pixels = self.size[0] * self.size[1]
+        means = self.totals / pixels * self.present_weights
         rows = [
             {
                 "plugin": light.plugin,
@@ -188,7 +192,17 @@ class Basis(Shown):
         """The image of the light called `name`, (h, w, 3). Raises BasisError if there is none."""
         if name not in self.names:
             raise BasisError(f"no light {name!r} in the basis: it has {some_names(self.names)}")
-        return np.asarray(self.images[self.names.index(name)])
+        return self.planes.plane(self.names.index(name))
+
+    @property
+    def images(self) -> Floats:
+        """All planes as one array, (n, h, w, 3) float32: for people, and for small pictures."""
+        return self.planes.array()
+
+    @property
+    def half_differences(self) -> Floats:
+        """The noise of all planes as one array, (n, h, w, 3) float32."""
+        return self.noise.array()
 
     def asking(self, asked: Asked) -> "Basis":
         """This basis, of whose lights that is asked."""
@@ -202,7 +216,7 @@ class Basis(Shown):
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
-        return self.images.shape[1], self.images.shape[2]
+        return self.planes.size
 
     @property
     def knows_noise(self) -> bool:
@@ -233,15 +247,15 @@ class Basis(Shown):
     @cached_property
     def totals(self) -> Doubles:
         """Σ_pixels Φᵢ, (n, 3) float64, over all of the picture."""
-        return read_only(self._sums(np.ones(self.images[0, ..., 0].size)))
+        return read_only(self._sums(np.ones(self.size[0] * self.size[1])))
 
     def _sums(self, counted: Doubles, *, is_squared: bool = False) -> Doubles:
         """Σ_pixels counted · Φᵢ, or its square, (n, 3). counted: (pixels,)."""
-        rows, sums = self.images.reshape(len(self.lights), -1, 3), np.zeros((len(self.lights), 3))
+        sums = np.zeros((len(self.lights), 3))
         # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
         # is as exact as the sum, and needs no copy of the basis.
-        for start in range(0, rows.shape[1], BLOCK):
-            block = rows[:, start : start + BLOCK].astype(np.float64)
+        for start in range(0, counted.size, BLOCK):
+            block = self.planes.pixels(slice(start, start + BLOCK)).astype(np.float64)
             if is_squared:
                 block *= block
             sums += counted[start : start + BLOCK] @ block
@@ -249,7 +263,7 @@ class Basis(Shown):
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """The image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the lights."""
-        return mix(self.images, weights)
+        return self.planes.mix(weights)
 
 
 def meter_exposure(image: Floats, *bases: Basis) -> float:
@@ -262,20 +276,6 @@ def meter_exposure(image: Floats, *bases: Basis) -> float:
         return choose_exposure(image)
     seen = [basis.emitters_seen.ravel() for basis in bases]
     return choose_exposure(image, np.concatenate(seen).reshape(image.shape[:2]))
-
-
-def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
-    """Σ w_i Φ_i in float32, without a copy of the images.
-
-    images: (n, h, w, 3) float32; weights: (n, 3), one per light and channel. Returns (h, w, 3).
-    """
-    n, height, width, _ = images.shape
-    # With a weight for every value of a row the innermost sums run along whole rows, not
-    # over three channels at a time.
-    along_row = np.tile(np.asarray(weights, np.float32), (1, width))
-    rows = images.reshape(n, height, width * 3)
-    mixed = np.einsum("nhk,nk->hk", rows, along_row)
-    return np.asarray(mixed.reshape(height, width, 3), np.float32)
 
 
 def free_name(name: str, taken: Collection[str]) -> str:

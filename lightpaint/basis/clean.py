@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import cache
-from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache_folder import CLEAN, is_own
+from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoised, how_denoised, is_there
@@ -76,7 +77,7 @@ class CleanPlanes:
 
     def scaled_as(self, basis: Basis) -> "CleanPlanes":
         """The same light, by the scales of the planes of another basis of the same lights."""
-        scales = np.array([scale_of(plane) for plane in basis.images])
+        scales = np.array([scale_of(plane) for plane in basis.planes])
         halves = np.stack([as_halves(self.plane(k), x) for k, x in enumerate(scales)])
         return CleanPlanes(halves, scales, self.present)
 
@@ -99,7 +100,7 @@ class RoughPlanes:
 
     def plane(self, k: int) -> Floats:
         """That of light k at unit emission, (h, w, 3) float32; 0 where the scene is black."""
-        lit, total = self._mean(self.basis.images[k]), self._total
+        lit, total = self._mean(self.basis.planes.plane(k)), self._total
         share = np.divide(lit, total, out=np.zeros_like(lit), where=total > 0)
         return self.present * resampled(share, self.basis.size)
 
@@ -136,7 +137,7 @@ def clean_planes(
         return None
     found = kept_planes(basis)
     if found is None and pixels <= most:
-        halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
+        halves, scales = np.empty(_shape(basis), np.float16), np.ones(len(basis.lights))
         for k in range(len(basis.lights)):
             halves[k], scales[k] = clean_plane(basis, k)
             if progress is not None:
@@ -148,8 +149,9 @@ def clean_planes(
 
 def clean_plane(basis: Basis, k: int) -> tuple[Halves, float]:
     """Of light k what `CleanPlanes` holds."""
-    scale = scale_of(basis.images[k])
-    return as_halves(denoised(basis.images[k], basis.features), scale), scale
+    plane = basis.planes.plane(k)
+    scale = scale_of(plane)
+    return as_halves(denoised(plane, basis.features), scale), scale
 
 
 def kept_planes(basis: Basis) -> CleanPlanes | None:
@@ -163,7 +165,7 @@ def kept_planes(basis: Basis) -> CleanPlanes | None:
                 return None
             found = CleanPlanes(*(kept[name] for name in PARTS))
         its = [getattr(found, name) for name in PARTS]
-        shapes = [basis.images.shape, (len(basis.lights),), basis.images.shape[1:]]
+        shapes = [_shape(basis), (len(basis.lights),), _shape(basis)[1:]]
         types = ["float16", "float64", "float32"]
         if [x.shape for x in its] == shapes and [x.dtype.name for x in its] == types:
             path.touch()
@@ -193,17 +195,22 @@ def _mixed(halves: Halves, scales: Doubles, weights: Doubles) -> Floats:
     return np.concatenate(side_by_side(strip, range(0, halves.shape[1], STRIP)))
 
 
+def _shape(basis: Basis) -> tuple[int, int, int, int]:
+    return (len(basis.lights), *basis.size, 3)
+
+
 def _made_of(basis: Basis) -> str:
     """What decides how they come out."""
-    pictures = [basis.images, basis.present_weights[None]]
+    others: list[Floats] = [basis.present_weights]
     if basis.features is not None:
-        pictures += [basis.features.albedo[None], basis.features.normal[None]]
+        others += [basis.features.albedo, basis.features.normal]
 
-    def digest(plane: Floats) -> bytes:
+    def digest(which: int | Floats) -> bytes:
+        plane = basis.planes.plane(which) if isinstance(which, int) else which
         return hashlib.blake2b(np.ascontiguousarray(plane).data).digest()
 
-    made = repr((FORMAT, how_denoised(basis.features, raw=""), basis.images.shape))
+    made = repr((FORMAT, how_denoised(basis.features, raw=""), _shape(basis)))
     content = hashlib.blake2b(made.encode(), digest_size=16)
-    for one in side_by_side(digest, [plane for planes in pictures for plane in planes]):
+    for one in side_by_side(digest, [*range(len(basis.lights)), *others]):
         content.update(one)
     return content.hexdigest()

@@ -4,22 +4,27 @@ Part k is named after light k and holds its image as R, G, B; docs/formats.md ha
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, Origin, free_name
 from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
+from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.files import file_length, one_line
 from lightpaint.images.denoiser import Features
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import Part, read_headers, read_parts, rgb_channels, write_parts
+from lightpaint.images.formats.exr_rows import NotByRowsError, PartLayout, RowFile
 from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
@@ -35,6 +40,12 @@ OBJECTS, OBJECTS_KEY, NAMES_KEY = "objects", "lightpaint.objects", "lightpaint.n
 
 #: Longest basis file that is read, in bytes.
 MAX_BYTES = 2**36
+
+#: Bytes of a file up to which its planes are brought into memory.
+IN_MEMORY = 2**31
+
+#: Channels that each light has.
+_NAMES = {*"RGB", *(f"{HALF_DIFFERENCE}.{c}" for c in "RGB")}
 
 #: What comes of a header that says something else than it should.
 _DAMAGES = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
@@ -54,7 +65,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         ('panel', 'bulb')
     """
     parts, sums = [], {}
-    for light, image, half in zip(basis.lights, basis.images, basis.half_differences, strict=True):
+    for light, image, half in zip(basis.lights, basis.planes, basis.noise, strict=True):
         about = json.dumps(_light_fields(light), ensure_ascii=False)
         channels = rgb_channels(image) | rgb_channels(half, HALF_DIFFERENCE)
         parts.append(Part(light.name, channels, {LIGHT_KEY: about}))
@@ -103,16 +114,12 @@ def read_basis(path: str | Path) -> Basis:
         Basis(2 lights, 16x16, 4 spp, of room.xml: panel, bulb)
     """
     path = Path(path)
-    file_length(path, "image file", ImageError, limit=MAX_BYTES)
+    length = file_length(path, "image file", ImageError, limit=MAX_BYTES)
     try:
+        if length > IN_MEMORY and (large := _large(path)) is not None:
+            return replace(large, source=str(path))
         parts = read_parts(path)
-        head = next((p.attributes for p in parts if FORMAT_KEY in p.attributes), {})
-        if head.get(FORMAT_KEY) != FORMAT:
-            found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
-            raise BasisError(
-                f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
-                "make one with lightpaint basis"
-            )
+        head = _head(p.attributes for p in parts)
         return replace(_of_parts(parts, head), source=str(path))
     except BasisError as error:
         raise BasisError(f"{path} {error}") from error
@@ -122,44 +129,117 @@ def read_basis(path: str | Path) -> Basis:
         raise ImageError(f"{path} takes more memory than there is") from None
 
 
+def _large(path: Path) -> Basis | None:
+    """Return a basis whose rows are read when they are asked for; None if that cannot be done."""
+    try:
+        file = RowFile(path)
+    except NotByRowsError:
+        return None
+    return _of_rows(file, _head(p.texts for p in file.parts))
+
+
+def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
+    """Return the attributes of the first part. Raises BasisError for another format."""
+    head: Mapping[str, str] = next((its for its in texts if FORMAT_KEY in its), {})
+    if head.get(FORMAT_KEY) != FORMAT:
+        found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
+        raise BasisError(
+            f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
+            "make one with lightpaint basis"
+        )
+    return head
+
+
 def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
     """Raises BasisError, without naming the file, or one of _DAMAGES."""
     lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
+
+    def planes(order: Sequence[int]) -> tuple[Planes, Planes]:
+        its = [lit[k] for k in order]
+        return as_planes(_stacked(its)), as_planes(_stacked(its, HALF_DIFFERENCE))
+
+    stored = [p.channels.__getitem__ for p in lit]
+    names = [tuple(p.channels) for p in lit]
+    about = [p.attributes[LIGHT_KEY] for p in lit]
+    return _assembled(about, names, stored, others, head, planes)
+
+
+def _of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
+    """Return the basis whose planes stay in the file; None where its parts are not alike.
+
+    Raises as `_of_parts` does.
+    """
+    lit = [p for p in file.parts if LIGHT_KEY in p.texts]
+    if any(
+        p.size != p.display or p.size != lit[0].size or not {*p.channels} >= _NAMES for p in lit
+    ):
+        return None
+
+    def part(layout: PartLayout) -> Part:
+        channels = {name: file.channel(layout, name) for name in layout.channels}
+        return Part("", channels, layout.texts, layout.display)
+
+    def planes(order: Sequence[int]) -> tuple[Planes, Planes]:
+        its = [lit[k] for k in order]
+        noise = [f"{HALF_DIFFERENCE}.{c}" for c in "RGB"]
+        return FilePlanes(file, its, "RGB"), FilePlanes(file, its, noise)
+
+    stored = [partial(file.channel, p) for p in lit]
+    names = [tuple(p.channels) for p in lit]
+    others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
+    return _assembled([p.texts[LIGHT_KEY] for p in lit], names, stored, others, head, planes)
+
+
+def _assembled(
+    about: Sequence[str],
+    names: Sequence[Sequence[str]],
+    stored: Sequence[Callable[[str], npt.NDArray[Any]]],
+    others: Sequence[Part],
+    head: Mapping[str, str],
+    planes: Callable[[Sequence[int]], tuple[Planes, Planes]],
+) -> Basis:
+    """Return the basis of a file, checked.
+
+    about, names, stored: of the part of each light what is said of it, its channels, and what reads
+    one. planes: makes images and noise of the parts in an order.
+    """
     seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
-    if not lit or not seen:
+    if not about or not seen:
         raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
     try:
-        lights = [read_record(BasisLight, strict_json(p.attributes[LIGHT_KEY])) for p in lit]
+        lights = [read_record(BasisLight, strict_json(text)) for text in about]
         origin = read_record(Origin, strict_json(head[ORIGIN_KEY]))
         checksums = None
         if CHECKSUMS_KEY in head:
             checksums = Checksums.of_text(head[CHECKSUMS_KEY])
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
-    order = list(range(len(lit)))
+    order = list(range(len(about)))
     if checksums is not None:
         order = checksums.in_order([light.name for light in lights])
         check(checksums.origin, "origin", head[ORIGIN_KEY], {})
     try:
+        images, noise = planes(order)
         basis = Basis(
             lights=Lights(tuple(lights[k] for k in order)),
-            images=_stacked([lit[k] for k in order]),
-            half_differences=_stacked([lit[k] for k in order], HALF_DIFFERENCE),
+            planes=images,
+            noise=noise,
             emitters_seen=seen[0] > 0,
             origin=origin,
             learned=_learned(others, checksums),
-            features=_features(others, lit[0].size),
-            objects=_objects(others, lit[0].size),
+            features=_features(others, images.size),
+            objects=_objects(others, images.size),
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
-    if not (np.isfinite(basis.images).all() and np.isfinite(basis.half_differences).all()):
-        raise BasisError("holds values that are not finite: make it again")
+    for k, light in enumerate(lights):  # one at a time: they may be larger than memory
+        channels = {name: stored[k](name) for name in names[k]}
+        if not all(np.isfinite(channels[name]).all() for name in _NAMES):
+            raise BasisError("holds values that are not finite: make it again")
+        if checksums is not None:
+            check(checksums.lights[light.name], f"light {light.name!r}", about[k], channels)
     if checksums is not None:
-        for k, light in enumerate(lights):
-            about, channels = lit[k].attributes[LIGHT_KEY], lit[k].channels
-            check(checksums.lights[light.name], f"light {light.name!r}", about, channels)
         check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
     return basis
 

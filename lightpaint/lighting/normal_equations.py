@@ -4,7 +4,6 @@ The objective is ‖Ψ − Σ w_i Φ_i‖² under ⟨f, g⟩ = Σ_pixels D f g, 
 channel. All sums run in float64 over float32 pixels.
 """
 
-from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +11,9 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.errors import SizeError
 from lightpaint.lighting.algebra.quadratic import UNREACHED
-from lightpaint.threads import one_thread
-
-#: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
-BLOCK = 2**13
-
-#: Lights up to which the product of a block is too small for BLAS to share it out to threads.
-FEW_LIGHTS = 256
 
 
 @dataclass(frozen=True)
@@ -98,7 +91,7 @@ class NormalEquations:
     @classmethod
     def of(cls, basis: Basis, image: Floats, importance: Floats) -> "NormalEquations":
         """From basis (n, h, w, 3), target image (h, w, 3) and importance (h, w) or (h, w, 3)."""
-        return cls(*inner_products(basis.images, image, importance))
+        return cls(*basis.planes.sums(importance, image))
 
 
 def block_diagonal(M: Doubles) -> Doubles:
@@ -118,29 +111,4 @@ def inner_products(
     images: (n, h, w, 3); target: (h, w, 3); importance: (h, w) or (h, w, 1), or (h, w, 3) where it
     differs between the channels, >= 0.
     """
-    n = images.shape[0]
-    rows = images.reshape(n, -1, 3)
-    # Pixels without weight contribute nothing and need not be read.
-    apart = importance.shape[2:] == (3,)
-    weights = importance.reshape(rows.shape[1], 3 if apart else 1)
-    counted = np.flatnonzero(weights.any(axis=1) if apart else weights)
-    colours = target.reshape(-1, 3)
-    gram = np.zeros((3, n + 1, n + 1))
-    room = np.empty((n + 1, min(BLOCK, counted.size)))
-    with one_thread() if n <= FEW_LIGHTS else nullcontext():
-        for start in range(0, counted.size, BLOCK):
-            pixels = counted[start : start + BLOCK]
-            first, last = int(pixels[0]), int(pixels[-1])
-            # Pixels in one run are looked at where they are; others have to be gathered.
-            in_one_run = last - first + 1 == pixels.size
-            where = slice(first, last + 1) if in_one_run else pixels
-            lit, painted = rows[:, where], colours[where]
-            root = np.sqrt(weights[where].astype(np.float64))
-            # (n + 1, block): the target goes along as one more row.
-            block = room[:, : pixels.size]
-            for c in range(3):
-                its = root[:, c * apart]
-                np.multiply(lit[..., c], its, out=block[:n])
-                np.multiply(painted[:, c], its, out=block[n])
-                gram[c] += block @ block.T
-    return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
+    return MemoryPlanes(images).sums(importance, target)

@@ -33,13 +33,15 @@ def without_traces(basis: Basis, weights: Doubles, image: Floats, *, is_asked: B
     if basis.knows_noise or not small.any():
         return weights
     # What is kept is a difference, and as fine as that comes out.
-    is_half = _is_half(image) or all(map(_is_half, basis.images[~basis.is_fixed]))
+    is_half = _is_half(image) or all(
+        _is_half(plane) for k, plane in enumerate(basis.planes) if not basis.is_fixed[k]
+    )
     resolution = ROUNDINGS * (HALF if is_half else SINGLE)
     mixed = basis.mix(weights)
     size = np.sqrt(np.square(mixed, dtype=np.float64).mean())
     kept = weights.copy()
     for k, c in np.argwhere(small):
-        added = weights[k, c] * basis.images[k, ..., c]
+        added = weights[k, c] * basis.planes.plane(k)[..., c]
         if (np.abs(added) <= resolution * (np.abs(mixed[..., c] - added) + size)).all():
             kept[k, c] = 0
     return kept

@@ -7,13 +7,13 @@ and the solve, its error bars and its refinement need not know of views at all.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import joined_planes
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import Estimate
 from lightpaint.screen import some_names
@@ -61,17 +61,12 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
         return first, (first,)
     for basis in bases[1:]:
         check_same_lights(first, basis)
-    ends = np.cumsum([0, *(basis.emitters_seen.size for basis in bases)])
-    rows = -(-int(ends[-1]) // ROW)
-    planes = np.zeros((2, len(first.lights), rows * ROW, 3), np.float32)
-    for basis, (start, end) in zip(bases, pairwise(ends), strict=True):
-        for plane, images in zip(planes, (basis.images, basis.half_differences), strict=True):
-            plane[:, start:end] = images.reshape(len(plane), -1, 3)
-    images, half_differences = planes.reshape(2, -1, rows, ROW, 3)
+    planes, views_planes = joined_planes([basis.planes for basis in bases], ROW)
+    noise, views_noise = joined_planes([basis.noise for basis in bases], ROW)
     joint = replace(
         first,
-        images=images,
-        half_differences=half_differences,
+        planes=planes,
+        noise=noise,
         emitters_seen=in_rows([basis.emitters_seen for basis in bases]),
         learned=None,
         # Of the views, which are shown one by one.
@@ -79,12 +74,8 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
         objects=None,
     )
     views = tuple(
-        replace(
-            basis,
-            images=planes[0, :, start:end].reshape(basis.images.shape),
-            half_differences=planes[1, :, start:end].reshape(basis.images.shape),
-        )
-        for basis, (start, end) in zip(bases, pairwise(ends), strict=True)
+        replace(basis, planes=its, noise=its_noise)
+        for basis, its, its_noise in zip(bases, views_planes, views_noise, strict=True)
     )
     return joint, views
 

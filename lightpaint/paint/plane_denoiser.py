@@ -23,7 +23,7 @@ class _Clean:
     is_kept: bool = False
 
     def is_of(self, basis: Basis) -> bool:
-        return self.basis.images is basis.images
+        return self.basis.planes is basis.planes
 
     def shown_of(self, basis: Basis) -> CleanPlanes:
         """What does for the eye until there are those of `basis`."""
@@ -75,7 +75,10 @@ class Cleaning:
 
     def _make_of(self, view: Canvas) -> None:
         basis = view.basis
-        halves, scales = np.empty(basis.images.shape, np.float16), np.ones(len(basis.lights))
+        halves, scales = (
+            np.empty((len(basis.lights), *basis.size, 3), np.float16),
+            np.ones(len(basis.lights)),
+        )
         planes = CleanPlanes(halves, scales, view.present)
         for k in range(len(basis.lights)):
             if not self._is_wanted() or view.basis is not basis:

@@ -299,7 +299,7 @@ def _small_planes(basis: Basis, factor: int) -> dict[str, Floats]:
     """By name, what each light does alone, in means over blocks; denoised, where there is noise."""
     small = {
         name: block_mean(image, factor)
-        for name, image in zip(basis.names, basis.images, strict=True)
+        for name, image in zip(basis.names, basis.planes, strict=True)
     }
     if not basis.knows_noise:
         return small

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis.basis import mix
+from lightpaint.basis.planes import mix
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse, without_noise
 from lightpaint.lighting.constraints.reduced_problem import ReducedProblem, problems
@@ -63,7 +63,7 @@ def find_additions(
     too_near: (m, m), pairs of candidates of which one at most is wanted.
     """
     folds = [_Fold(candidates, k) for k in range(2)]
-    whole = _Solver(candidates, candidates.images, candidates.noise)
+    whole = _Solver(candidates, candidates.pictures, candidates.noise)
     chosen: list[int] = []
     found: list[Addition] = []
     left = np.ones(candidates.count, dtype=bool)
@@ -168,9 +168,9 @@ class _Fold:
         self.solver = _Solver(
             candidates, candidates.half(solve_half), candidates.noise_of_half(solve_half)
         )
-        self.images = candidates.half(self.measured)
+        self.pictures = candidates.half(self.measured)
         self.noise_images = candidates.noise_of_half(self.measured)
-        self.equations = candidates.equations(self.images)
+        self.equations = candidates.equations(self.pictures)
         self.noise = candidates.equations(self.noise_images).M
         self.known: dict[tuple[int, ...], Doubles] = {}
 
@@ -191,7 +191,7 @@ class _Fold:
         """The same for each pixel, (h, w) float64."""
         c, w = self.candidates, self.weights(chosen)
         on = w.any(axis=1)
-        missed = c.image - mix(self.images[on], w[on])
+        missed = c.image - mix(self.pictures[on], w[on])
         noise = mix(self.noise_images[on], w[on]).astype(np.float64)
         squared = np.square(missed) - np.square(noise)
         return np.asarray((c.importance * squared).sum(axis=-1))

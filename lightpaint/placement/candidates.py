@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import mix
 from lightpaint.errors import SizeError
 from lightpaint.images.pixel_blocks import block_mean, whole_factor
 from lightpaint.lighting.constraints.knobs import Knob
@@ -23,14 +24,14 @@ from lightpaint.threads import one_thread
 class Candidates:
     """A solved problem, and images of lights to try, all of one size.
 
-    images, noise: (n + m, h, w, 3), the n lights of the basis and m candidates at unit emission,
+    pictures, noise: (n + m, h, w, 3), the n lights of the basis and m candidates at unit emission,
     and half the differences of halves of their samples. halves: (n + m, 2), shares of the
     samples in half A and B. image, (h, w, 3), and importance, (h, w, 1 or 3): what is solved
     for; after reweighting, in the last linear problem. reduction: what may be done
     with the n lights. pull: of `prefer current`, for these.
     """
 
-    images: Floats
+    pictures: Floats
     noise: Floats
     halves: Doubles
     image: Floats
@@ -55,15 +56,15 @@ class Candidates:
         image, importance = _reduced(solution.image, solution.weight, factor)
         free = ~added.is_fixed
         count = int(free.sum())
-        images, noise = (
-            np.concatenate([[block_mean(one, factor) for one in its], more[free]])
-            for its, more in (
-                (basis.images, added.images),
-                (basis.half_differences, added.half_differences),
+        pictures, noise = (
+            np.stack(
+                [block_mean(one, factor) for one in its]
+                + [one for one, is_free in zip(more, free, strict=True) if is_free]
             )
+            for its, more in ((basis.planes, added.planes), (basis.noise, added.noise))
         )
         return cls(
-            images,
+            pictures,
             noise,
             np.concatenate([_shares(basis, len(basis.lights)), _shares(added, count)]),
             image,
@@ -76,17 +77,17 @@ class Candidates:
     @property
     def lights(self) -> int:
         """n, the lights of the basis."""
-        return len(self.images) - self.count
+        return len(self.pictures) - self.count
 
     def picture(self, weights: Doubles) -> Floats:
         """Σ w_i Φ_i, (h, w, 3). weights: (n + m, 3)."""
-        return mix(self.images, weights)
+        return mix(self.pictures, weights)
 
     def half(self, k: int) -> Floats:
         """The images as half A (0) or B (1) of the samples has them."""
         sign = 1 if k == 0 else -1
         scale = sign * 2 * self.halves[:, 1 - k]
-        return np.asarray(self.images + self.noise * _column(scale), np.float32)
+        return np.asarray(self.pictures + self.noise * _column(scale), np.float32)
 
     def noise_of_half(self, k: int) -> Floats:
         """What has the variance of `half(k)`, as its square."""

@@ -45,7 +45,7 @@ def with_power(
         predicted,
         verified,
         [
-            Estimate(basis.images[k] * weight, basis.half_differences[k] * weight)
+            Estimate(basis.planes.plane(k) * weight, basis.noise.plane(k) * weight)
             for k, weight in zip(places, parts, strict=True)
         ],
     )

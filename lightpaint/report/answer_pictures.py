@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, meter_exposure, mix
+from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import box_mean
@@ -144,7 +144,7 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
         end = float(np.percentile(np.abs(values[counts > 0]), 99))
         return values, round_up(max(end, FINEST_SCALE * 2.0**-transform.stops))
 
-    noise = luminance(mix(solution.basis.half_differences, solution.weights).astype(np.float64))
+    noise = luminance(solution.basis.noise.mix(solution.weights).astype(np.float64))
     spread = float(np.sqrt((np.square(noise) * counts).sum() / max(counts.sum(), 1)))
     if spread == 0:
         return Residual(*averaged(0), 0)

@@ -15,18 +15,18 @@ from lightpaint.basis.clean import CleanPlanes, clean_planes
 Made = TypeVar("Made")
 
 _lock = Lock()
-#: By the identity of a basis's images, which views of it share, and what it is.
+#: By the identity of a basis's planes, which views of it share, and what it is.
 _made: dict[int, dict[Hashable, Future[Any]]] = {}
 
 
 def once(basis: Basis, what: Hashable, make: Callable[[], Made]) -> Made:
     """What `make` makes of `basis`, or has made before; whoever asks meanwhile waits for it."""
     with _lock:
-        images = id(basis.images)
-        if images not in _made:
-            weakref.finalize(basis.images, _made.pop, images, None)
-            _made[images] = {}
-        its = _made[images]
+        planes = id(basis.planes)
+        if planes not in _made:
+            weakref.finalize(basis.planes, _made.pop, planes, None)
+            _made[planes] = {}
+        its = _made[planes]
         made = its.get(what)
         if made is not None:
             is_mine = False

@@ -111,7 +111,7 @@ def _cell(basis: Basis, k: int, share: float, factor: int) -> _Cell:
     light, weight = basis.lights[k], basis.present_weights[k]
     name = light.name if len(light.members) == 1 else f"{light.name} ({len(light.members)})"
     is_off = not weight.any()
-    image = block_mean(np.float32(1 if is_off else weight) * basis.images[k], factor)
+    image = block_mean(np.float32(1 if is_off else weight) * basis.planes.plane(k), factor)
     said = "off" if is_off else spoken_percent(share)
     said = f"kept, {said}" if light.is_fixed else said
     if not image.any():

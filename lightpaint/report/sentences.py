@@ -124,7 +124,7 @@ def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
     if k is None and untold:
         return untold
     if k is None:
-        has_noise = bool(basis.half_differences.any())
+        has_noise = any(x.any() for x in basis.noise)
         why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
         return f"More samples would change no light: {why}."
     shares = energy_shares(basis, solution.lighting)

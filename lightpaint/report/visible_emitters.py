@@ -57,7 +57,7 @@ def _too_bright(target: Target, solution: Solution, predicted: Estimate, out: Bo
     # Where the painting says at least so bright, no more is too bright.
     if target.at_least is not None:
         out = out & ~target.at_least.any(axis=-1)
-    images = basis.images[:, out] * solution.weights[:, None].astype(np.float32)
+    images = basis.planes.pixels(np.flatnonzero(out)) * solution.weights[:, None].astype(np.float32)
     whose = np.argmax(luminance(images), axis=0) if out.any() else np.zeros(0, np.intp)
     here, meant = (np.asarray(luminance(x[out])) for x in (predicted.image, target.image))
     told = []

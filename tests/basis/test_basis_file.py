@@ -249,7 +249,7 @@ def test_lost_noise(path: Path):
 def test_values_that_are_not_finite(tmp_path: Path, basis: Basis, bad: float):
     images = basis.images.copy()
     images[1, 2, 3, 0] = bad
-    write_basis(tmp_path / "a.exr", replace(basis, images=images))
+    write_basis(tmp_path / "a.exr", replace(basis, planes=images))
     with pytest.raises(BasisError, match="not finite"):
         read_basis(tmp_path / "a.exr")
 
@@ -301,7 +301,7 @@ def test_what_is_asked_often_is_computed_once(make_basis: Any) -> None:
         assert getattr(basis, kept) is getattr(basis, kept)
         assert kept == "names" or not getattr(basis, kept).flags.writeable
     # Another basis has its own.
-    assert replace(basis, images=basis.images * 2).power[0, 0] == 4 * basis.power[0, 0]
+    assert replace(basis, planes=basis.images * 2).power[0, 0] == 4 * basis.power[0, 0]
 
 
 def test_a_basis_is_shown_on_one_screen(make_basis: Any) -> None:

@@ -57,7 +57,7 @@ def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.Monk
     assert again is not None
     np.testing.assert_array_equal(first.halves, again.halves)
     # Other pixels, features or present emissions have others.
-    other = replace(basis, images=basis.images * np.float32(1.5))
+    other = replace(basis, planes=basis.images * np.float32(1.5))
     assert kept_planes(other) is None
     brighter = tuple(replace(x, emission=(2.0, 2.0, 2.0)) for x in basis.lights)
     assert kept_planes(replace(basis, lights=brighter)) is None
@@ -96,7 +96,7 @@ def test_the_same_light_by_the_scales_of_brighter_planes(make_basis: Any):
     basis = make_basis(2, (24, 32))
     planes = clean_planes(basis)
     assert planes is not None
-    brighter = replace(basis, images=basis.images * np.float32(2**12))
+    brighter = replace(basis, planes=basis.images * np.float32(2**12))
     its = planes.scaled_as(brighter)
     np.testing.assert_array_equal(its.scales, [scale_of(plane) for plane in brighter.images])
     assert (its.scales != planes.scales).any()

@@ -27,7 +27,7 @@ SIZE = (6, 5)
 def basis(make_basis: Any) -> Basis:
     made = make_basis(3, SIZE, names=["key", "fill", "rim"], seen=np.eye(*SIZE, dtype=bool))
     halves = np.random.default_rng(1).normal(size=made.images.shape).astype(np.float32)
-    return replace(made, half_differences=halves, learned=np.ones((2, 4, 3), np.float32))
+    return replace(made, noise=halves, learned=np.ones((2, 4, 3), np.float32))
 
 
 @pytest.fixture

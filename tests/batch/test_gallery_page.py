@@ -145,7 +145,7 @@ def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Pat
     few = small_basis()
     lights = tuple(replace(few.lights[0], name=f"lamp {k}") for k in range(60))
     images = np.repeat(few.images, 20, 0)
-    made = replace(few, lights=lights, images=images, half_differences=0 * images)
+    made = replace(few, lights=lights, planes=images, noise=0 * images)
     key = '{"view": 0}'
     keep_planes(tmp_path, key, made)
     run_all(str(write_batch(tmp_path)), str(tmp_path / "out"))

@@ -12,8 +12,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import channel_loss as pixels
-from lightpaint.lighting.loss import lit_pixels
+from lightpaint.lighting.loss import lit_pixels, loss
 from lightpaint.lighting.loss import warm_start as approach
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.warm_start import sample
@@ -31,7 +30,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Samples of 400 pixels, and strips of 500."""
     monkeypatch.setattr(approach, "SAMPLE", 400)
     monkeypatch.setattr(approach, "EACH", 1)
-    monkeypatch.setattr(pixels, "STRIP", 500)
+    monkeypatch.setattr(loss, "STRIP", 500)
     return monkeypatch
 
 
@@ -176,7 +175,7 @@ def test_a_sample_stands_for_all_and_has_every_light(make_basis: Any, few: Any):
     problem, lit = _lit(basis, target, VIEWS[0])
     part = sample(lit, np.einsum("cii->ic", problem.equations.M), 400)
     assert 350 <= len(part.pixels) <= 450
-    assert (part.rows[3] > 0).any(axis=-1).sum() == 5
+    assert (part.planes.pixels(slice(None))[3] > 0).any(axis=-1).sum() == 5
     # One drawn of each 400th part: the mean of all, to some 1/400 and the scatter of weights.
     assert part.pixels.importance.sum() == pytest.approx(lit.pixels.importance.sum(), rel=0.05)
 

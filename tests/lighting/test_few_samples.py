@@ -41,7 +41,7 @@ def _few(scene: lp.Scene) -> dict[int, Basis]:
     two = render_basis(scene, spp=2, seed=2)
     # Of two halves one, which has twice the noise of both.
     half = two.half_differences
-    one = replace(two, images=two.images + half, half_differences=half * np.float32(2**0.5))
+    one = replace(two, planes=two.images + half, noise=half * np.float32(2**0.5))
     return {1: one, 2: two, 4: render_basis(scene, spp=4, seed=2, start=two)}
 
 
@@ -126,12 +126,12 @@ def _over(basis: Basis, times: float) -> lp.Target:
 
 
 def test_blocks_are_as_large_as_noise_asks(noisy: Basis):
-    quiet = replace(noisy, half_differences=noisy.half_differences / 50)
+    quiet = replace(noisy, noise=noisy.half_differences / 50)
     unknown = replace(noisy, origin=replace(noisy.origin, halves=(0, 0)))
     tiny = replace(
         noisy,
-        images=noisy.images[:, :12, :10],
-        half_differences=noisy.half_differences[:, :12, :10],
+        planes=noisy.images[:, :12, :10],
+        noise=noisy.half_differences[:, :12, :10],
         emitters_seen=noisy.emitters_seen[:12, :10],
     )
     sides = []

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
+from lightpaint.basis.planes import BLOCK
+from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 
 # Sums of float64 products, a few thousand of them: round-off well below 1e-12.
 PRECISION = 1e-12

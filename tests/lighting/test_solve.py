@@ -289,8 +289,8 @@ def test_keeping_a_light_is_painting_without_it(make_basis: Any, unpainted: floa
     others = replace(
         basis,
         lights=tuple(np.delete(np.array(basis.lights, object), 1)),
-        images=np.delete(basis.images, 1, axis=0),
-        half_differences=np.delete(basis.half_differences, 1, axis=0),
+        planes=np.delete(basis.images, 1, axis=0),
+        noise=np.delete(basis.half_differences, 1, axis=0),
     )
     target = _random_target()
     bare = replace(target, image=target.image - basis.images[1])

@@ -223,7 +223,7 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
 ):
     """A picture without grain is not shown with it again while the lights are still rendered."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    better = replace(basis, images=basis.images * np.float32(1.5))
+    better = replace(basis, planes=basis.images * np.float32(1.5))
     is_taken, goes_on = threading.Event(), threading.Event()
     cleaned: list[lp.Basis] = []
     real = cleaning.clean_plane
@@ -260,7 +260,7 @@ def test_lights_of_unknown_noise_are_cleaned_too(
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     origin = replace(basis.origin, halves=(0, 0))
     none = np.zeros_like(basis.half_differences)
-    unknown = replace(basis, half_differences=none, origin=origin)
+    unknown = replace(basis, noise=none, origin=origin)
     assert not unknown.knows_noise
     heard = Heard(tmp_path, unknown)
     heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
@@ -333,7 +333,7 @@ def test_clean_planes_come_later_and_keep_the_light(
         np.testing.assert_array_equal(*same)
     presents = (one.studio.session.views[0].present for one in (heard, again))
     np.testing.assert_array_equal(*presents)
-    assert kept_planes(replace(basis, images=2 * basis.images)) is None
+    assert kept_planes(replace(basis, planes=2 * basis.images)) is None
     for one in (heard, again):
         one.studio.close()
 

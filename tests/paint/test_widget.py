@@ -320,7 +320,7 @@ def test_it_has_room_beside_other_widgets(open_: Any) -> None:
 
 
 def test_several_views_have_a_target_each(basis: lp.Basis, tmp_path: Path) -> None:
-    side = replace(basis, images=basis.images[::-1], origin=replace(basis.origin, sensor="side"))
+    side = replace(basis, planes=basis.images[::-1], origin=replace(basis.origin, sensor="side"))
     painter = lp.Painter([basis, side], folder=tmp_path, **HOW)
     painter.comm.messages = []
     page = Page(painter)
@@ -466,7 +466,7 @@ class Rendered:
     """Stands for a scene whose basis is rendered meanwhile: a first one, and then a better one."""
 
     def __init__(self, basis: lp.Basis, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.basis, self.better = basis, replace(basis, images=basis.images * np.float32(1.5))
+        self.basis, self.better = basis, replace(basis, planes=basis.images * np.float32(1.5))
         self.goes_on = threading.Event()
         scene: Any = SimpleNamespace(spp=4, size=basis.size)
         subject = Subject("room.xml", folder, scene=scene, settings=Settings(use_cache=False))

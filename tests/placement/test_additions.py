@@ -40,8 +40,8 @@ def _joined(basis: Any, added: Any, chosen: list[int]) -> Any:
     return replace(
         basis,
         lights=(*basis.lights, *(added.lights[k] for k in chosen)),
-        images=np.concatenate([basis.images, added.images[chosen]]),
-        half_differences=np.concatenate([basis.half_differences, added.half_differences[chosen]]),
+        planes=np.concatenate([basis.images, added.images[chosen]]),
+        noise=np.concatenate([basis.half_differences, added.half_differences[chosen]]),
     )
 
 
@@ -119,8 +119,8 @@ def test_a_smaller_film_asks_the_same(make_basis: Any):
     basis, added, target = _problem(make_basis, 7)
     large = replace(
         basis,
-        images=basis.images.repeat(2, 1).repeat(2, 2),
-        half_differences=basis.half_differences.repeat(2, 1).repeat(2, 2),
+        planes=basis.images.repeat(2, 1).repeat(2, 2),
+        noise=basis.half_differences.repeat(2, 1).repeat(2, 2),
         emitters_seen=basis.emitters_seen.repeat(2, 0).repeat(2, 1),
     )
     painted = _target(

@@ -215,8 +215,8 @@ def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
     assert first.gain_share > 0.5
     other = replace(
         basis,
-        images=basis.images[:, :7],
-        half_differences=basis.half_differences[:, :7],
+        planes=basis.images[:, :7],
+        noise=basis.half_differences[:, :7],
         emitters_seen=basis.emitters_seen[:7],
         features=None,
         objects=None,

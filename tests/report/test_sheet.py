@@ -57,7 +57,7 @@ def test_places_do_not_meet() -> None:
 def test_how_bright_a_light_is_does_not_change_its_picture(make_basis: Any) -> None:
     basis = make_basis(3, size=(6, 8))
     # Powers of two, so that nothing is rounded; all alike, so that shares are as they were.
-    brighter = replace(basis, images=basis.images * np.float32(1024))
+    brighter = replace(basis, planes=basis.images * np.float32(1024))
     same = [light_sheet(x, title="") for x in (basis, brighter)]
     assert np.array_equal(*same)
 

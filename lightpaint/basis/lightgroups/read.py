@@ -19,6 +19,7 @@ from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
 from lightpaint.basis.lightgroups.naming import FILES
 from lightpaint.basis.lightgroups.roles import Roles, roles_of
 from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis.planes import as_planes
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
@@ -228,8 +229,8 @@ def _basis(path: Path, roles: Roles, rest: Floats | None, holes: npt.NDArray[np.
         images[-1] = first.in_rec709(rest)
     return Basis(
         lights=Lights(tuple(made)),
-        images=images,
-        half_differences=np.zeros_like(images),
+        planes=as_planes(images),
+        noise=as_planes(np.zeros_like(images)),
         emitters_seen=np.zeros(holes.shape, dtype=bool),
         origin=_origin(path, roles, images, [*lights]),
     )

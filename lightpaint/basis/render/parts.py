@@ -18,6 +18,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.render import (
     IN_PARTS,
     ONE_PASS,
@@ -259,7 +260,7 @@ class PartSums:
                 origin_of(scene, self._seed, method_of(scene), (0, 0), (0, 0)),
                 **self._lights.counts(),
             )
-            made = Basis(lights, images, half_differences, seen, origin)
+            made = Basis(lights, as_planes(images), as_planes(half_differences), seen, origin)
         else:
             halves = (self._spp[0], self._spp[1])
             images, half_differences = mean_and_half_difference(self._halves, halves)
@@ -270,7 +271,9 @@ class PartSums:
             plan = plan_passes(height * width, sum(halves))
             counts = sum(half == 0 for half, _ in plan), sum(half == 1 for half, _ in plan)
             origin = origin_of(scene, self._seed, IN_PARTS, halves, counts)
-            made = Basis(lights, images, half_differences, seen, origin, learned)
+            made = Basis(
+                lights, as_planes(images), as_planes(half_differences), seen, origin, learned
+            )
         if start is not None:
             made = replace(made, features=start.features, objects=start.objects)
         return with_first_hits(made, scene, self._seed)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.budget import Budget, Keeper, passes
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.separate import (
@@ -245,8 +246,8 @@ def _render_together(
         halves, passes = (sums.spp[0], sums.spp[1]), (sums.passes[0], sums.passes[1])
         return Basis(
             basis_lights(scene),
-            images,
-            half_differences,
+            as_planes(images),
+            as_planes(half_differences),
             sums.emitters_seen(),
             origin_of(scene, seed, ONE_PASS, halves, passes),
             tracer.guide.learned(),
@@ -298,7 +299,9 @@ def _render_one_by_one(
         origin = replace(nothing, **sums.counts())
         lights = basis_lights(scene)
         source = str(scene.path)
-        return Basis(lights, images, half_differences, seen, origin, source=source)
+        return Basis(
+            lights, as_planes(images), as_planes(half_differences), seen, origin, source=source
+        )
 
     numbers = view_seed(seed, scene.sensor)
     render_separately(

@@ -47,7 +47,7 @@ def keep_planes(folder: Path, key: str, basis: Basis) -> None:
     identity = _identity(basis)
     if read_planes(path).get("identity") == identity:
         return
-    is_noisy = bool(basis.half_differences.any())
+    is_noisy = any(x.any() for x in basis.noise)
     size, planes = planes_for_page(basis, is_clean=is_noisy)
     told = {
         "identity": identity,

@@ -3,6 +3,7 @@
 from typing import Any
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.render import IN_PARTS, basis_lights, origin_of
 from lightpaint.basis.render.sums import mean_and_half_difference
 from lightpaint.batch.work.work_items import SumsOfRows
@@ -23,10 +24,10 @@ def sums_of_rows(errand: SumsOfRows, held: Held) -> list[Sums]:
         seen = its if seen is None else seen + its
         spp[part.half] += part.spp
     assert seen is not None
-    images, half_differences = mean_and_half_difference(halves, spp)
+    images, differences = mean_and_half_difference(halves, spp)
     rows = slice(errand.parts[0].top, errand.parts[0].bottom)
     origin = origin_of(scene, errand.seed, IN_PARTS, (spp[0], spp[1]), (1, 1))
-    basis = Basis(basis_lights(scene), images, half_differences, seen > 0, origin)
+    basis = Basis(basis_lights(scene), as_planes(images), as_planes(differences), seen > 0, origin)
     return [
         sums_of(basis, held.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
         for wanted in errand.paintings

@@ -56,8 +56,8 @@ def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
     basis = solution.basis
     free = np.flatnonzero(~basis.is_fixed)
     noise, power = (
-        np.array([_power(images[k]) for k in free])
-        for images in (basis.half_differences, basis.images)
+        np.array([_power(planes.plane(int(k))) for k in free])
+        for planes in (basis.noise, basis.planes)
     )
     shares = noise[power > 0] / power[power > 0]
     alike = max(ALIKE, 2 * float(np.median(shares))) if shares.size else ALIKE

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
-from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
@@ -287,7 +287,7 @@ def combine(
     """
     given = lighting
     weights = given.weights_for(basis) if isinstance(given, Lighting) else _weights(basis, given)
-    return Estimate(basis.mix(weights), mix(basis.half_differences, weights))
+    return Estimate(basis.mix(weights), basis.noise.mix(weights))
 
 
 def _weights(basis: Basis, given: Mapping[str, Any] | npt.ArrayLike) -> Doubles:

@@ -84,7 +84,7 @@ class PaintedLight:
         rows, image, weight, albedo = [], [], [], []
         for (basis, painting, importance), where in zip(views, its, strict=True):
             some = where[::step]
-            rows.append(basis.images.reshape(len(basis.images), -1, 3)[:, some])
+            rows.append(basis.planes.pixels(some))
             image.append(painting.reshape(-1, 3)[some])
             weight.append(importance.ravel()[some])
             known = None if basis.features is None else basis.features.albedo.reshape(-1, 3)[some]

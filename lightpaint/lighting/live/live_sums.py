@@ -33,9 +33,9 @@ class PaintedTiles:
     def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
         self._importance, self._seen = importance, basis.emitters_seen
         self._present = basis.present_weights
-        self._paint = TiledEquations(basis.images, image, importance)
+        self._paint = TiledEquations(basis.planes, image, importance)
         self._left = np.where(basis.emitters_seen, np.float32(0), np.float32(1))
-        rest = basis.images, basis.present_look, self._left
+        rest = basis.planes, basis.present_look, self._left
         self._rest = TiledEquations(*rest, like=self._paint)
         self._whole = self._rest.base.copy()
         everything = slice(0, len(importance)), slice(0, importance.shape[1])
@@ -96,7 +96,7 @@ class SmallFilm:
         # A block in which something else is seen shows no emitter.
         unseen = (~self._seen).astype(np.float64)
         self._shown = np.where(_spread(block_sums(unseen, side), side, unseen.shape) > 0, unseen, 1)
-        small = np.stack([self._average(x) for x in basis.images])
+        small = np.stack([self._average(x) for x in basis.planes])
         # Singles are enough for what is averaged, and sums of them take half the time.
         planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
         self.rows = np.ascontiguousarray(planes, np.float32)

@@ -14,6 +14,7 @@ from math import prod
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import SizeError
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread, side_by_side
@@ -34,7 +35,7 @@ FEW_LIGHTS = 32
 class TiledEquations:
     """The problem of one basis, target and importance, which are looked at where they are.
 
-    images: (n, h, w, 3); target: (h, w, 3); importance: (h, w) or (h, w, 1), or (h, w, 3) where
+    planes: (n, h, w, 3) if an array; target: (h, w, 3); importance: (h, w), or (h, w, 1 or 3) where
     channels differ, finite and >= 0. Whoever paints on these says where, by `update`.
 
     The sums of the tiles are the base of a pyramid, each of whose nodes is the sum of two by
@@ -44,16 +45,17 @@ class TiledEquations:
 
     def __init__(
         self,
-        images: Floats,
+        planes: Planes | Floats,
         target: Floats,
         importance: Floats,
         *,
         side: int | None = None,
         like: "TiledEquations | None" = None,
     ) -> None:
-        """like: of the same images, updated for the same strokes; they are looked at once then."""
-        self._images = images
-        n, height, width, _ = images.shape
+        """like: of the same planes, updated for the same strokes; they are looked at once then."""
+        planes = as_planes(planes)
+        self._count = n = planes.count
+        height, width = planes.size
         if importance.ndim == 2:
             importance = importance[..., None]
         fits = importance.shape in ((height, width, 1), (height, width, 3))
@@ -65,7 +67,7 @@ class TiledEquations:
         self._target = target
         self._importance = importance
         self.side = side_for(n, height, width) if side is None else side
-        self._lit: _Lit = _Lit(images, self.side) if like is None else like._lit
+        self._lit: _Lit = _Lit(planes, self.side) if like is None else like._lit
         self._lit.is_shared = like is not None
         # What a stroke of colour leaves as it is, M, is kept apart from what it changes, b and
         # ‖Ψ‖².
@@ -93,11 +95,11 @@ class TiledEquations:
         rows, columns = self.touched(region)
         if not (rows and columns):
             return
-        few = max(CHUNK // (8 * 3 * (len(self._images) + 1) * self.side**2), 1)
+        few = max(CHUNK // (8 * 3 * (self._count + 1) * self.side**2), 1)
         wide = min(few, len(columns))
         blocks = product(_parts(rows, few // wide), _parts(columns, wide))
         sum_block = partial(self._sum, with_M=with_M)
-        if with_M and len(self._images) > FEW_LIGHTS:
+        if with_M and self._count > FEW_LIGHTS:
             side_by_side(sum_block, blocks)
         else:
             with one_thread():
@@ -117,7 +119,7 @@ class TiledEquations:
         rows, columns = self.touched(region)
         if not (rows and columns):
             return
-        n = len(self._images)
+        n = self._count
         tiles = np.s_[rows.start : rows.stop, columns.start : columns.stop]
         M = np.subtract(whole[tiles], painted.base[tiles], out=self._M[0][tiles])
         b = np.matmul(M, w.T[..., None])[..., 0]
@@ -133,7 +135,7 @@ class TiledEquations:
 
     def _sum(self, block: tuple[range, range], *, with_M: bool) -> None:
         """Σ D f g over each of a block of tiles: of images and target, and of pairs of images."""
-        n, side = len(self._images), self.side
+        n, side = self._count, self.side
         tiles = len(block[0]), len(block[1])
         rows, columns = (slice(part.start, part.stop) for part in block)
         where = (
@@ -174,8 +176,8 @@ class _Lit:
     is_shared: whether the last block is kept, for who asks for the same, and never changes.
     """
 
-    def __init__(self, images: Floats, side: int) -> None:
-        self._images, self._side = images, side
+    def __init__(self, planes: Planes, side: int) -> None:
+        self._planes, self._side = planes, side
         self._last: tuple[tuple[slice, slice], Doubles] | None = None
         self.is_shared = False
 
@@ -184,8 +186,10 @@ class _Lit:
         last = self._last
         if last is not None and last[0] == where:
             return last[1]
-        made = np.empty((*tiles, 3, len(self._images), self._side**2))
-        _cut(self._images[(slice(None), *where)], self._side, out=made)
+        made = np.empty((*tiles, 3, self._planes.count, self._side**2))
+        rows, columns = where
+        lit = self._planes.rows(rows.start, rows.stop)[:, :, columns]
+        _cut(lit, self._side, out=made)
         if self.is_shared:
             self._last = (where, made)
         return made

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import Planes
 from lightpaint.lighting.loss.loss import Loss, PixelLoss
-from lightpaint.lighting.normal_equations import NormalEquations, inner_products
+from lightpaint.lighting.normal_equations import NormalEquations
 
 #: Part of the pixels that must not count for it to be worth a copy of the others.
 FEW_LEFT_OUT = 0.1
@@ -17,17 +18,17 @@ FEW_LEFT_OUT = 0.1
 class LitPixels:
     """The loss of some pixels, and the pictures that lights make of them.
 
-    rows: (n, p, 3). which: (p,), which pixels of a picture they are; None for all.
+    planes: of these pixels. which: (p,), which pixels of a picture they are; None for all.
     """
 
-    rows: Floats
+    planes: Planes
     pixels: PixelLoss
     which: Indices | None = None
 
     @classmethod
     def whole(cls, basis: Basis, loss: Loss) -> "LitPixels":
         """All there are."""
-        return cls(basis.images.reshape(len(basis.images), -1, 3), loss.pixels)
+        return cls(basis.planes, loss.pixels)
 
     @classmethod
     def of(cls, basis: Basis, loss: Loss) -> "LitPixels":
@@ -36,15 +37,16 @@ class LitPixels:
         counted = np.flatnonzero(whole.pixels.importance)
         if counted.size > (1 - FEW_LEFT_OUT) * len(whole.pixels):
             return whole
-        return cls(whole.rows[:, counted], whole.pixels.at(counted), counted)
+        return cls(basis.planes.picked(counted), whole.pixels.at(counted), counted)
 
     def predicted(self, weights: Doubles) -> Doubles:
         """Σ w_i Φ_i, (3, p), in float64: a float32's round-off would hide the last steps."""
         made = np.empty((3, len(self.pixels)))
 
         def mix(where: slice, _: PixelLoss) -> None:
+            lit = self.planes.pixels(where)
             for c in range(3):
-                made[c, where] = weights[:, c] @ self.rows[:, where, c].astype(np.float64)
+                made[c, where] = weights[:, c] @ lit[..., c].astype(np.float64)
 
         self.pixels.each(mix)
         return made
@@ -53,7 +55,7 @@ class LitPixels:
         """The loss of weights, (n, 3), and half its gradient, (n, 3)."""
 
         def its(where: slice, pixels: PixelLoss) -> tuple[float, Doubles]:
-            rows = self.rows[:, where].transpose(2, 0, 1).astype(np.float64, order="C")
+            rows = self.planes.pixels(where).transpose(2, 0, 1).astype(np.float64, order="C")
             x = np.stack([w @ lit for w, lit in zip(weights.T, rows, strict=True)])
             value, slope = pixels.objective_and_gradient(x)
             return value, np.stack([lit @ s for lit, s in zip(rows, slope, strict=True)], axis=1)
@@ -72,5 +74,6 @@ class LitPixels:
 
     def equations(self, image: Doubles, weight: Doubles) -> NormalEquations:
         """The linear problem of squares, (3, p) each."""
-        sums = inner_products(self.rows[:, None], image.T[None], weight.T[None])
-        return NormalEquations(*sums)
+        shape = (*self.planes.size, 3)
+        its, weights = image.T.reshape(shape), weight.T.reshape(shape)
+        return NormalEquations(*self.planes.sums(weights, its))

@@ -14,7 +14,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.basis.basis import Basis, mix
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import as_planes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -68,7 +69,7 @@ class BinnedPixels:
         present = self.basis.present_weights
         at = LitPixels.whole(self.basis, self.loss).predicted(present)
         _, weight = self.loss.pixels.squares(at, from_clipping=False)
-        halves = self.basis.half_differences[:, 0].astype(np.float64)
+        halves = self.basis.noise.pixels(slice(None)).astype(np.float64)
         power = np.einsum("cp,npc->nc", weight, np.square(halves))
         return to_present(PRIOR * power, present)
 
@@ -102,7 +103,9 @@ def _strips(basis: Basis) -> tuple[Floats, Floats, Bools]:
     every = max(1, basis.emitters_seen.size // ENOUGH)
     rows = np.flatnonzero(np.arange(basis.size[0]) // STRIP_ROWS % every == 0)
     weights = basis.present_weights
-    look, half = (mix(x[:, rows], weights) for x in (basis.images, basis.half_differences))
+    its = np.flatnonzero(np.repeat(np.isin(np.arange(basis.size[0]), rows), basis.size[1]))
+    picture = (len(rows), basis.size[1], 3)
+    look, half = (x.picked(its).mix(weights).reshape(picture) for x in (basis.planes, basis.noise))
     return look, half, basis.emitters_seen[rows]
 
 
@@ -135,8 +138,8 @@ def binned_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
         counts[glows & (others[: counts.shape[0], : counts.shape[1]] > 0)] = 0
         total = block_sums(counts, side)
         safe = np.where(total > 0, total, 1)
-        for made, images in zip(planes, (basis.images, basis.half_differences), strict=True):
-            means = [block_sums(x * counts[..., None], side) / safe[..., None] for x in images]
+        for made, pictures in zip(planes, (basis.planes, basis.noise), strict=True):
+            means = [block_sums(x * counts[..., None], side) / safe[..., None] for x in pictures]
             made.append(np.stack(means).reshape(len(means), -1, 3))
         parts.append((cut, counts))
     if (blocks := loss.of_blocks(parts, side)) is None:
@@ -144,9 +147,9 @@ def binned_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
     images, halves = (np.concatenate(x, axis=1)[:, None].astype(np.float32) for x in planes)
     basis = replace(
         views.bases[0],
-        images=images,
-        half_differences=halves,
-        emitters_seen=np.zeros(images.shape[1:3], bool),
+        planes=as_planes(images),
+        noise=as_planes(halves),
+        emitters_seen=np.zeros(images.shape[1:3], dtype=bool),
         learned=None,
         features=None,
         objects=None,

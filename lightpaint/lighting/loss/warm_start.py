@@ -93,7 +93,7 @@ def sample(lit: LitPixels, power: Doubles, size: int) -> LitPixels:
     chance = np.minimum(chance, 1)
     drawn = np.flatnonzero(np.diff(np.floor(np.cumsum(chance) + 0.5), prepend=0))
     pixels = lit.pixels.at(drawn).weighed(1 / chance[drawn])
-    return LitPixels(np.ascontiguousarray(lit.rows[:, drawn]), pixels)
+    return LitPixels(lit.planes.picked(drawn), pixels)
 
 
 def _said(lit: LitPixels, power: Doubles) -> Doubles:
@@ -101,7 +101,7 @@ def _said(lit: LitPixels, power: Doubles) -> Doubles:
     part = np.where(power > 0, 1 / np.where(power > 0, power, 1), 0).astype(np.float32)
 
     def its(where: slice, pixels: PixelLoss) -> Doubles:
-        squares = np.square(lit.rows[:, where])
+        squares = np.square(lit.planes.pixels(where))
         said = sum(part[:, c] @ squares[..., c] for c in range(3))
         return np.asarray(said * pixels.importance)
 

@@ -76,7 +76,7 @@ def is_changing(name: str) -> bool:
 
 def small(basis: Basis, k: int) -> Picture:
     """A thumbnail of what light k does, as a display shows it."""
-    picture, _ = thumbnail(basis.images[k], basis.emitters_seen)
+    picture, _ = thumbnail(basis.planes.plane(k), basis.emitters_seen)
     return np.round(picture * 255).astype(np.uint8)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.paint.protocol import ViewInfo
@@ -32,8 +33,8 @@ def offer_view(
 
     rough = RoughPlanes(basis, view.present)
     is_lit = bool(view.present.any())
-    for k, plane in enumerate(basis.images):
-        offer(f"plane/{k}", partial(_plane, plane))
+    for k in range(len(basis.lights)):
+        offer(f"plane/{k}", partial(_plane, basis, k))
         offer(f"thumb/{k}", partial(pictures.small, basis, k))
         name = of_view(f"clean/{k}", view.view)
         if clean is not None:
@@ -54,12 +55,13 @@ def offer_view(
         offer("objects", lambda: index.astype(np.int16))
 
 
-def _plane(plane: Any) -> Picture:
+def _plane(basis: Basis, k: int) -> Picture:
+    plane = basis.planes.plane(k)
     return as_halves(plane, scale_of(plane))
 
 
 def _rough(planes: RoughPlanes, k: int) -> Picture:
-    return as_halves(planes.plane(k), scale_of(planes.basis.images[k]))
+    return as_halves(planes.plane(k), scale_of(planes.basis.planes.plane(k)))
 
 
 def view_info(view: Canvas) -> ViewInfo:
@@ -69,5 +71,5 @@ def view_info(view: Canvas) -> ViewInfo:
         name=view.name,
         size=(height, width),
         objects=() if objects is None else tuple(objects.names),
-        scales=tuple(scale_of(plane) for plane in view.basis.images),
+        scales=tuple(scale_of(plane) for plane in view.basis.planes),
     )

@@ -106,7 +106,7 @@ def copied_part(groups: LightGroups) -> Part:
     """The layers in linear Rec.709 float32, under names that Nuke tells apart."""
     channels: dict[str, Floats] = {}
     *names, beauty = _copied_names(groups)
-    for name, image in zip(names, groups.basis.images, strict=False):
+    for name, image in zip(names, groups.basis.planes, strict=False):
         channels |= rgb_channels(image, name)
     if groups.beauty is not None:
         there = np.where(groups.holes[..., None], np.float32(0), groups.beauty.image)

@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
@@ -118,11 +118,13 @@ def _rows(
 def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int, ...], float]]:
     """What each light lights alone: data: URI, size and exposure. is_clean: whether denoised."""
 
-    def shown(image: Floats) -> tuple[str, tuple[int, ...], float]:
-        picture, stops = thumbnail(image, basis.emitters_seen, is_clean=is_clean)
+    def shown(k: int) -> tuple[str, tuple[int, ...], float]:
+        picture, stops = thumbnail(basis.planes.plane(k), basis.emitters_seen, is_clean=is_clean)
         return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
 
-    return once(basis, ("thumbnails", is_clean), lambda: side_by_side(shown, basis.images))
+    return once(
+        basis, ("thumbnails", is_clean), lambda: side_by_side(shown, range(len(basis.lights)))
+    )
 
 
 def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:

@@ -145,7 +145,7 @@ def _made(
         if k >= len(lights):
             made = (planes or basis).mix(mixes[k - len(lights)])
         else:
-            made = planes.plane(lights[k]) if planes else basis.images[lights[k]]
+            made = planes.plane(lights[k]) if planes else basis.planes.plane(lights[k])
         return np.asarray(block_mean(made, factor), np.float32)
 
     pictures = side_by_side(small, range(len(lights) + len(mixes)))

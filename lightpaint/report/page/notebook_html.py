@@ -151,7 +151,8 @@ def basis_png(basis: Basis) -> bytes:
     power = (basis.present_weights * basis.totals) @ LUMINANCE
     chosen = _most(power, SHEET)
     pictures = [
-        _wide(thumbnail(basis.images[k], basis.emitters_seen, is_clean=True)[0]) for k in chosen
+        _wide(thumbnail(basis.planes.plane(k), basis.emitters_seen, is_clean=True)[0])
+        for k in chosen
     ]
     height, width = pictures[0].shape[:2]
     text = 12

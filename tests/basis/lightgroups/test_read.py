@@ -382,7 +382,7 @@ def test_the_basis_can_be_saved_and_is_no_light_group_file_then(tmp_path: Path):
     write_basis(tmp_path / "a.basis.exr", groups.basis)
     back = read_basis(tmp_path / "a.basis.exr")
     np.testing.assert_array_equal(back.images, groups.basis.images)
-    assert replace(back, images=groups.basis.images).lights == groups.basis.lights
+    assert replace(back, planes=groups.basis.images).lights == groups.basis.lights
     assert not back.knows_noise
     assert is_light_groups(path)
     assert not is_light_groups(tmp_path / "a.basis.exr")

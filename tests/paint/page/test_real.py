@@ -633,7 +633,7 @@ class Rendering(Subject):
         yield self.basis
         better.wait(60)
         images = self.basis.images * np.float32(1.25)
-        yield replace(self.basis, images=images)
+        yield replace(self.basis, planes=images)
         told.set()
 
 

@@ -330,13 +330,13 @@ def _lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]
     """
     basis = solution.basis
     top, left, bottom, right = place.box
-    there = basis.images[:, top:bottom, left:right].mean(axis=(1, 2), dtype=np.float64)
+    there = basis.planes.rows(top, bottom)[:, :, left:right].mean(axis=(1, 2), dtype=np.float64)
     if luminance(np.array(place.painted)) < luminance(np.array(place.reached)):
         part, enough = luminance(there * solution.weights), DOES_MUCH
         whole = np.full(len(part), part.sum())
     else:
         part, enough = np.where(basis.is_fixed, 0, luminance(there)), GETS_THERE
-        every = luminance(basis.images[:, ::THINNED, ::THINNED])
+        every = np.stack([luminance(x[::THINNED, ::THINNED]) for x in basis.planes])
         whole = np.percentile(every.reshape(len(part), -1), 99, axis=1)
     share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
     names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)

@@ -179,7 +179,7 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
 
 def _seen_in(view: Solution, delta_e: float, found: Mapping[Colors, Doubles]) -> Choices:
     look = Looking.at(view.problem, most=LOOKED_AT)
-    rows = look.rows(view.basis.images)
+    rows = look.rows(view.basis.planes)
 
     def missed(weights: Doubles) -> float:
         return look.mean(look.missed(np.einsum("npc,nc->pc", rows, weights)))

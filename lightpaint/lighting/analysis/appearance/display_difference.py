@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.basis.planes import Planes
 from lightpaint.colour.color_difference import ciede2000, lab
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.srgb import decode_display
@@ -62,9 +63,9 @@ class Looking:
         """(p, 3), the painted pixels of a whole picture (H, W, 3)."""
         return image[:: self.step, :: self.step][self.counts].astype(np.float64)
 
-    def rows(self, images: Floats) -> Floats:
-        """(n, p, 3), the painted pixels of whole pictures (n, H, W, 3)."""
-        return images[:, :: self.step, :: self.step][:, self.counts]
+    def rows(self, planes: Planes) -> Floats:
+        """(n, p, 3), the painted pixels of whole pictures (H, W, 3)."""
+        return np.stack([x[:: self.step, :: self.step][self.counts] for x in planes])
 
     def meant(self, pixels: Doubles) -> Doubles:
         """(p, 3), the paint, or light `pixels` (p, 3) where brighter is as good."""

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import as_planes
 from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
@@ -420,12 +421,12 @@ def _in_blocks(views: Views, side: int) -> Views:
         counts, safe = unseen[..., None], np.where(total > 0, total, 1)[..., None]
         images, halves = (
             np.stack([block_sums(x[:height, :width] * counts, side) / safe for x in planes])
-            for planes in (basis.images, basis.half_differences)
+            for planes in (basis.planes, basis.noise)
         )
         made = replace(
             basis,
-            images=images.astype(np.float32),
-            half_differences=halves.astype(np.float32),
+            planes=as_planes(images.astype(np.float32)),
+            noise=as_planes(halves.astype(np.float32)),
             emitters_seen=total == 0,
             learned=None,
             features=None,
@@ -442,13 +443,10 @@ def _in_a_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tup
     def cut(image: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return image.reshape(1, -1, *image.shape[2:])[:, chosen]
 
-    def planes(images: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return images.reshape(len(images), 1, -1, 3)[:, :, chosen]
-
     row = replace(
         basis.asking(type(basis.asked)()),
-        images=planes(basis.images),
-        half_differences=planes(basis.half_differences),
+        planes=basis.planes.picked(chosen),
+        noise=basis.noise.picked(chosen),
         emitters_seen=cut(basis.emitters_seen),
         learned=None,
         features=None,

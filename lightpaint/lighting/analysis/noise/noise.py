@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.basis import mix
+from lightpaint.basis.planes import BLOCK, FEW_LIGHTS, Planes, run_of
 from lightpaint.lighting.analysis.noise.peaks import Peaks
-from lightpaint.lighting.normal_equations import BLOCK, FEW_LIGHTS, NormalEquations
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import one_thread, side_by_side
 
@@ -78,13 +78,13 @@ def noise_sums(solution: Solution) -> Noise:
     unseen = ~basis.emitters_seen.ravel()
     counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
     of_all = _Pixels(
-        basis.images.reshape(len(weights), -1, 3),
-        basis.half_differences.reshape(len(weights), -1, 3),
+        basis.planes,
+        basis.noise,
         weight,
         share,
         residual,
         mixed,
-        mix(basis.half_differences, basis.present_weights).reshape(-1, 3),
+        basis.noise.mix(basis.present_weights).reshape(-1, 3),
         unseen,
     )
     # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
@@ -126,13 +126,13 @@ class _Sums:
 class _Pixels:
     """What is known of all pixels.
 
-    images, halves: (n, p, 3). weight, share: (p, 1) or (p, 3). residual, mixed: (p, 3), as of
+    planes, noise: of the basis. weight, share: (p, 1) or (p, 3). residual, mixed: (p, 3), as of
     `residual_and_noise`. present: (p, 3), noise of the current look. unseen: (p,), where no emitter
     is.
     """
 
-    images: Floats
-    halves: Floats
+    planes: Planes
+    noise: Planes
     weight: Floats
     share: Floats
     residual: Doubles
@@ -146,11 +146,9 @@ class _Pixels:
         """Over some of them. pulled: (n, 3), by how much noise moves the pull."""
         made = _Sums.none(len(weights))
         for start in range(0, counted.size, BLOCK):
-            its = counted[start : start + BLOCK]
-            # Pixels in one run are looked at where they are; others have to be gathered.
-            in_one_run = its[-1] - its[0] + 1 == its.size
-            pixels = slice(int(its[0]), int(its[-1]) + 1) if in_one_run else its
-            rows = [self._rows(made, pixels, c, weights, pulled) for c in range(3)]
+            pixels = run_of(counted[start : start + BLOCK])
+            both = self.noise.pixels(pixels), self.planes.pixels(pixels)
+            rows = [self._rows(made, pixels, both, c, weights, pulled) for c in range(3)]
             for c in range(3):
                 made.gradient[c, :, c] += rows[c] @ rows[c].T
             if is_coupled:
@@ -162,11 +160,20 @@ class _Pixels:
         return made
 
     def _rows(
-        self, made: _Sums, pixels: slice | Indices, c: int, weights: Doubles, pulled: Doubles
+        self,
+        made: _Sums,
+        pixels: slice | Indices,
+        both: tuple[Floats, Floats],
+        c: int,
+        weights: Doubles,
+        pulled: Doubles,
     ) -> Doubles:
-        """(n, pixels), what noise adds to the gradient of a channel; all else goes to `made`."""
+        """(n, pixels), what noise adds to the gradient of a channel; all else goes to `made`.
+
+        both: (n, pixels, 3), noise and planes there.
+        """
         D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
-        h, lit = (x[:, pixels, c].astype(np.float64) for x in (self.halves, self.images))
+        h, lit = (x[..., c].astype(np.float64) for x in both)
         residual, mixed = self.residual[pixels, c], self.mixed[pixels, c]
         rows = D * (h * residual - lit * mixed)
         size = np.abs(residual) + weights[:, c, None] * lit
@@ -188,10 +195,10 @@ def residual_and_noise(solution: Solution) -> tuple[Doubles, Doubles]:
     basis, weights, r = solution.basis, solution.weights, solution.problem.refinement
     residual = solution.image.astype(np.float64) - basis.mix(weights)
     if r is not None:
-        noise = r.noise + mix(basis.half_differences, weights - r.before)
+        noise = r.noise + basis.noise.mix(weights - r.before)
     else:
-        noise = mix(basis.half_differences, weights).astype(np.float64)
-        present = mix(basis.half_differences, basis.present_weights)
+        noise = basis.noise.mix(weights).astype(np.float64)
+        present = basis.noise.mix(basis.present_weights)
         noise = noise - solution.problem.squares.share * present
     return residual.reshape(-1, 3), np.asarray(noise, np.float64).reshape(-1, 3)
 

@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.planes import BLOCK
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
-from lightpaint.lighting.normal_equations import BLOCK
 from lightpaint.lighting.solution import Solution
 
 #: Parts of what a light does and no other can, that are noise, from which on and up to which it is
@@ -48,7 +48,7 @@ def weakest(solution: Solution, power: Doubles, doubts: Doubles, corrected: Doub
     made = corrected.copy()
     for k, c in np.argwhere(doubts > 0):
         D = weight[..., c % weight.shape[2]].ravel()
-        image, half = (x[k, ..., c].ravel() for x in (basis.images, basis.half_differences))
+        image, half = (x.plane(k)[..., c].ravel() for x in (basis.planes, basis.noise))
         smooth, error = _least_power(image, half, D)
         # What no other light can do: of that alone anything may be taken away.
         noisy, alone = (1 / float(pseudo_inverse(x[c])[k, k]) for x in (M, made))

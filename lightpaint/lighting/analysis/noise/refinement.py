@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.planes import BLOCK
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
@@ -22,7 +23,7 @@ from lightpaint.lighting.analysis.noise.noise import (
     pseudo_inverse,
     residual_and_noise,
 )
-from lightpaint.lighting.normal_equations import BLOCK, NormalEquations, inner_products
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Refinement
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import again
@@ -64,7 +65,7 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
             f"{basis.size[1]}x{basis.size[0]}: render it on the film of the basis"
         )
     missed = solution.image.astype(np.float64) - mixed.image
-    _, rendered, _ = inner_products(basis.images, missed, solution.weight)
+    _, rendered, _ = basis.planes.sums(solution.weight, missed)
     M = problem.solved.M
     known = problem.solved.b - np.einsum("cij,jc->ci", M, w)
 
@@ -114,15 +115,15 @@ def _pushed(solution: Solution, noise: Floats, to: Doubles) -> Doubles:
     basis = solution.basis
     n = len(basis.lights)
     along = to.reshape(3, n, -1)
-    images, noise = basis.images.reshape(n, -1, 3), noise.reshape(-1, 3)
+    noise = noise.reshape(-1, 3)
     weight = solution.weight.reshape(len(noise), -1)
     covariance = np.zeros((to.shape[1], to.shape[1]))
     counted = np.flatnonzero(solution.importance)
     for start in range(0, counted.size, BLOCK):
         pixels = counted[start : start + BLOCK]
-        push = np.zeros((to.shape[1], pixels.size))
+        lit, push = basis.planes.pixels(pixels), np.zeros((to.shape[1], pixels.size))
         for c in np.flatnonzero(along.any(axis=(1, 2))):
             pulls = weight[pixels, c % weight.shape[1]] * noise[pixels, c]
-            push += along[c].T @ (images[:, pixels, c] * pulls)
+            push += along[c].T @ (lit[..., c] * pulls)
         covariance += push @ push.T
     return covariance

@@ -1,0 +1,213 @@
+"""Planes: one picture for each light, as numbers over pixels, wherever they are kept.
+
+A basis has two sets of them, the images and half the differences of two halves of the samples.
+Nobody outside this room indexes an array of planes: what is asked of them stands here.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.threads import one_thread
+
+#: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
+BLOCK = 2**13
+
+#: Lights up to which the product of a block is too small for BLAS to share it out to threads.
+FEW_LIGHTS = 256
+
+
+class Planes(Protocol):
+    """One picture (h, w, 3) for each of n lights, float32 whatever is stored.
+
+    What is returned is to look at only: it may be the very memory that the planes are kept in.
+    """
+
+    @property
+    def count(self) -> int:
+        """n."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+
+    def __iter__(self) -> Iterator[Floats]:
+        """The planes, (h, w, 3) each, one after the other."""
+
+    def plane(self, i: int) -> Floats:
+        """That of light i, (h, w, 3)."""
+
+    def rows(self, top: int, bottom: int) -> Floats:
+        """Some rows of all, (n, bottom - top, w, 3)."""
+
+    def pixels(self, where: slice | Indices) -> Floats:
+        """Some pixels of all, (n, p, 3), counted along the rows."""
+
+    def picked(self, where: slice | Indices) -> "Planes":
+        """The same pixels as planes of one row, (1, p, 3) each."""
+
+    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Σ w_i Φ_i, (h, w, 3). weights: (n, 3), one per light and channel."""
+
+    def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
+        """M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of all pixels, in one walk.
+
+        weight: (h, w), (h, w, 1) or, where it differs between channels, (h, w, 3), >= 0. image: Ψ,
+        (h, w, 3).
+        """
+
+    def replaced(self, planes: Mapping[int, Floats]) -> "Planes":
+        """These planes with others, (h, w, 3), for some of the lights."""
+
+    def array(self) -> Floats:
+        """All of them, (n, h, w, 3): for people in Python, and for what is small."""
+
+
+class PlanesBase:
+    """What follows of the rest for any planes, wherever they are kept."""
+
+    @property
+    def count(self) -> int:
+        """n."""
+        raise NotImplementedError
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        raise NotImplementedError
+
+    def plane(self, i: int) -> Floats:
+        """That of light i, (h, w, 3)."""
+        raise NotImplementedError
+
+    def pixels(self, where: slice | Indices) -> Floats:
+        """Some pixels of all, (n, p, 3)."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        height, width = self.size
+        return f"{type(self).__name__}({self.count} of {width}x{height})"
+
+    def __iter__(self) -> Iterator[Floats]:
+        return (self.plane(k) for k in range(self.count))
+
+    def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
+        """M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels that count."""
+        n, (height, width) = self.count, self.size
+        # Pixels without weight contribute nothing and need not be read.
+        apart = weight.shape[2:] == (3,)
+        weights = weight.reshape(height * width, 3 if apart else 1)
+        counted = np.flatnonzero(weights.any(axis=1) if apart else weights)
+        colours = image.reshape(-1, 3)
+        gram = np.zeros((3, n + 1, n + 1))
+        room = np.empty((n + 1, min(BLOCK, counted.size)))
+        with one_thread() if n <= FEW_LIGHTS else nullcontext():
+            for start in range(0, counted.size, BLOCK):
+                where = run_of(counted[start : start + BLOCK])
+                lit, painted = self.pixels(where), colours[where]
+                root = np.sqrt(weights[where].astype(np.float64))
+                # (n + 1, block): the target goes along as one more row.
+                block = room[:, : len(painted)]
+                for c in range(3):
+                    its = root[:, c * apart]
+                    np.multiply(lit[..., c], its, out=block[:n])
+                    np.multiply(painted[:, c], its, out=block[n])
+                    gram[c] += block @ block.T
+        return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
+
+
+class MemoryPlanes(PlanesBase):
+    """Planes that are kept in memory. images: (n, h, w, 3) float32."""
+
+    def __init__(self, images: Floats) -> None:
+        self._images = images
+
+    @property
+    def count(self) -> int:
+        """n."""
+        return len(self._images)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self._images.shape[1], self._images.shape[2]
+
+    def plane(self, i: int) -> Floats:
+        """That of light i, (h, w, 3)."""
+        return np.asarray(self._images[i])
+
+    def rows(self, top: int, bottom: int) -> Floats:
+        """Some rows of all, (n, bottom - top, w, 3)."""
+        return self._images[:, top:bottom]
+
+    def pixels(self, where: slice | Indices) -> Floats:
+        """Some pixels of all, (n, p, 3)."""
+        return self._images.reshape(len(self._images), -1, 3)[:, where]
+
+    def picked(self, where: slice | Indices) -> "MemoryPlanes":
+        """The same pixels as planes of one row."""
+        return MemoryPlanes(self.pixels(where)[:, None])
+
+    def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
+        """Σ w_i Φ_i, (h, w, 3)."""
+        return mix(self._images, weights)
+
+    def replaced(self, planes: Mapping[int, Floats]) -> "MemoryPlanes":
+        """These planes with others for some of the lights."""
+        images = self._images.copy()
+        for k, plane in planes.items():
+            images[k] = plane
+        return MemoryPlanes(images)
+
+    def array(self) -> Floats:
+        """All of them, (n, h, w, 3), which are not copied."""
+        return self._images
+
+
+def as_planes(given: Planes | Floats) -> Planes:
+    """Return planes as they are, and an array (n, h, w, 3) as planes in memory."""
+    return MemoryPlanes(given) if isinstance(given, np.ndarray) else given
+
+
+def joined_planes(
+    parts: Sequence[Planes], width: int
+) -> tuple[MemoryPlanes, tuple[MemoryPlanes, ...]]:
+    """Return the planes of several pictures as those of one, (n, rows, width, 3), and the parts.
+
+    Pixels lie behind each other along the rows, and the last row is filled with zeros. The parts
+    that are returned look at the memory of the joint planes.
+    """
+    ends = np.cumsum([0, *(its.size[0] * its.size[1] for its in parts)])
+    n, rows = parts[0].count, -(-int(ends[-1]) // width)
+    joint = np.zeros((n, rows * width, 3), np.float32)
+    made = []
+    for its, (start, end) in zip(parts, pairwise(ends), strict=True):
+        for plane, image in zip(joint[:, start:end], its, strict=True):
+            plane[...] = image.reshape(-1, 3)
+        made.append(MemoryPlanes(joint[:, start:end].reshape(n, *its.size, 3)))
+    return MemoryPlanes(joint.reshape(n, rows, width, 3)), tuple(made)
+
+
+def run_of(pixels: Indices) -> slice | Indices:
+    """Return a slice for pixels in one run, which are looked at where they are."""
+    first, last = int(pixels[0]), int(pixels[-1])
+    return slice(first, last + 1) if last - first + 1 == pixels.size else pixels
+
+
+def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
+    """Σ w_i Φ_i in float32, without a copy of the images.
+
+    images: (n, h, w, 3) float32; weights: (n, 3), one per light and channel. Returns (h, w, 3).
+    """
+    n, height, width, _ = images.shape
+    # With a weight for every value of a row the innermost sums run along whole rows, not
+    # over three channels at a time.
+    along_row = np.tile(np.asarray(weights, np.float32), (1, width))
+    rows = images.reshape(n, height, width * 3)
+    mixed = np.einsum("nhk,nk->hk", rows, along_row)
+    return np.asarray(mixed.reshape(height, width, 3), np.float32)

@@ -1,0 +1,243 @@
+"""Rows of a multi-part OpenEXR file, read when they are asked for.
+
+The OpenEXR project's own module reads whole files. What is needed to find rows in one is little:
+headers, tables of offsets, and lines without compression or by ZIP. Whatever else a file holds is
+left to that module.
+"""
+
+import os
+import struct
+import threading
+import weakref
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.errors import ImageError
+
+MAGIC, MULTI_PART = 20000630, 0x1000
+
+#: Other kinds of parts, by the flags of the version: tiles, deep pixels.
+OTHERS = 0x200 | 0x800
+
+#: Lines of a chunk by how they are compressed: not at all, each by ZIP, 16 by ZIP.
+LINES = {0: 1, 2: 1, 3: 16}
+
+TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
+
+#: Longest header that is looked at, in bytes.
+MAX_HEADER = 2**26
+
+#: Bytes before the pixels of a chunk: its part, its first line, how many bytes follow.
+HEAD = struct.Struct("<iii")
+
+
+class NotByRowsError(Exception):
+    """A file of another kind than is read here."""
+
+
+@dataclass(frozen=True)
+class PartLayout:
+    """Where the pixels of a part lie.
+
+    display: (height, width) of the picture. channels: names and types in the order of the file.
+    texts: its text attributes. lines: rows of a chunk. offsets: (chunks,), of each in the file.
+    """
+
+    number: int
+    size: tuple[int, int]
+    display: tuple[int, int]
+    channels: Mapping[str, np.dtype[Any]]
+    texts: Mapping[str, str]
+    lines: int
+    is_packed: bool
+    offsets: npt.NDArray[np.int64]
+
+    @property
+    def line_bytes(self) -> int:
+        """Bytes of a row, all channels together."""
+        return self.size[1] * sum(kind.itemsize for kind in self.channels.values())
+
+
+class RowFile:
+    """An open file whose rows are read when they are asked for; as it was when it was opened.
+
+    Raises NotByRowsError for a file that is not read so, and OSError.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+        weakref.finalize(self, os.close, self._file)
+        self._lock = threading.Lock()
+        self.length = os.fstat(self._file).st_size
+        try:
+            self.parts = self._layouts(self._read(0, min(MAX_HEADER, self.length)))
+        except (IndexError, KeyError, UnicodeDecodeError, ValueError, struct.error) as error:
+            raise NotByRowsError(str(error)) from error
+
+    def _read(self, start: int, count: int) -> bytes:
+        if hasattr(os, "pread"):
+            parts = []
+            while count > 0 and (part := os.pread(self._file, count, start)):
+                parts.append(part)
+                start, count = start + len(part), count - len(part)
+            return parts[0] if len(parts) == 1 else b"".join(parts)
+        with self._lock, os.fdopen(os.dup(self._file), "rb") as file:  # Windows has no pread
+            file.seek(start)
+            return file.read(count)
+
+    def _layouts(self, head: bytes) -> tuple[PartLayout, ...]:
+        magic, version = struct.unpack_from("<iI", head)
+        if magic != MAGIC or not version & MULTI_PART or version & OTHERS:
+            raise NotByRowsError("no file of several parts of lines")
+        at, headers = 8, []
+        while head[at]:
+            attributes, at = _attributes(head, at)
+            headers.append(attributes)
+        at += 1
+        parts = []
+        for number, attributes in enumerate(headers):
+            parts.append(_layout(number, attributes, head, at))
+            at += 8 * len(parts[-1].offsets)
+        return tuple(parts)
+
+    def rows(self, part: PartLayout, top: int, bottom: int, names: Sequence[str]) -> Floats:
+        """Rows of some channels of a part, (bottom - top, w, channels) float32.
+
+        Raises ImageError for a file that is cut off or damaged.
+        """
+        width = part.size[1]
+        made = np.empty((max(bottom - top, 0), width, len(names)), np.float32)
+        starts = dict(zip(part.channels, _starts(part), strict=True))
+        first = top // part.lines
+        for lines, begin in self._lines(part, first, -(-bottom // part.lines)):
+            its = slice(max(top, begin), min(bottom, begin + len(lines)))
+            inner = lines[its.start - begin : its.stop - begin]
+            for c, name in enumerate(names):
+                kind, start = part.channels[name], starts[name]
+                values = inner[:, start : start + width * kind.itemsize]
+                pixels = np.ascontiguousarray(values).view(kind)
+                made[its.start - top : its.stop - top, :, c] = pixels
+        return made
+
+    def channel(self, part: PartLayout, name: str) -> npt.NDArray[Any]:
+        """A whole channel as it is stored, (h, w)."""
+        kind, start = part.channels[name], _starts(part)[list(part.channels).index(name)]
+        made = np.empty(part.size, kind)
+        for lines, begin in self._lines(part, 0, len(part.offsets)):
+            values = lines[:, start : start + part.size[1] * kind.itemsize]
+            made[begin : begin + len(lines)] = np.ascontiguousarray(values).view(kind)
+        return made
+
+    def _lines(
+        self, part: PartLayout, first: int, last: int
+    ) -> Sequence[tuple[npt.NDArray[np.uint8], int]]:
+        """Bytes of the rows of some chunks, (rows, line_bytes) each, and the row they begin at."""
+        offsets, size = part.offsets[first:last], part.line_bytes
+        if not part.is_packed and len(offsets):
+            stride = HEAD.size + size
+            if (np.diff(offsets) == stride).all():  # one behind the other
+                data = self._read(int(offsets[0]), stride * len(offsets))
+                if len(data) != stride * len(offsets):
+                    raise self._damaged()
+                lines = np.frombuffer(data, np.uint8).reshape(-1, stride)[:, HEAD.size :]
+                return [(lines, first)]
+        made = []
+        for k, offset in enumerate(offsets.tolist(), first):
+            begin = k * part.lines
+            rows = min(part.lines, part.size[0] - begin)
+            head = self._read(offset, HEAD.size)
+            if len(head) != HEAD.size:
+                raise self._damaged()
+            number, _, count = HEAD.unpack(head)
+            if number != part.number or not 0 <= count <= rows * size:
+                raise self._damaged()
+            data = self._read(offset + HEAD.size, count)
+            if count < rows * size:
+                data = _unpacked(data, rows * size)
+            if len(data) != rows * size:
+                raise self._damaged()
+            made.append((np.frombuffer(data, np.uint8).reshape(rows, size), begin))
+        return made
+
+    def _damaged(self) -> ImageError:
+        return ImageError(f"{self.path} is cut off or damaged: make it again")
+
+
+def _attributes(head: bytes, at: int) -> tuple[dict[str, tuple[str, bytes]], int]:
+    """Name → type and value of the attributes of the header at `at`, and where it ends."""
+    found = {}
+    while head[at]:
+        name, at = _text(head, at)
+        kind, at = _text(head, at)
+        (size,) = struct.unpack_from("<i", head, at)
+        if not 0 <= size <= len(head) - at - 4:
+            raise ValueError("an attribute is longer than the file")
+        found[name] = kind, head[at + 4 : at + 4 + size]
+        at += 4 + size
+    return found, at + 1
+
+
+def _text(head: bytes, at: int) -> tuple[str, int]:
+    end = head.index(b"\0", at)
+    return head[at:end].decode(), end + 1
+
+
+def _layout(
+    number: int, attributes: Mapping[str, tuple[str, bytes]], head: bytes, at: int
+) -> PartLayout:
+    values = {name: value for name, (_, value) in attributes.items()}
+    if values["type"] != b"scanlineimage" or values["compression"][0] not in LINES:
+        raise NotByRowsError("tiles, or another compression")
+    windows = [struct.unpack("<4i", values[name]) for name in ("dataWindow", "displayWindow")]
+    left, top, right, bottom = windows[0]
+    size = bottom - top + 1, right - left + 1
+    if (left, top) != windows[1][:2] or min(size) < 1:
+        raise NotByRowsError("a crop, or a margin")
+    channels: dict[str, np.dtype[Any]] = {}
+    end = 0
+    table = values["channels"]
+    while table[end]:
+        name, end = _text(table, end)
+        kind, _, wide, high = struct.unpack_from("<iIii", table, end)
+        if (wide, high) != (1, 1):
+            raise NotByRowsError("chroma of lower resolution")
+        channels[name], end = TYPES[kind], end + 16
+    lines = LINES[values["compression"][0]]
+    chunks = -(-size[0] // lines)
+    offsets = np.frombuffer(head, "<i8", chunks, at)
+    if values["lineOrder"][0] > 1:
+        raise NotByRowsError("lines in any order")
+    texts = {name: value.decode() for name, (kind, value) in attributes.items() if kind == "string"}
+    is_packed = values["compression"] != b"\0"
+    shown = windows[1][3] - windows[1][1] + 1, windows[1][2] - windows[1][0] + 1
+    where = offsets.astype(np.int64)
+    return PartLayout(number, size, shown, channels, texts, lines, is_packed, where)
+
+
+def _starts(part: PartLayout) -> list[int]:
+    """Where the channels begin in the bytes of a row."""
+    sizes = [part.size[1] * kind.itemsize for kind in part.channels.values()]
+    return [sum(sizes[:k]) for k in range(len(sizes))]
+
+
+def _unpacked(data: bytes, size: int) -> bytes:
+    """Return bytes that ZIP has packed: as differences, every other byte before the rest."""
+    try:
+        packed = np.frombuffer(zlib.decompress(data, bufsize=size), np.uint8)
+    except zlib.error:
+        return b""
+    steps = packed - np.uint8(128)
+    steps[:1] = packed[:1]
+    values = np.cumsum(steps, dtype=np.uint8)
+    made = np.empty_like(values)
+    half = -(-values.size // 2)
+    made[0::2], made[1::2] = values[:half], values[half:]
+    return made.tobytes()
