@@ -51,6 +51,24 @@ def test_decisions_are_numbered_and_whole() -> None:
     assert [x for x in parts if x != ["Context", "Decision", "Consequence"]] == []
 
 
+#: Characters of a paragraph: six lines of 100, and half a word at the end of each.
+LONGEST = 620
+
+#: Measurements, which are read line by line.
+MEASURED = {"benchmarks.md"}
+
+
+@pytest.mark.parametrize(
+    "document", [x for x in DOCUMENTS if x.name not in MEASURED], ids=lambda path: path.name
+)
+def test_paragraphs_are_short(document: Path) -> None:
+    """Six lines of 100 characters, however the file is wrapped; tables and code aside."""
+    text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
+    blocks = re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d\.) )", text)
+    prose = [" ".join(x.split()) for x in blocks if not re.match(r"\s*[|<#]|    ", x)]
+    assert [x[:60] for x in prose if len(x) > LONGEST] == []
+
+
 def test_rooms_that_are_named_are_there():
     text = (ROOT / "docs" / "architecture.md").read_text()
     rooms = set(re.findall(r"`([a-z_]+(?:/[a-z_]+)*)/`", text))
