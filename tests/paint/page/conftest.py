@@ -19,6 +19,9 @@ HERE = Path(__file__).parent
 
 KINDS = {".js": "text/javascript", ".html": "text/html; charset=utf-8", ".css": "text/css"}
 
+#: Of painters whose test does not ask for another.
+VIEWPORT = {"width": 1280, "height": 720}
+
 
 @pytest.fixture(scope="session")
 def axe() -> str:
@@ -49,6 +52,9 @@ def site() -> Iterator[Site]:
             self.send_response(200 if headers else 404)
             for name, value in headers.items():
                 self.send_header(name, value)
+            if headers and not path.startswith("/data/"):
+                # No file changes while tests run: fifty modules are fetched and compiled once.
+                self.send_header("cache-control", "max-age=3600")
             self.send_header("content-length", str(len(content)))
             self.end_headers()
             self.wfile.write(content)
@@ -102,31 +108,103 @@ def page(tab: Any, site: Site) -> Iterator[Any]:
     assert left == []
 
 
+class Tabs:
+    """Tabs that one test after another takes, each as if it were new.
+
+    A new one in a context of its own takes thrice the time: it starts a process, and compiles all
+    modules of the page.
+    """
+
+    def __init__(self, browser: Any, site: Site) -> None:
+        self.browser, self.site = browser, site
+        self.idle: list[Any] = []
+
+    def take(self, viewport: dict[str, int]) -> Any:
+        """Return a tab of that size which nobody else has."""
+        if not self.idle:
+            return self.browser.new_context(viewport=viewport).new_page()
+        tab = self.idle.pop()
+        if tab.viewport_size != viewport:
+            tab.set_viewport_size(viewport)
+        return tab
+
+    def give_back(self, tab: Any) -> None:
+        """Forget all that a test may have left: what is stored, permissions, mouse and keys."""
+        if tab.is_closed() or len(tab.context.pages) > 1:
+            tab.context.close()
+            return
+        tab.mouse.up()
+        tab.mouse.move(-10, -10)
+        for key in ("Shift", "Control", "Alt", "Meta", "Space"):
+            tab.keyboard.up(key)
+        # First to a page that stores nothing, since the painter may while it ends.
+        tab.goto(f"{self.site.url}/empty.html")
+        tab.evaluate("() => { localStorage.clear(); sessionStorage.clear(); }")
+        tab.context.clear_permissions()
+        tab.context.clear_cookies()
+        self.idle.append(tab)
+
+    def close(self) -> None:
+        for tab in self.idle:
+            tab.context.close()
+
+
+@pytest.fixture(scope="session")
+def tabs(browser: Any, site: Site) -> Iterator[Tabs]:
+    """Tabs for the painters of all tests."""
+    made = Tabs(browser, site)
+    yield made
+    made.close()
+
+
 @pytest.fixture
-def opened(browser: Any, site: Any) -> Iterator[Any]:
-    """Opens painters. No test leaves an error on the console, or one that nobody caught."""
-    contexts, errors = [], []
+def opened(tabs: Tabs) -> Iterator[Any]:
+    """Opens painters. No test leaves an error on the console, or one that nobody caught.
+
+    is_fresh: in a context of its own, for a test that changes what cannot be changed back, such as
+    a clock. So is every painter with a script that runs first, or options beside the viewport.
+    """
+    taken: list[tuple[Any, bool]] = []
+    errors: list[str] = []
+
+    def wrong(error: Any) -> None:
+        errors.append(str(error))
+
+    def said(line: Any) -> None:
+        if line.type in ("error", "warning"):
+            errors.append(line.text)
 
     def open_painter(
-        query: str = "", init: str = "", until: str = ".lightpaint .tag", **about: Any
+        query: str = "",
+        init: str = "",
+        until: str = ".lightpaint .tag",
+        *,
+        is_fresh: bool = False,
+        viewport: dict[str, int] = VIEWPORT,
+        **about: Any,
     ) -> Painter:
-        context = browser.new_context(**{"viewport": {"width": 1280, "height": 720}, **about})
-        contexts.append(context)
-        page = context.new_page()
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on(
-            "console",
-            lambda said: errors.append(said.text) if said.type in ("error", "warning") else None,
-        )
+        if is_fresh or init or about:
+            page = tabs.browser.new_context(viewport=viewport, **about).new_page()
+            taken.append((page, True))
+        else:
+            page = tabs.take(viewport)
+            taken.append((page, False))
+        page.on("pageerror", wrong)
+        page.on("console", said)
         if init:
             page.add_init_script(init)
-        page.goto(f"{site.url}/fake/index.html?{query}&size=48x27")
+        page.goto(f"{tabs.site.url}/fake/index.html?{query}&size=48x27")
         page.wait_for_selector(until)
         return Painter(page)
 
     yield open_painter
-    for context in contexts:
-        context.close()
+    for page, is_own in taken:
+        if is_own or errors:
+            page.context.close()
+        else:
+            tabs.give_back(page)
+            page.remove_listener("pageerror", wrong)
+            page.remove_listener("console", said)
     assert not errors
 
 

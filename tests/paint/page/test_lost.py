@@ -123,7 +123,7 @@ def alert(painter: Painter) -> str:
 
 
 def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(opened: Any) -> None:
-    painter = opened("model")
+    painter = opened("model", is_fresh=True)
     painter.page.clock.install(time=0)
     painter.page.clock.pause_at(60_000)  # else it goes on, as long as this test takes
     painter.page.evaluate("() => { model.isBusy = true; }")
