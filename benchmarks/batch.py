@@ -34,8 +34,8 @@ from lightpaint.batch.run_options import How
 from lightpaint.batch.work.basis_parts import InParts
 from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import Film
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.work_items import SceneFilm
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import silent
@@ -177,7 +177,7 @@ def basis(engine: Engine, spp: int, cache: Path) -> Basis:
     os.environ["LIGHTPAINT_CACHE"] = str(cache)
     file = SceneFile(str(GALLERY))
     scene = file.content
-    film = Film(file, files=tuple(map(str, scene.read_files)))
+    film = SceneFilm(file, files=tuple(map(str, scene.read_files)))
     return InParts(engine, film)(scene, spp=spp, time_s=None, seed=0, progress=silent)
 
 
@@ -192,7 +192,7 @@ def _tell(name: str, spent: Took) -> None:
 def bases(folder: Path, spp: int) -> None:
     """The table of who renders it."""
     limit_threads(1)
-    held = Held()
+    held = WorkerCache()
     basis(InProcess(held, silent), WARM, folder / "warm")
     made: list[Basis] = []
     by = partial(basis, InProcess(held, silent), spp, folder / "alone")

@@ -11,7 +11,7 @@ import pytest
 from command import refused, run, succeed
 
 import lightpaint as lp
-from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
+from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.report.visible_emitters import emitters_in_view
 
 SIZE = (12, 10)
@@ -120,7 +120,7 @@ def test_nothing_left_is_an_error(basis: lp.Basis, image: Any):
 
 def test_the_terminal_and_the_report_say_so(basis: lp.Basis, image: Any, tmp_path: Path):
     lp.write_basis(tmp_path / "a.basis.exr", basis)
-    write_parts(tmp_path / "t.exr", [Part("", rgb_channels(image))])
+    write_parts(tmp_path / "t.exr", [ExrPart("", rgb_channels(image))])
     done = run(tmp_path, "solve", "a.basis.exr", "t.exr", "-o", "out")
     assert done.returncode == 0
     assert "emitters are seen in 4 of 120 painted pixels (3.3 %)" in done.stderr
@@ -139,7 +139,7 @@ def test_the_terminal_and_the_report_say_so(basis: lp.Basis, image: Any, tmp_pat
 
 def test_light_groups_know_of_no_emitters(tmp_path: Path, image: Any):
     channels = rgb_channels(image)
-    write_parts(tmp_path / "g.exr", [Part("ViewLayer.Combined_key", channels)])
-    write_parts(tmp_path / "t.exr", [Part("", channels)])
+    write_parts(tmp_path / "g.exr", [ExrPart("ViewLayer.Combined_key", channels)])
+    write_parts(tmp_path / "t.exr", [ExrPart("", channels)])
     said = refused(tmp_path, "solve", "g.exr", "t.exr", "--emitters", "count")
     assert "--emitters" in said

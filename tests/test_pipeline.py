@@ -9,7 +9,7 @@ import pytest
 
 from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, write_estimate
-from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
+from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.pipeline import results
 from lightpaint.pipeline.results import VIEW_KEY, verify_result
 
@@ -49,7 +49,7 @@ def test_a_damaged_view_is_an_image_error(tmp_path: Path, view: str, complaint: 
 
 
 def test_a_prediction_of_several_parts_is_an_image_error(tmp_path: Path):
-    parts = [Part(name, rgb_channels(IMAGE), {VIEW_KEY: "{}"}) for name in ("left", "right")]
+    parts = [ExrPart(name, rgb_channels(IMAGE), {VIEW_KEY: "{}"}) for name in ("left", "right")]
     write_parts(_result(tmp_path, None) / "predicted.exr", parts)
     with pytest.raises(ImageError, match=r"predicted\.exr has 2 parts \(left, right\)"):
         verify_result(tmp_path)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from lightpaint.batch.plan.journal import Journal, Line
+from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.files import write_text
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
@@ -93,7 +93,7 @@ def test_so_are_results_that_appear_together(tmp_path: Path) -> None:
 def test_so_is_a_journal_that_is_settled(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     for look in ("a", "b"):
-        journal.add(Line(look, "answer", "done", "0f"))
+        journal.add(JournalLine(look, "answer", "done", "0f"))
     journal.settle([("b", "answer")])
     assert [*Journal(tmp_path).lines] == [("b", "answer")]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lightpaint import Painting, SceneFile
-from lightpaint.batch.work.work_items import Film
+from lightpaint.batch.work.work_items import SceneFilm
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.sources import BasisFile, GroupsFile
 
@@ -50,6 +50,6 @@ def test_a_file_as_it_is_sent(file: Any) -> None:
         assert same == file
         assert "content" not in vars(same)
     if isinstance(file, SceneFile):
-        film = Film(file, resolution="8x8")
+        film = SceneFilm(file, resolution="8x8")
         assert film.unread() == film
         assert "content" not in vars(film.unread().scene)

@@ -23,7 +23,13 @@ from lightpaint.errors import BasisError, ImageError
 from lightpaint.files import file_length, one_line
 from lightpaint.images.denoiser import Features
 from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.formats.exr import Part, read_headers, read_parts, rgb_channels, write_parts
+from lightpaint.images.formats.exr import (
+    ExrPart,
+    read_headers,
+    read_parts,
+    rgb_channels,
+    write_parts,
+)
 from lightpaint.images.formats.exr_rows import NotByRowsError, PartLayout, RowFile
 from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
@@ -68,33 +74,33 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     for light, image, half in zip(basis.lights, basis.planes, basis.noise, strict=True):
         about = json.dumps(_light_fields(light), ensure_ascii=False)
         channels = rgb_channels(image) | rgb_channels(half, HALF_DIFFERENCE)
-        parts.append(Part(light.name, channels, {LIGHT_KEY: about}))
+        parts.append(ExrPart(light.name, channels, {LIGHT_KEY: about}))
         sums[light.name] = checksum(about, channels)
     seen = {"Y": basis.emitters_seen.astype(np.float16)}
     # The format's rule: a part name never repeats, so a light may not take this one.
-    parts.append(Part(free_name(EMITTERS_SEEN, basis.names), seen))
+    parts.append(ExrPart(free_name(EMITTERS_SEEN, basis.names), seen))
     learned = {}
     if basis.learned is not None:
         learned = dict(zip(("received", "asked"), basis.learned, strict=True))
         # A table and no picture; the format wants one display window for all parts.
-        parts.append(Part(free_name(LEARNED, basis.names), learned, display=basis.size))
+        parts.append(ExrPart(free_name(LEARNED, basis.names), learned, display=basis.size))
     if basis.features is not None:
         its = _feature_channels(basis.features)
         about_them = {FEATURES_KEY: checksum("", its)}
-        parts.append(Part(free_name(FEATURES, basis.names), its, about_them))
+        parts.append(ExrPart(free_name(FEATURES, basis.names), its, about_them))
     if basis.objects is not None:
         named = json.dumps(basis.objects.names, ensure_ascii=False)
         # Whole numbers that float32 holds.
         index = {"index": basis.objects.index.astype(np.float32)}
         about_it = {NAMES_KEY: named, OBJECTS_KEY: checksum(named, index)}
-        parts.append(Part(free_name(OBJECTS, basis.names), index, about_it))
+        parts.append(ExrPart(free_name(OBJECTS, basis.names), index, about_it))
     # Without `each_light` and `integrator` as in files from before there was any.
     of_origin = json.dumps(fields_of(basis.origin, "each_light", "integrator"), ensure_ascii=False)
     checksums = Checksums(
         sums, checksum(of_origin, {}), checksum("", seen), checksum("", learned) if learned else ""
     )
     head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
-    parts[0] = Part(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
+    parts[0] = ExrPart(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
     write_parts(Path(path), parts)
 
 
@@ -150,7 +156,7 @@ def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
     return head
 
 
-def _of_parts(parts: Sequence[Part], head: Mapping[str, str]) -> Basis:
+def _of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     """Raises BasisError, without naming the file, or one of _DAMAGES."""
     lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
@@ -176,9 +182,9 @@ def _of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
     ):
         return None
 
-    def part(layout: PartLayout) -> Part:
+    def part(layout: PartLayout) -> ExrPart:
         channels = {name: file.channel(layout, name) for name in layout.channels}
-        return Part("", channels, layout.texts, layout.display)
+        return ExrPart("", channels, layout.texts, layout.display)
 
     def planes(order: Sequence[int]) -> tuple[Planes, Planes]:
         its = [lit[k] for k in order]
@@ -195,7 +201,7 @@ def _assembled(
     about: Sequence[str],
     names: Sequence[Sequence[str]],
     stored: Sequence[Callable[[str], npt.NDArray[Any]]],
-    others: Sequence[Part],
+    others: Sequence[ExrPart],
     head: Mapping[str, str],
     planes: Callable[[Sequence[int]], tuple[Planes, Planes]],
 ) -> Basis:
@@ -244,7 +250,7 @@ def _assembled(
     return basis
 
 
-def _stacked(parts: Sequence[Part], layer: str = "") -> Floats:
+def _stacked(parts: Sequence[ExrPart], layer: str = "") -> Floats:
     """(n, h, w, 3), without the copies that np.stack of np.stack would make."""
     stacked = np.empty((len(parts), *parts[0].size, 3), np.float32)
     for image, part in zip(stacked, parts, strict=True):
@@ -258,7 +264,7 @@ def _stacked(parts: Sequence[Part], layer: str = "") -> Floats:
     return stacked
 
 
-def _learned(others: Sequence[Part], checksums: Checksums | None) -> Floats | None:
+def _learned(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
     """The table of what was learned; None for one that is not as it was, which nothing needs."""
     for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
         if checksums is not None and checksum("", channels) != checksums.learned:
@@ -274,7 +280,7 @@ def _feature_channels(features: Features) -> dict[str, Floats]:
     return {name: plane.astype(np.float16) for name, plane in (albedo | normal).items()}
 
 
-def _features(others: Sequence[Part], size: tuple[int, int]) -> Features | None:
+def _features(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | None:
     """Albedo and normals; None if there are none or not as they were, which nothing needs."""
     for part in (p.in_display_window() for p in others if FEATURES_KEY in p.attributes):
         channels = part.channels
@@ -285,7 +291,7 @@ def _features(others: Sequence[Part], size: tuple[int, int]) -> Features | None:
     return None
 
 
-def _objects(others: Sequence[Part], size: tuple[int, int]) -> Objects | None:
+def _objects(others: Sequence[ExrPart], size: tuple[int, int]) -> Objects | None:
     """Whose surfaces are seen; None if nothing says so or not as it was, which nothing needs."""
     for part in (p.in_display_window() for p in others if OBJECTS_KEY in p.attributes):
         named = part.attributes.get(NAMES_KEY, "")

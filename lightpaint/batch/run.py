@@ -17,9 +17,9 @@ from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.small_planes import keep_all_planes
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.batch.plan.cost_estimate import look_s
-from lightpaint.batch.plan.journal import Journal, Line
-from lightpaint.batch.plan.plan import Plan, PlannedLook, Step, by_bases, waves
-from lightpaint.batch.run_options import How, Outcome
+from lightpaint.batch.plan.journal import Journal, JournalLine
+from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
+from lightpaint.batch.run_options import BatchOutcome, How
 from lightpaint.batch.work.basis_parts import InParts
 from lightpaint.batch.work.distributed_render import rendered_by
 from lightpaint.batch.work.distributed_sums import solved_by_sums
@@ -27,7 +27,7 @@ from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.processes import Processes
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import attempted, fields_of, final_render, is_full
-from lightpaint.batch.work.work_items import Done, Film
+from lightpaint.batch.work.work_items import Done, SceneFilm
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
 from lightpaint.pipeline.pipeline import obtain
@@ -43,7 +43,7 @@ def run_batch(
     progress: Progress = silent,
     *,
     told: Callable[[PlannedLook, Done], None] | None = None,
-) -> Outcome:
+) -> BatchOutcome:
     """Do what is left of `plan`. What is done is on the disk, and is not done again.
 
     Args:
@@ -88,7 +88,7 @@ class _Run:
         told: Callable[[PlannedLook, Done], None],
     ) -> None:
         self.journal = Journal(plan.folder, "/".join(sorted(plan.chosen)) if how.apart else "")
-        self.outcome = Outcome()
+        self.outcome = BatchOutcome()
         self._plan, self._how, self._listen, self._told = plan, how, listen, told
         self._looks = {look.entry.name: look for look in plan.looks}
         self._held = plan.held
@@ -151,7 +151,7 @@ class _Run:
         exact = settings.exact_spp or not settings.use_cache
         return not exact and kept >= (film.spp if asked is None else asked)
 
-    def _by_sums(self, steps: Sequence[Step]) -> None:
+    def _by_sums(self, steps: Sequence[PlanStep]) -> None:
         """Looks that share a basis which nobody is to have."""
         by_look = {step.task.look: step for step in steps if self._can_begin(step)}
         tasks = [step.task for step in by_look.values()]
@@ -162,7 +162,7 @@ class _Run:
                 raise OutputError(f"{done.failure}: make room; the same command goes on")
             self._record(by_look[done.look], done)
 
-    def _of_bases(self, steps: Sequence[Step]) -> None:
+    def _of_bases(self, steps: Sequence[PlanStep]) -> None:
         """Looks that share their bases; those that are made of others come after them."""
         task = steps[0].task
         self._held.only(task.bases)
@@ -199,14 +199,14 @@ class _Run:
             film = on_film(scene.content, settings.quality, settings.resolution)
             basis = self._held.basis(key)
             if basis is None:
-                its = Film(scene, settings.quality, settings.resolution, _files(scene))
+                its = SceneFilm(scene, settings.quality, settings.resolution, _files(scene))
                 render = InParts(self._engine, its)
                 basis = obtain(film, settings, self._listen, render=render)
                 self._held.hold(key, basis)
             bases.append(basis)
         return bases
 
-    def _together(self, steps: Sequence[Step]) -> None:
+    def _together(self, steps: Sequence[PlanStep]) -> None:
         """Steps that do not wait for each other, and again those that failed and may be tried."""
         by_look = {step.task.look: step for step in steps}
         waiting = [step for step in steps if self._can_begin(step)]
@@ -246,7 +246,7 @@ class _Run:
             by_all = rendered_by(self._engine, task, variant, self._listen)
             yield attempted(task, partial(final_render, task, self._held, self._listen, by_all))
 
-    def _can_begin(self, step: Step) -> bool:
+    def _can_begin(self, step: PlanStep) -> bool:
         """Whether the look has not failed by now, nor what it is made of."""
         look = self._looks[step.task.look]
         gone = [name for name in look.entry.of if name in self.outcome.failed]
@@ -259,13 +259,13 @@ class _Run:
         self._tries[key] = self._tries.get(key, 0) + 1
         return self._tries[key] <= self._how.retry
 
-    def _record(self, step: Step, done: Done) -> None:
+    def _record(self, step: PlanStep, done: Done) -> None:
         """Keep what came of a step, and tell it."""
         look = self._looks[done.look]
         if done.failure:
             self._fail(look, step, done.failure, done)
         else:
-            self.journal.add(Line(done.look, step.task.kind, "done", step.made_of))
+            self.journal.add(JournalLine(done.look, step.task.kind, "done", step.made_of))
             if step.task.kind == look.steps[-1].task.kind:
                 self.outcome.done.append(done.look)
                 self.outcome.waiting.remove(done.look)
@@ -273,7 +273,7 @@ class _Run:
             self._told(look, replace(done, left_s=self._left_s))
         self._listen("steps", self._finished, self._total, "steps")
 
-    def _fail(self, look: PlannedLook, step: Step, why: str, done: Done | None = None) -> None:
+    def _fail(self, look: PlannedLook, step: PlanStep, why: str, done: Done | None = None) -> None:
         if self._engine.is_gone:
             raise BatchError(why)
         name = look.entry.name
@@ -282,7 +282,7 @@ class _Run:
         self.outcome.failed[name] = why
         if name in self.outcome.waiting:
             self.outcome.waiting.remove(name)
-        self.journal.add(Line(name, step.task.kind, "failed", step.made_of, why))
+        self.journal.add(JournalLine(name, step.task.kind, "failed", step.made_of, why))
         self._told(look, done or Done(name, step.task.kind, why))
 
     def _is_stopped(self) -> bool:

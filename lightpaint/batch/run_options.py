@@ -26,7 +26,7 @@ class How:
 
 
 @dataclass
-class Outcome:
+class BatchOutcome:
     """What a run came to. done, failed: names of looks, and why. skipped: done earlier.
 
     waiting: what was not come to. rows: of all looks, as the summary has them.

@@ -12,7 +12,7 @@ from importlib import import_module
 from lightpaint.cli.crash_report import report_fault
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output import lines
-from lightpaint.cli.output.output_mode import Manner, Outcome, speaking
+from lightpaint.cli.output.output_mode import CommandOutcome, Manner, speaking
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BatchError, LightpaintError
 
@@ -83,7 +83,7 @@ def _without_garbage() -> Iterator[None]:
         gc.enable()
 
 
-def _command(name: str) -> Callable[..., Outcome]:
+def _command(name: str) -> Callable[..., CommandOutcome]:
     """The function of a command, of whose rooms the others have no need."""
     module = import_module(f"lightpaint.cli.commands.{_HOMES.get(name, 'rooms')}")
     return getattr(module, name)  # type: ignore[no-any-return]

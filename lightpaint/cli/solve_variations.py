@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis
 from lightpaint.batch.gallery.gallery import check_gallery, spoken_counts
 from lightpaint.batch.gallery.solve_gallery import entry_of, write_gallery_of
-from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
 from lightpaint.batch.work.derived_looks import (
     leave_shifted,
@@ -41,7 +41,7 @@ class Several:
     called: Mapping[Path, str]
     made: Mapping[Path, Mapping[str, ResultFolder]]
     failed: dict[str, str]
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[LookEntry] = field(default_factory=list)
     shifted: list[dict[str, Any]] = field(default_factory=list)
 
     def is_done(self, job: Job, lighting: Lighting, bases: Sequence[Basis]) -> None:
@@ -69,7 +69,7 @@ class Several:
         if self.together is None:
             return
         named = {entry.name for entry in self.entries}
-        lost = [Entry(name, "") for name in self.failed if name not in named]
+        lost = [LookEntry(name, "") for name in self.failed if name not in named]
         rows = write_gallery_of(self.together, [*self.entries, *lost], self.failed, bases)
         terminal.write(f"{self.together / FILES[0]}: {spoken_counts(rows)}")
 

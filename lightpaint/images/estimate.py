@@ -9,7 +9,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError
 from lightpaint.files import one_line
-from lightpaint.images.formats.exr import Part, read_parts, rgb_channels, write_parts
+from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
 from lightpaint.screen import shortly, some_names
@@ -87,7 +87,7 @@ def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -
     """Write R, G, B and the half difference as a layer of its own, in float32."""
     channels = rgb_channels(estimate.image)
     channels |= rgb_channels(estimate.half_difference, HALF_DIFFERENCE)
-    write_parts(path, [Part("rgb", channels, attributes)])
+    write_parts(path, [ExrPart("rgb", channels, attributes)])
 
 
 def read_estimate(path: Path) -> tuple[Estimate, Mapping[str, str]]:

@@ -19,7 +19,7 @@ from lightpaint.images.formats.bitmap_decoder import (
     transform_of,
     unpremultiply,
 )
-from lightpaint.images.formats.exr import Part, read_parts
+from lightpaint.images.formats.exr import ExrPart, read_parts
 from lightpaint.images.formats.exr_layers import ALPHA_NAMES, RGB_NAMES, Layer, choose_layer
 from lightpaint.images.formats.file_kinds import head_of, kind_of, name_of
 from lightpaint.images.formats.openraster import LAYERED, layered_kind, read_merged
@@ -174,7 +174,7 @@ def _at_least(layer: Layer) -> Mask | None:
     return np.stack([nowhere if mark is None else mark > 0 for mark in marks], axis=-1)
 
 
-def _stored(part: Part) -> Mask | None:
+def _stored(part: ExrPart) -> Mask | None:
     """Where in its display window a part has pixels; None if everywhere."""
     if part.display in (None, part.size) and part.offset == (0, 0):
         return None
@@ -234,7 +234,7 @@ def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
     return np.where(partial, np.float32(0), alpha), (note,)
 
 
-def _mask_in(parts: Sequence[Part]) -> npt.NDArray[np.float32]:
+def _mask_in(parts: Sequence[ExrPart]) -> npt.NDArray[np.float32]:
     if len(parts) > 1:
         raise ImageError(
             f"has {len(parts)} parts ({', '.join(p.name for p in parts)}), and which of them is "

@@ -23,7 +23,7 @@ from lightpaint.pipeline.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.report.clean_pictures import Looks
+from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.painting_file import write_painting
@@ -80,7 +80,7 @@ def export(
 def picture(basis: Basis, lighting: Lighting, transform: ViewTransform) -> bytes:
     """The answer in a view, as pages and reports show it: a PNG, through `transform`, clean."""
     weights = lighting.weights_for(basis)
-    looks = Looks.clean(basis, weights, basis.mix(weights), None)
+    looks = CleanLooks.clean(basis, weights, basis.mix(weights), None)
     shown = to_8_bit(transform.encode(looks.predicted))
     return png_bytes(shown, texts_of(transform) | how_denoised(basis.features, raw="not kept"))
 

@@ -26,7 +26,7 @@ from lightpaint.placement.light_search import suggest_lights
 from lightpaint.progress import Listener, Progress, labelled, listener, silent
 from lightpaint.relit.detection_power import with_power
 from lightpaint.relit.render_rounds import refine_by_rendering
-from lightpaint.relit.sample_budget import Budget, verification_budget
+from lightpaint.relit.sample_budget import VerificationBudget, verification_budget
 from lightpaint.relit.verification_render import verify
 from lightpaint.report.basis_memo import ahead
 from lightpaint.report.page.page import prepare_page
@@ -242,7 +242,7 @@ def _finished(
     return look
 
 
-def _budget(settings: Settings, basis: Basis, relit: Scene) -> Budget:
+def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudget:
     """Return what the verification of `relit`, on its whole film, may cost."""
     most = None if settings.checks_as_basis else settings.spp or relit.spp
     spp = basis.origin.spp
@@ -252,7 +252,7 @@ def _budget(settings: Settings, basis: Basis, relit: Scene) -> Budget:
     return verification_budget(relit, basis.size, spp, most_spp=most, asked_spp=settings.verify_spp)
 
 
-def _spoken(budget: Budget, basis: Basis) -> str:
+def _spoken(budget: VerificationBudget, basis: Basis) -> str:
     """Return how long a verification takes, said before it starts."""
     height, width = budget.scene.size
     its = f"verification of {budget.spp} samples per pixel on {width}x{height}"

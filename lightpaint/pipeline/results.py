@@ -24,7 +24,7 @@ from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import verify
 from lightpaint.report.answer_pictures import residual_of, transform_of
-from lightpaint.report.clean_pictures import Looks
+from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.page.notebook_html import look_html
 from lightpaint.report.page.page import report_page
@@ -191,7 +191,7 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
             film = look.relit if is_whole else look.relit.reduced(f"{width}x{height}")
             larger = render_features(film)
     weights, predicted = look.solution.weights, look.predicted.image
-    looks = Looks.clean(look.basis, weights, predicted, verified, larger=larger)
+    looks = CleanLooks.clean(look.basis, weights, predicted, verified, larger=larger)
     transform = transform_of(look.target, look.basis, predicted)
     missed = residual_of(look.solution, predicted, transform=transform)
 

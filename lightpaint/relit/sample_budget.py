@@ -10,7 +10,7 @@ FEWEST = 4
 
 
 @dataclass(frozen=True)
-class Budget:
+class VerificationBudget:
     """A verification that is to be rendered.
 
     scene: relit, on the film that it is rendered on. spp: samples per pixel. share: of the samples
@@ -29,7 +29,7 @@ def verification_budget(
     *,
     most_spp: int | None = None,
     asked_spp: int | None = None,
-) -> Budget:
+) -> VerificationBudget:
     """Return the verification of `relit` that takes no longer than its basis, or the one asked for.
 
     The samples of the basis are spread over the whole film, or over the largest one of whole blocks
@@ -44,7 +44,7 @@ def verification_budget(
     samples = basis_spp * basis_size[0] * basis_size[1]
     whole = relit.size[0] * relit.size[1]
     if asked_spp is not None:
-        return Budget(relit, asked_spp, asked_spp * whole / samples)
+        return VerificationBudget(relit, asked_spp, asked_spp * whole / samples)
     factor = whole_factor(relit.size, basis_size) or 1
     for part in range(1, factor + 1):
         if factor % part:
@@ -60,5 +60,5 @@ def verification_budget(
             spp = max(2, spp if most_spp is None else min(spp, most_spp))
             # As many in each pixel of a block, for either half.
             spp = max(spp, 2 * scene.film.block_pixels)
-            return Budget(scene, spp, spp * pixels / samples)
+            return VerificationBudget(scene, spp, spp * pixels / samples)
     raise AssertionError("the last factor is always taken")

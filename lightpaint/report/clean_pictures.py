@@ -32,7 +32,7 @@ class Encoder(ViewTransform):
 
 
 @dataclass(frozen=True)
-class Looks:
+class CleanLooks:
     """Current look, prediction and verification, (h, w, 3) linear.
 
     verified: None where there is none. texts: what a PNG of them says of itself; none where they
@@ -54,7 +54,7 @@ class Looks:
         verified: Floats | None,
         *,
         larger: Features | None = None,
-    ) -> "Looks":
+    ) -> "CleanLooks":
         """Without their grain.
 
         weights: (n, 3), of which `predicted` is the sum. larger: of a verification that has another
@@ -72,7 +72,7 @@ class Looks:
         return cls(*shown, verified, texts)
 
     @classmethod
-    def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "Looks":
+    def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "CleanLooks":
         """As they were rendered."""
         present = basis.present_look
         return cls(present, predicted, verified, {})

@@ -22,7 +22,7 @@ from lightpaint.report.answer_pictures import (
     target_picture,
     transform_of,
 )
-from lightpaint.report.clean_pictures import Looks
+from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.target.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read.
@@ -54,7 +54,7 @@ def comparison_image(
     predicted: Floats,
     verified: Floats | None,
     seen: Seen | None = None,
-    looks: Looks | None = None,
+    looks: CleanLooks | None = None,
     missed: Residual | None = None,
 ) -> npt.NDArray[np.uint8]:
     """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
@@ -68,7 +68,7 @@ def comparison_image(
     Raises SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
-    looks = looks or Looks.raw(basis, predicted, verified)
+    looks = looks or CleanLooks.raw(basis, predicted, verified)
     transform = looks.through(transform_of(target, basis, predicted))
     is_part = target.painted_share < ALL_OF_IT
     at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""

@@ -14,7 +14,7 @@ import numpy as np
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import TargetError
-from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
+from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.images.picture import AT_LEAST
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.target.target import Target
@@ -49,7 +49,7 @@ def write_painting(path: Path, target: Target) -> None:
     channels = rgb_channels(target.image) | {"W": target.importance.astype(np.float32)}
     if target.at_least is not None and target.at_least.any():
         channels |= rgb_channels(target.at_least.astype(np.float32), AT_LEAST)
-    write_parts(path, [Part("rgb", channels, {KEY: json.dumps(fields_of(painted))})])
+    write_parts(path, [ExrPart("rgb", channels, {KEY: json.dumps(fields_of(painted))})])
 
 
 def painted_of(attributes: Mapping[str, str], path: Path) -> Painted | None:

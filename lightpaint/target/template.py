@@ -15,7 +15,7 @@ from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.files import one_line, read_text, write_bytes, write_text
-from lightpaint.images.formats.exr import Part, read_parts, write_parts, write_rgb
+from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
 from lightpaint.images.formats.png import TRANSFORM_KEY, png_bytes, write_png_16
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.storage.staging import is_below, staged
@@ -137,7 +137,7 @@ def write_template(
         if normals is not None:
             write_rgb(stage / NORMALS, normals)
         if depth is not None:
-            write_parts(stage / DEPTH, [Part("depth", {"Y": depth.astype(np.float32)})])
+            write_parts(stage / DEPTH, [ExrPart("depth", {"Y": depth.astype(np.float32)})])
         for file, matte in zip(matte_files, mattes.values(), strict=True):
             write_bytes(stage / file, png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):

@@ -25,7 +25,7 @@ from lightpaint.basis.file import (
 )
 from lightpaint.errors import BasisError, ImageError, SizeError
 from lightpaint.images.estimate import HALF_DIFFERENCE
-from lightpaint.images.formats.exr import Part, read_parts, write_parts, write_rgb
+from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
 from lightpaint.images.object_map import Objects
 
 SIZE = (6, 5)
@@ -229,7 +229,7 @@ def test_damaged_origin(path: Path, origin: str | None):
 def test_lost_parts(path: Path, keep: slice):
     parts = read_parts(path)
     marks = {k: parts[0].attributes[k] for k in (FORMAT_KEY, ORIGIN_KEY)}
-    mark = Part("marks", {"Z": np.zeros(SIZE, np.float32)}, marks)
+    mark = ExrPart("marks", {"Z": np.zeros(SIZE, np.float32)}, marks)
     kept = [replace(p, attributes={**p.attributes, **marks}) for p in parts[keep]]
     write_parts(path, [*kept, mark])
     with pytest.raises(BasisError, match="has lost parts of its basis"):

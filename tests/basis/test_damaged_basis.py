@@ -18,7 +18,7 @@ from lightpaint.basis.file import LIGHT_KEY, ORIGIN_KEY, read_basis, read_origin
 from lightpaint.basis.lightgroups.folder import MAX_FILES, is_light_groups
 from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.images.formats.exr import Part, read_parts, write_parts, write_rgb
+from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
 
 SIZE = (6, 5)
 
@@ -63,7 +63,7 @@ def test_damage_of_light_groups(tmp_path: Path) -> None:
         for layer in ("Combined_key", "Combined_fill")
         for c in "RGB"
     }
-    write_parts(tmp_path / "a.exr", [Part("ViewLayer", channels)])
+    write_parts(tmp_path / "a.exr", [ExrPart("ViewLayer", channels)])
     content = (tmp_path / "a.exr").read_bytes()
     cases = list(damaged("a.exr", content, 3, 150, 150))
     results = outcomes("groups", {"a.exr": content}, cases, tmp_path)
@@ -71,8 +71,8 @@ def test_damage_of_light_groups(tmp_path: Path) -> None:
     assert cut_and_read(results) == []
 
 
-def _edited(name: str) -> Callable[[list[Part]], list[Part]]:
-    def edit(parts: list[Part]) -> list[Part]:
+def _edited(name: str) -> Callable[[list[ExrPart]], list[ExrPart]]:
+    def edit(parts: list[ExrPart]) -> list[ExrPart]:
         if name == "one dropped":
             return [parts[0], *parts[2:]]
         if name == "one twice":

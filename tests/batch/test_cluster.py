@@ -25,7 +25,7 @@ from lightpaint.basis.render import parts as parts_module
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.run_options import How, Outcome
+from lightpaint.batch.run_options import BatchOutcome, How
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene import scene_render as render_module
 from lightpaint.scene.runtime.kernel_threads import limit_threads
@@ -183,7 +183,7 @@ class Hears:
         return Counter(text.split(" begun by ")[0] for text in self.said if " begun by " in text)
 
 
-def do(here: Path, name: str, workers: Workers, hears: Hears, **how: Any) -> Outcome:
+def do(here: Path, name: str, workers: Workers, hears: Hears, **how: Any) -> BatchOutcome:
     with pytest.MonkeyPatch.context() as patch:
         in_small_parts(patch, here / f"cache-{name}")
         planned = plan(here / "looks.toml", here / name)

@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.batch.manifest.folder_names import JOURNAL
-from lightpaint.batch.plan.journal import Journal, Line
+from lightpaint.batch.plan.journal import Journal, JournalLine
 
 LINES = [
-    Line("evening", "answer", "done", "a" * 64),
-    Line("Ærø · 夜", "answer", "failed", "b" * 64, "no such file: ø.exr"),
-    Line("evening", "render", "done", "c" * 64),
-    Line("evening", "answer", "done", "d" * 64),
+    JournalLine("evening", "answer", "done", "a" * 64),
+    JournalLine("Ærø · 夜", "answer", "failed", "b" * 64, "no such file: ø.exr"),
+    JournalLine("evening", "render", "done", "c" * 64),
+    JournalLine("evening", "answer", "done", "d" * 64),
 ]
 
 

@@ -8,13 +8,13 @@ import pytest
 from batches import contents, write_batch
 from light_groups import interleaved, pictures
 
-from lightpaint.batch.cluster.parcels import Contents, Parcel, Store, packed, pieces, unpack
+from lightpaint.batch.cluster.parcels import Contents, Parcel, ParcelStore, packed, pieces, unpack
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import do
 from lightpaint.batch.work.work_items import Done, Errand
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.progress import silent
 
@@ -28,8 +28,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Store:
-    return Store(tmp_path / "worker")
+def store(tmp_path: Path) -> ParcelStore:
+    return ParcelStore(tmp_path / "worker")
 
 
 def task(manifest: Path, out: Path, look: str = "p0") -> Task:
@@ -37,10 +37,10 @@ def task(manifest: Path, out: Path, look: str = "p0") -> Task:
 
 
 def here_done(errand: Errand) -> Done:
-    return do(errand, Held(), silent)
+    return do(errand, WorkerCache(), silent)
 
 
-def sent(store: Store, parcel: Parcel) -> None:
+def sent(store: ParcelStore, parcel: Parcel) -> None:
     """Send what is lacking, as the engine does."""
     files = {its: file for file, its in (*parcel.files, *parcel.carried)}
     for sum_ in store.lacking(parcel):
@@ -50,7 +50,9 @@ def sent(store: Store, parcel: Parcel) -> None:
 
 
 @pytest.mark.parametrize("whole", [False, True])
-def test_a_look_done_elsewhere_is_the_look_done_here(here: Path, store: Store, whole: bool) -> None:
+def test_a_look_done_elsewhere_is_the_look_done_here(
+    here: Path, store: ParcelStore, whole: bool
+) -> None:
     base = here if whole else Path()
     run_batch(plan(base / "looks.toml", base / "expected").only("p0"))
     errand = task(base / "looks.toml", base / "expected")
@@ -77,7 +79,7 @@ def test_a_look_done_elsewhere_is_the_look_done_here(here: Path, store: Store, w
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
-    here: Path, store: Store, whole: bool
+    here: Path, store: ParcelStore, whole: bool
 ) -> None:
     base, images = here if whole else Path(), pictures()
     (here / "renders").mkdir()
@@ -108,7 +110,7 @@ def forced(one: Task) -> Task:
     return replace(one, job=json.dumps(job))
 
 
-def test_other_content_under_the_same_name_is_sent_anew(here: Path, store: Store) -> None:
+def test_other_content_under_the_same_name_is_sent_anew(here: Path, store: ParcelStore) -> None:
     errand, contents_ = task(here / "looks.toml", here / "out"), Contents()
     sent(store, packed(errand, contents_, run="a", is_shared=False))
     (here / "p0.exr").write_bytes((here / "p1.exr").read_bytes())
@@ -127,12 +129,14 @@ def test_other_content_under_the_same_name_is_sent_anew(here: Path, store: Store
     assert seen == [(here / "p1.exr").read_bytes()]
 
 
-def test_what_comes_otherwise_than_it_was_sent_is_refused(store: Store) -> None:
+def test_what_comes_otherwise_than_it_was_sent_is_refused(store: ParcelStore) -> None:
     with pytest.raises(BatchError, match="otherwise than it was sent"):
         store.put("0" * 64, b"data", is_first=True, is_last=True)
 
 
-def test_a_shared_disk_is_believed_only_if_it_holds_the_same(here: Path, store: Store) -> None:
+def test_a_shared_disk_is_believed_only_if_it_holds_the_same(
+    here: Path, store: ParcelStore
+) -> None:
     errand = task(here / "looks.toml", here / "out")
     parcel = packed(errand, Contents(), run="a", is_shared=True)
     assert store.lacking(parcel) == []
@@ -143,7 +147,7 @@ def test_a_shared_disk_is_believed_only_if_it_holds_the_same(here: Path, store: 
 
 
 def test_files_that_are_only_here_are_carried_to_a_shared_disk_too(
-    here: Path, store: Store
+    here: Path, store: ParcelStore
 ) -> None:
     only_here = (here / "b.basis.exr").rename(here / "only-here.exr")
     write_batch(here)

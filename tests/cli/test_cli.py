@@ -22,7 +22,7 @@ from lightpaint import paint_with_light
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import read_estimate
-from lightpaint.images.formats.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
+from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts, write_rgb
 from lightpaint.pipeline.results import verify_result
 from lightpaint.scene.presets import PRESETS
 from lightpaint.scene.scene import load_scene
@@ -145,7 +145,7 @@ def test_several_targets_share_one_basis(tmp_path: Path) -> None:
 
 
 def test_each_target_with_its_own_mask(basis_file: Path, tmp_path: Path) -> None:
-    write_parts(tmp_path / "m.exr", [Part("", {"Y": np.ones((128, 128), np.float32)})])
+    write_parts(tmp_path / "m.exr", [ExrPart("", {"Y": np.ones((128, 128), np.float32)})])
     masks = ("--mask", "m.exr", "--mask", COOL_MASK)
     succeed(tmp_path, "solve", basis_file, WARM, COOL, *masks, "-o", "both")
     succeed(tmp_path, "solve", basis_file, COOL, "--mask", COOL_MASK, "-o", "cool")
@@ -379,8 +379,10 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
     bad = tmp_path / "bad"
     bad.mkdir()
     write_rgb(bad / "small.exr", image[:64])
-    write_parts(bad / "unpainted.exr", [Part("", {**rgb_channels(image), "A": image[..., 0] * 0})])
-    write_parts(bad / "negative.exr", [Part("", {**rgb_channels(image), "W": -image[..., 0]})])
+    write_parts(
+        bad / "unpainted.exr", [ExrPart("", {**rgb_channels(image), "A": image[..., 0] * 0})]
+    )
+    write_parts(bad / "negative.exr", [ExrPart("", {**rgb_channels(image), "W": -image[..., 0]})])
     write_rgb(bad / "nan.exr", image * np.nan)
     whole = WARM.read_bytes()
     (bad / "cut.exr").write_bytes(whole[: len(whole) // 2])
@@ -442,7 +444,7 @@ def test_deep_images_are_refused_by_name(tmp_path: Path) -> None:
 def test_resize_and_unpainted(basis_file: Path, tmp_path: Path) -> None:
     [part] = read_parts(WARM)
     wide = {k: np.repeat(np.repeat(v, 2, 0), 2, 1) for k, v in part.channels.items()}
-    write_parts(tmp_path / "wide.exr", [Part("", wide)])
+    write_parts(tmp_path / "wide.exr", [ExrPart("", wide)])
     succeed(tmp_path, "solve", basis_file, "wide.exr", "--resize")
     succeed(tmp_path, "solve", basis_file, WARM)
     answers = [
@@ -664,7 +666,7 @@ def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
     succeed(tmp_path, "template", "room.xml", *size, "-o", "look.exr", "--spp", 2)
     mask = np.zeros((128, 171), np.float32)
     mask[50:] = 1
-    write_parts(tmp_path / "mask.exr", [Part("mask", {"Y": mask})])
+    write_parts(tmp_path / "mask.exr", [ExrPart("mask", {"Y": mask})])
     solve = ("solve", "room.xml", "look.exr", "--mask", "mask.exr", *size, "--quality", "preview")
     done = run(tmp_path, *solve, "--spp", 8, "--verify-spp", 8)
     assert done.returncode == 0, done.stderr

@@ -133,7 +133,7 @@ def test_progress_and_remarks_on_a_terminal(
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")
-    with terminal.Listener() as listen:
+    with terminal.TerminalListener() as listen:
         listen(f"basis of {BAD}", 0, 2)
         listen(f"basis of {BAD}", 1, 2)
         assert listen._bars is not None
@@ -149,11 +149,11 @@ def test_each_worker_has_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")
 
-    def shown(listen: terminal.Listener) -> list[str]:
+    def shown(listen: terminal.TerminalListener) -> list[str]:
         assert listen._bars is not None
         return [task.description for task in listen._bars.tasks if task.visible]
 
-    with terminal.Listener() as listen:
+    with terminal.TerminalListener() as listen:
         listen.at_work("worker 1", f"{BAD}: answer")
         listen.at_work("worker 2", "night: answer")
         assert shown(listen) == [f"worker 1: {SHOWN}: answer", "worker 2: night: answer"]

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from lightpaint.errors import ImageError, OutputError
-from lightpaint.images.formats.exr import Part, read_parts, rgb_channels, write_parts, write_rgb
+from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts, write_rgb
 
 # What a header's text may hold: anything but NUL, which ends it.
 TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=20)
@@ -27,7 +27,7 @@ TYPES = st.sampled_from([np.float16, np.float32, np.uint32])
 
 
 @st.composite
-def _parts(draw: Any) -> list[Part]:
+def _parts(draw: Any) -> list[ExrPart]:
     parts = []
     # All parts of one file share a display window, so that their sizes agree.
     size = draw(SIZES)
@@ -37,13 +37,13 @@ def _parts(draw: Any) -> list[Part]:
             for channel in draw(st.lists(TEXT, min_size=1, max_size=4, unique=True))
         }
         keys = TEXT.map(lambda text: f"lightpaint.{text}")
-        parts.append(Part(name, channels, draw(st.dictionaries(keys, TEXT, max_size=3))))
+        parts.append(ExrPart(name, channels, draw(st.dictionaries(keys, TEXT, max_size=3))))
     return parts
 
 
 @given(parts=_parts())
 @settings(max_examples=60)
-def test_there_and_back_is_exact(tmp_path_factory: pytest.TempPathFactory, parts: list[Part]):
+def test_there_and_back_is_exact(tmp_path_factory: pytest.TempPathFactory, parts: list[ExrPart]):
     path = tmp_path_factory.getbasetemp() / "parts.exr"
     write_parts(path, parts)
     back = read_parts(path)
@@ -69,7 +69,7 @@ def test_other_programs_read_what_we_write(tmp_path: Path):
 def test_rgb_of_layers(tmp_path: Path):
     image = np.random.default_rng(0).random((4, 3, 3)).astype(np.float32)
     channels = rgb_channels(image) | rgb_channels(-image, "noise")
-    write_parts(tmp_path / "a.exr", [Part("p", channels)])
+    write_parts(tmp_path / "a.exr", [ExrPart("p", channels)])
     part = read_parts(tmp_path / "a.exr")[0]
     np.testing.assert_array_equal(part.rgb(), image)
     np.testing.assert_array_equal(part.rgb("noise"), -image)
@@ -82,7 +82,7 @@ def _written(path: Path, kind: str) -> bytes:
     """A file of `kind`. Its pixels do not compress to nothing."""
     rgb = {c: np.random.default_rng(1).random((33, 21)).astype(np.float32) for c in "RGB"}
     if kind == "parts":
-        write_parts(path, [Part("a", rgb), Part("b", rgb)])
+        write_parts(path, [ExrPart("a", rgb), ExrPart("b", rgb)])
     elif kind == "tiles":
         header = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
         OpenEXR.File(header, rgb).write(str(path))
@@ -200,7 +200,7 @@ def test_threads_that_read_at_once_give_the_terminal_back(
 def test_float32_pixels_are_copied_once(monkeypatch: pytest.MonkeyPatch):
     stacked = np.zeros((2, 3, 3), np.float32)
     monkeypatch.setattr(np, "stack", lambda *_args, **_options: stacked)
-    assert Part("p", rgb_channels(stacked)).rgb() is stacked
+    assert ExrPart("p", rgb_channels(stacked)).rgb() is stacked
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.images.formats.exr import Part, write_parts
+from lightpaint.images.formats.exr import ExrPart, write_parts
 from lightpaint.paint import protocol
 from lightpaint.paint.notebook import widget_arguments as cells
 from lightpaint.paint.session.look_library import Looks
@@ -228,7 +228,7 @@ def test_any_exr_may_say_so(tmp_path: Path):
     light = {c: np.ones((4, 5), np.float32) for c in "RGB"}
     green = np.zeros((4, 5), np.float32)
     green[1, 2:4] = 1
-    write_parts(tmp_path / "a.exr", [Part("", light | {"at_least.G": green})])
+    write_parts(tmp_path / "a.exr", [ExrPart("", light | {"at_least.G": green})])
     target = lp.read_target(tmp_path / "a.exr", find=False)
     assert target.at_least is not None
     assert not target.at_least[..., [0, 2]].any()

@@ -11,7 +11,7 @@ from PIL import Image
 from lightpaint.colour.display.srgb import decode_display
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import SizeError, TargetError, ViewError
-from lightpaint.images.formats.exr import Part, write_parts, write_rgb
+from lightpaint.images.formats.exr import ExrPart, write_parts, write_rgb
 from lightpaint.images.formats.png import write_png_16
 from lightpaint.target.target_reader import read_target
 from lightpaint.target.template import Template, write_look, write_template
@@ -245,7 +245,7 @@ def test_what_a_cropped_exr_does_not_store_is_not_painted(tmp_path: Path) -> Non
     painted = template.image[10:40, 20:60].copy()
     painted[10:20, 10:20] += 0.3
     planes = {name: np.ascontiguousarray(painted[..., k]) for k, name in enumerate("RGB")}
-    crop = Part("", planes, offset=(10, 20), display=SIZE)
+    crop = ExrPart("", planes, offset=(10, 20), display=SIZE)
     write_parts(tmp_path / "crop.exr", [crop])
     target = read_target(tmp_path / "crop.exr")
     stored = np.zeros(SIZE, bool)

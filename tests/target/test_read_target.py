@@ -9,7 +9,7 @@ import OpenEXR
 import pytest
 
 from lightpaint.errors import ImageError, SizeError, TargetError
-from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
+from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.target.target_reader import read_target
 
 SIZE = (6, 5)
@@ -32,7 +32,7 @@ def write(tmp_path: Path) -> Any:
 
     def write(name: str = "look.exr", rgb: Any = None, **channels: Any) -> Path:
         colours = {} if rgb is None else rgb_channels(rgb)
-        write_parts(tmp_path / name, [Part("paint", colours | channels)])
+        write_parts(tmp_path / name, [ExrPart("paint", colours | channels)])
         return tmp_path / name
 
     return write
@@ -226,7 +226,9 @@ def test_luminance_alone_is_grey(write: Any, alpha: Any):
 
 def test_several_parts(tmp_path: Path, write: Any, image: Any):
     path = tmp_path / "parts.exr"
-    write_parts(path, [Part("left", rgb_channels(image)), Part("right", rgb_channels(-image))])
+    write_parts(
+        path, [ExrPart("left", rgb_channels(image)), ExrPart("right", rgb_channels(-image))]
+    )
     with pytest.raises(ImageError, match=r"parts\.exr has 2 layers \(left, right\).*layer=\.\.\."):
         read_target(path)
     np.testing.assert_array_equal(read_target(path, layer="right").image, -image)
@@ -269,6 +271,6 @@ def test_a_cropped_or_padded_picture_lies_where_it_was_painted(
     np.testing.assert_array_equal(target.image[inside][:, 0], y[inside])
     np.testing.assert_array_equal(target.image[inside][:, 1], x[inside])
     # A mask does not paint what is not there.
-    write_parts(tmp_path / "mask.exr", [Part("", {"Y": np.full((height, width), 0.5, "f4")})])
+    write_parts(tmp_path / "mask.exr", [ExrPart("", {"Y": np.full((height, width), 0.5, "f4")})])
     target = read_target(tmp_path / "cropped.exr", mask=tmp_path / "mask.exr")
     np.testing.assert_array_equal(target.importance, 0.5 * inside)

@@ -16,7 +16,7 @@ from lightpaint.basis.lightgroups.folder import files_in
 from lightpaint.basis.lightgroups.naming import short_names
 from lightpaint.colour.primaries import are_same, converted, to_rec709
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.images.formats.exr import Part, read_parts
+from lightpaint.images.formats.exr import ExrPart, read_parts
 from lightpaint.images.formats.exr_layers import (
     ALPHA_NAMES,
     channel_named,
@@ -147,7 +147,7 @@ def _of_file(path: Path) -> list[RenderLayer]:
     return layers
 
 
-def _primaries(path: Path, part: Part) -> tuple[float, ...] | None:
+def _primaries(path: Path, part: ExrPart) -> tuple[float, ...] | None:
     """Those that the part declares, unless they are Rec.709's. Raises ImageError if unknown."""
     try:
         return primaries_of(part)

@@ -72,7 +72,7 @@ def packed(errand: Errand, contents: Contents, *, run: str, is_shared: bool) -> 
     return Parcel(errand, files, carried, os.getcwd(), is_shared, run)
 
 
-class Store:
+class ParcelStore:
     """The files of a worker, in `folder`, which nobody else uses."""
 
     def __init__(self, folder: Path) -> None:

@@ -11,10 +11,10 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from lightpaint.batch.cluster.parcels import Parcel, Store
+from lightpaint.batch.cluster.parcels import Parcel, ParcelStore
 from lightpaint.batch.work.work import do
 from lightpaint.batch.work.work_items import Done, spoken
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.version import __version__
@@ -40,13 +40,13 @@ class _Here:
 
     def __init__(self) -> None:
         self.thread = ThreadPoolExecutor(1, "lightpaint")
-        self.held, self.run = Held(), ""
-        self.stores: dict[str, Store] = {}
+        self.held, self.run = WorkerCache(), ""
+        self.stores: dict[str, ParcelStore] = {}
 
-    def store(self, worker: Any) -> Store:
+    def store(self, worker: Any) -> ParcelStore:
         """The files of that worker; they are deleted with its folder."""
         folder = str(worker.local_directory)
-        return self.stores.setdefault(folder, Store(Path(folder) / "lightpaint"))
+        return self.stores.setdefault(folder, ParcelStore(Path(folder) / "lightpaint"))
 
 
 _HERE = _Here()
@@ -79,7 +79,7 @@ def _do(parcel: Parcel, worker: Any) -> Done | list[str]:
     if _HERE.run != parcel.run:
         # Files of another batch may have the same names, and are others.
         _HERE.held.rest()
-        _HERE.held, _HERE.run = Held(), parcel.run
+        _HERE.held, _HERE.run = WorkerCache(), parcel.run
         threadpool_limits(worker.state.nthreads, "blas")
         limit_threads(worker.state.nthreads)
         _keep_memory()

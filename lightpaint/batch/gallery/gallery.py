@@ -25,7 +25,7 @@ from lightpaint.batch.gallery.summary import (
     view_folders,
 )
 from lightpaint.batch.manifest.folder_names import FILES
-from lightpaint.batch.plan.journal import Line
+from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan
 from lightpaint.batch.work.task import Kind
 from lightpaint.errors import OutputError
@@ -53,7 +53,9 @@ def check_gallery(folder: Path, *, force: bool = False) -> None:
         )
 
 
-def write_gallery(folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
+def write_gallery(
+    folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]
+) -> list[Row]:
     """Write index.html, contact.png, summary.csv and summary.json of what there is by now.
 
     Returns the rows, failures first.

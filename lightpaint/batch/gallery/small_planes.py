@@ -16,7 +16,7 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import fields_of
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, write_text
 from lightpaint.pipeline.sources import content
@@ -64,7 +64,7 @@ def keep_planes(folder: Path, key: str, basis: Basis) -> None:
     write_text(path, json.dumps(told, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def keep_all_planes(folder: Path, task: Task, obtained: Sequence[Basis], held: Held) -> None:
+def keep_all_planes(folder: Path, task: Task, obtained: Sequence[Basis], held: WorkerCache) -> None:
     """The same of each basis of a task. obtained: those that are no files already."""
     bases = list(obtained)
     if not bases:

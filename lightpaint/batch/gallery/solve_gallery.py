@@ -9,22 +9,22 @@ from lightpaint.basis.basis import Basis
 from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.small_planes import keep_planes
 from lightpaint.batch.gallery.summary import Row
-from lightpaint.batch.manifest.entries import Entry
-from lightpaint.batch.plan.journal import Line
-from lightpaint.batch.plan.plan import Plan, PlannedLook, Step
+from lightpaint.batch.manifest.entries import LookEntry
+from lightpaint.batch.plan.journal import JournalLine
+from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.task import Kind, Task
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 
 
-def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> Entry:
+def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookEntry:
     """What a gallery says of a look.
 
     It was solved by `job` or, where there is a `folder`, made of its answer. variation: its word.
     """
     scenes = tuple(scene for scene in job.scenes if isinstance(scene, SceneFile))
     basis = job.basis if isinstance(job.basis, BasisFile | GroupsFile) else None
-    return Entry(
+    return LookEntry(
         (folder or job.folder).name,
         "",
         scenes,
@@ -36,7 +36,7 @@ def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> Entry
 
 
 def write_gallery_of(
-    folder: Path, entries: Sequence[Entry], failed: Mapping[str, str], bases: Sequence[Basis]
+    folder: Path, entries: Sequence[LookEntry], failed: Mapping[str, str], bases: Sequence[Basis]
 ) -> list[Row]:
     """Write the gallery of the looks in `folder`, by the names of their folders there.
 
@@ -49,11 +49,11 @@ def write_gallery_of(
     for entry in entries:
         name = entry.name
         made_of = "" if name in failed else _content(folder / name / "lighting.json")
-        step = Step(Task(name, "answer", "", bases=keys), made_of, True)
+        step = PlanStep(Task(name, "answer", "", bases=keys), made_of, True)
         looks.append(PlannedLook(entry, folder / name, (step,)))
         its: tuple[str, Kind] = (name, "answer")
         state = "failed" if name in failed else "done"
-        lines[its] = Line(name, "answer", state, made_of, failed.get(name, ""))  # type: ignore[arg-type]
+        lines[its] = JournalLine(name, "answer", state, made_of, failed.get(name, ""))  # type: ignore[arg-type]
     names = frozenset(entry.name for entry in entries)
     plan = Plan(Path(folder.resolve().name), folder, tuple(looks), {}, names)
     return write_gallery(folder, plan, lines)

@@ -15,7 +15,7 @@ from PIL import Image
 
 from lightpaint.arrays import RGB
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
-from lightpaint.batch.plan.journal import Line
+from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.work.task import EXPORT, Kind
 from lightpaint.colour.display.exposure import choose_exposure
@@ -101,7 +101,7 @@ class Row:
     size: tuple[int, int] = field(default=(4, 3))
 
 
-def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
+def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[Row]:
     """A row for each view of each look, in the order of the manifest."""
     rows: list[Row] = []
     widest = WIDE if len(plan.looks) <= WIDE_LOOKS else NARROW
@@ -119,7 +119,7 @@ def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], Line]) -> list[Row]:
     return rows
 
 
-def state_of(look: PlannedLook, lines: Mapping[tuple[str, Kind], Line]) -> tuple[State, str]:
+def state_of(look: PlannedLook, lines: Mapping[tuple[str, Kind], JournalLine]) -> tuple[State, str]:
     """Whether all its steps are done, as they are asked for now; and why not."""
     state: State = "done"
     for step in look.steps:
@@ -131,7 +131,7 @@ def state_of(look: PlannedLook, lines: Mapping[tuple[str, Kind], Line]) -> tuple
     return state, ""
 
 
-def _key(look: PlannedLook, lines: Mapping[tuple[str, Kind], Line]) -> str:
+def _key(look: PlannedLook, lines: Mapping[tuple[str, Kind], JournalLine]) -> str:
     return lines[look.entry.name, "answer"].made_of[:16]
 
 

@@ -34,7 +34,7 @@ MOST_LOOKS = 10_000
 
 
 @dataclass(frozen=True)
-class Entry:
+class LookEntry:
     """One look, with all that is asked of it.
 
     name: of its folder. where: what errors call it. scenes, basis: what it is lit in. paintings:
@@ -72,20 +72,20 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Looks:
+class LookEntries:
     """All looks that tables ask for.
 
     whole: those that can be planned, in their order. rest: of each table with mistakes, what can be
     looked at all the same: its scenes, constraints and settings, without a painting.
     """
 
-    whole: list[Entry] = field(default_factory=list)
-    rest: list[tuple[Table, Entry]] = field(default_factory=list)
+    whole: list[LookEntry] = field(default_factory=list)
+    rest: list[tuple[Table, LookEntry]] = field(default_factory=list)
 
 
-def looks_of(manifest: Manifest) -> Looks:
+def looks_of(manifest: Manifest) -> LookEntries:
     """Return all looks that tables ask for; what is wrong is added to the mistakes."""
-    sources, looks = _Sources(manifest), Looks()
+    sources, looks = _Sources(manifest), LookEntries()
     for table in manifest.looks:
         made, entry = _of_look(manifest, sources, table)
         looks.whole.extend(made)
@@ -136,7 +136,7 @@ class _Sources:
 
 def _of_look(
     manifest: Manifest, sources: _Sources, table: Table
-) -> tuple[list[Entry], Entry | None]:
+) -> tuple[list[LookEntry], LookEntry | None]:
     """Return the looks that one table asks for; or, of one with mistakes, what of it is clear."""
     mistakes, where, look = manifest.mistakes, table.where, table.said
     before = len(mistakes.found)
@@ -144,7 +144,7 @@ def _of_look(
     check_files(manifest, table)
     check_wanted(mistakes, table)
     is_given = table.has("lighting", "lightings")
-    entry = Entry(
+    entry = LookEntry(
         look.get("name", ""),
         where,
         constraints=constraints_of(manifest, where, look),
@@ -153,7 +153,7 @@ def _of_look(
         final=mistakes.final(look.get("render", {}), where),
         handover=mistakes.handover(look.get("export", {}), where, manifest.folder),
     )
-    made: list[Entry] = []
+    made: list[LookEntry] = []
     try:
         _painting(manifest, look, "")  # its view is looked at, whatever else is wrong
         if len(mistakes.found) == before and not table.unclear:
@@ -173,7 +173,9 @@ def _of_look(
     return [], shown
 
 
-def _what_is_clear(manifest: Manifest, sources: _Sources, table: Table, entry: Entry) -> Entry:
+def _what_is_clear(
+    manifest: Manifest, sources: _Sources, table: Table, entry: LookEntry
+) -> LookEntry:
     """Return the scenes and the basis of a table with mistakes, as far as they follow from it."""
     look, base = table.said, manifest.folder
     # Another sensor, or none, is as good to look at the lights of a scene.
@@ -190,8 +192,8 @@ def _what_is_clear(manifest: Manifest, sources: _Sources, table: Table, entry: E
 
 
 def _of_subject(
-    manifest: Manifest, sources: _Sources, entry: Entry, look: Mapping[str, Any]
-) -> Iterator[Entry]:
+    manifest: Manifest, sources: _Sources, entry: LookEntry, look: Mapping[str, Any]
+) -> Iterator[LookEntry]:
     """A look for each painting or lighting, through each sensor."""
     if "views" in look:
         views = look["views"]
@@ -235,7 +237,7 @@ def _painting(manifest: Manifest, look: Mapping[str, Any], file: str) -> Paintin
     return Painting(file, transform=transform, **said)
 
 
-def _varied(entry: Entry, word: str) -> Entry:
+def _varied(entry: LookEntry, word: str) -> LookEntry:
     """A sibling of a look: solved otherwise, or made of its answer."""
     named = replace(entry, name=f"{entry.name}-{word.replace(' ', '-')}", variation=word)
     if word not in SHIFTED:

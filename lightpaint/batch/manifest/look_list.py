@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from lightpaint.batch.manifest.checks import SHOWN, check_handover, check_sequence, check_wanted
-from lightpaint.batch.manifest.entries import MOST_LOOKS, Entry, Looks, looks_of
+from lightpaint.batch.manifest.entries import MOST_LOOKS, LookEntries, LookEntry, looks_of
 from lightpaint.batch.manifest.folder_names import is_reserved, name_clashes
 from lightpaint.batch.manifest.keys import MOST_FRAMES, Mistakes
 from lightpaint.batch.manifest.manifest import Manifest, Table
@@ -14,7 +14,7 @@ from lightpaint.errors import BatchError
 from lightpaint.screen import some_names
 
 
-def entries_of(manifest: Manifest) -> Looks:
+def entries_of(manifest: Manifest) -> LookEntries:
     """Return all looks in the order of the manifest; what is wrong is added to its mistakes."""
     looks = looks_of(manifest)
     for table in manifest.sequences:
@@ -29,7 +29,7 @@ def entries_of(manifest: Manifest) -> Looks:
     return looks
 
 
-def _check_names(manifest: Manifest, looks: Sequence[Entry]) -> None:
+def _check_names(manifest: Manifest, looks: Sequence[LookEntry]) -> None:
     """Add to the mistakes each look whose folder another look, or the batch itself, would use."""
     for look in looks:
         if is_reserved(look.name):
@@ -50,7 +50,7 @@ def _check_names(manifest: Manifest, looks: Sequence[Entry]) -> None:
         manifest.mistakes.add(wheres, said)
 
 
-def _of_sequence(manifest: Manifest, looks: Looks, table: Table) -> list[Entry]:
+def _of_sequence(manifest: Manifest, looks: LookEntries, table: Table) -> list[LookEntry]:
     """Return a look for each frame; none of a sequence with mistakes."""
     mistakes, where, said = manifest.mistakes, table.where, table.said
     by_name = {look.name: look for look in looks.whole}
@@ -78,7 +78,7 @@ def _of_sequence(manifest: Manifest, looks: Looks, table: Table) -> list[Entry]:
 
 
 def _check_ends(
-    mistakes: Mistakes, where: str, ends: Sequence[Entry], said: Mapping[str, Any]
+    mistakes: Mistakes, where: str, ends: Sequence[LookEntry], said: Mapping[str, Any]
 ) -> None:
     """Add why there is nothing between the looks that a sequence goes through."""
     path = said.get("sensors")
@@ -90,14 +90,14 @@ def _check_ends(
         mistakes.add(where, "through: a look of several views has no one picture: take single ones")
 
 
-def _may_make(name: str, entry: Entry) -> bool:
+def _may_make(name: str, entry: LookEntry) -> bool:
     """Return whether a table might make a look of that name without its mistakes."""
     if not entry.name:
         return True
     return name == entry.name or name.startswith(f"{entry.name}-")
 
 
-def _frames(said: Mapping[str, Any], ends: Sequence[Entry]) -> Iterator[Entry]:
+def _frames(said: Mapping[str, Any], ends: Sequence[LookEntry]) -> Iterator[LookEntry]:
     """Each frame: what lies between two of `ends`, seen as they are or by its place on a path."""
     path, through = said.get("sensors"), said["through"]
     frames = len(path) if path else said["frames"]
@@ -119,7 +119,7 @@ def _frames(said: Mapping[str, Any], ends: Sequence[Entry]) -> Iterator[Entry]:
         )
 
 
-def _place(entry: Entry, path: Sequence[str] | None) -> tuple[Any, ...]:
+def _place(entry: LookEntry, path: Sequence[str] | None) -> tuple[Any, ...]:
     """What two looks of one sequence have in common. path: of sensors, which theirs give way to."""
     if path:
         return tuple(replace(scene, sensor=None) for scene in entry.scenes[:1]), entry.basis

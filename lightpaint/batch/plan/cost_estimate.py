@@ -21,7 +21,7 @@ SAVED = Cost("", 12, (360, 640), 0, 0)
 
 
 @dataclass(frozen=True)
-class Estimate:
+class CostEstimate:
     """Seconds of bases and of looks, those of final renders among them; bytes at the peak."""
 
     bases_s: float
@@ -29,7 +29,7 @@ class Estimate:
     memory: int
 
 
-def estimate(plan: Plan) -> Estimate:
+def estimate(plan: Plan) -> CostEstimate:
     """Of what is left of `plan`, if no basis is kept."""
     left = [look for look in plan.chosen_looks if not look.failure and not look.is_done]
     needed = dict.fromkeys(
@@ -41,7 +41,7 @@ def estimate(plan: Plan) -> Estimate:
         if key in plan.costs
     )
     costs = [plan.costs[key] for key in needed]
-    return Estimate(
+    return CostEstimate(
         sum(rendered_s(cost.samples, cost.lights) for cost in costs),
         sum(look_s(look, plan) for look in left),
         max((cost.memory for cost in costs), default=0),

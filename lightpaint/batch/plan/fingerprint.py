@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Final, Handover
 from lightpaint.errors import OutputError
 from lightpaint.version import __version__
@@ -22,7 +22,7 @@ class Fingerprints:
         self._sums: dict[Path, str] = {}
         self._answers: dict[str, str] = {}
 
-    def answer(self, entry: Entry, reads: Sequence[Path]) -> str:
+    def answer(self, entry: LookEntry, reads: Sequence[Path]) -> str:
         """Of all that goes into an answer; looks that it is made of have been asked for before.
 
         reads: files whose content counts. Raises OutputError for one that cannot be read.
@@ -38,11 +38,11 @@ class Fingerprints:
         self._answers[entry.name] = _sum(json.dumps(made_of, default=str))
         return self._answers[entry.name]
 
-    def render(self, entry: Entry) -> str:
+    def render(self, entry: LookEntry) -> str:
         """Of all that goes into a final render."""
         return _sum(json.dumps([self._answers[entry.name], asdict(entry.final)]))
 
-    def export(self, entry: Entry) -> str:
+    def export(self, entry: LookEntry) -> str:
         """Of all that other programs get."""
         stage = [self._content(Path(entry.handover.stage))] if entry.handover.stage else []
         told = _relative(asdict(entry.handover), self._base)

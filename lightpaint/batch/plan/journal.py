@@ -25,7 +25,7 @@ MAX_BYTES = 2**28
 
 
 @dataclass(frozen=True)
-class Line:
+class JournalLine:
     """A step that was done, or that failed. made_of: fingerprint of all that went in."""
 
     look: str
@@ -56,11 +56,11 @@ class Journal:
         self._half, self._lacks_end = own.half, own.lacks_end
 
     @property
-    def lines(self) -> Mapping[tuple[str, Kind], Line]:
+    def lines(self) -> Mapping[tuple[str, Kind], JournalLine]:
         """The last of each look and step."""
         return self._lines
 
-    def add(self, line: Line) -> None:
+    def add(self, line: JournalLine) -> None:
         """Keep a line, whatever comes. Raises OutputError where the disk does not take it."""
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
@@ -86,7 +86,7 @@ class Journal:
         self._half, self._lacks_end = None, False
 
 
-def _text(line: Line) -> str:
+def _text(line: JournalLine) -> str:
     return json.dumps(asdict(line), ensure_ascii=False) + "\n"
 
 
@@ -103,7 +103,7 @@ class _Read:
     lacks_end: whether nothing but its end is missing of the last one.
     """
 
-    lines: tuple[Line, ...] = ()
+    lines: tuple[JournalLine, ...] = ()
     damaged: int = 0
     half: int | None = None
     lacks_end: bool = False
@@ -129,9 +129,9 @@ def _read(path: Path) -> _Read:
     return _Read(tuple(x for x in (*found, end) if x), damaged, half, end is not None)
 
 
-def _line(row: bytes) -> Line | None:
+def _line(row: bytes) -> JournalLine | None:
     """Return the line that a row is, or None."""
     try:
-        return read_record(Line, strict_json(row.decode("utf-8-sig")))
+        return read_record(JournalLine, strict_json(row.decode("utf-8-sig")))
     except (LightpaintError, ValueError, RecursionError):
         return None

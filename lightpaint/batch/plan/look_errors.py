@@ -8,9 +8,9 @@ from typing import Any
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.render import basis_lights
-from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Mistakes
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import ALONE, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduction import reduce_to
@@ -18,7 +18,7 @@ from lightpaint.pipeline.sources import check_nothing_idle, content
 from lightpaint.scene.presets import on_film
 
 
-def look_over(entry: Entry, held: Held, mistakes: Mistakes) -> None:
+def look_over(entry: LookEntry, held: WorkerCache, mistakes: Mistakes) -> None:
     """Add what is wrong with scene, sensors, settings and constraints, each looked at alone.
 
     held: scenes and bases, so that none is loaded for this that is there. What fails one look

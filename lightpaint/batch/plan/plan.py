@@ -5,15 +5,15 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.work.task import Kind, Task
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BatchError
 from lightpaint.screen import some_names
 
 
 @dataclass(frozen=True)
-class Step:
+class PlanStep:
     """One step of one look. made_of: fingerprint of all that goes in. is_done: earlier."""
 
     task: Task
@@ -25,9 +25,9 @@ class Step:
 class PlannedLook:
     """One look. failure: why it cannot be done; it is the only one. remarks: worth knowing."""
 
-    entry: Entry
+    entry: LookEntry
     folder: Path
-    steps: tuple[Step, ...]
+    steps: tuple[PlanStep, ...]
     failure: str = ""
     remarks: tuple[str, ...] = ()
 
@@ -66,7 +66,7 @@ class Plan:
     looks: tuple[PlannedLook, ...]
     costs: Mapping[str, Cost]
     chosen: frozenset[str]
-    held: Held = field(default_factory=Held, repr=False, compare=False)
+    held: WorkerCache = field(default_factory=WorkerCache, repr=False, compare=False)
     remarks: tuple[str, ...] = ()
 
     @property
@@ -96,7 +96,7 @@ class Plan:
         return replace(self, chosen=frozenset(wanted))
 
 
-def by_bases(steps: Sequence[Step], looks: Mapping[str, PlannedLook]) -> list[list[Step]]:
+def by_bases(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> list[list[PlanStep]]:
     """Steps together that share their bases, after all that they are made of through others."""
     left, groups = list(steps), []
     while left:
@@ -115,7 +115,7 @@ def by_bases(steps: Sequence[Step], looks: Mapping[str, PlannedLook]) -> list[li
     return groups
 
 
-def waves(steps: Sequence[Step], looks: Mapping[str, PlannedLook]) -> list[list[Step]]:
+def waves(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> list[list[PlanStep]]:
     """Steps that wait for none of the others; those that wait for these; and so on."""
     left, found = list(steps), []
     while left:

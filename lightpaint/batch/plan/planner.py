@@ -10,7 +10,7 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.batch.gallery.gallery import check_gallery
-from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.manifest.look_list import entries_of
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
@@ -18,10 +18,10 @@ from lightpaint.batch.manifest.variations import varied
 from lightpaint.batch.plan.fingerprint import Fingerprints
 from lightpaint.batch.plan.journal import Journal
 from lightpaint.batch.plan.look_errors import look_over
-from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook, Step
+from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.derived_looks import adjusted, made_folder
 from lightpaint.batch.work.task import EXPORT, answer_task, bases_of, export_task, render_task
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import ALONE, BatchError, LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -76,7 +76,7 @@ class _Planner:
         self,
         manifest: Manifest,
         folder: Path,
-        entries: Sequence[Entry],
+        entries: Sequence[LookEntry],
         *,
         force: bool,
         command: str,
@@ -84,12 +84,12 @@ class _Planner:
         self._mistakes: Mistakes = manifest.mistakes
         self._force, self._command = force, command
         self._folders = {entry.name: folder / entry.name for entry in entries}
-        self.held, self.journal = Held(), Journal(folder)
+        self.held, self.journal = WorkerCache(), Journal(folder)
         self._prints = Fingerprints(manifest.folder)
         self._failed: set[str] = set()
         self.costs: dict[str, Cost] = {}
 
-    def planned(self, entry: Entry) -> PlannedLook:
+    def planned(self, entry: LookEntry) -> PlannedLook:
         """What is to be done for one look. What is wrong with the manifest is added to its
         mistakes; what is wrong with the look's own files is its failure.
         """
@@ -111,11 +111,13 @@ class _Planner:
         steps = self._steps(entry, reads if not failure else (), is_possible=not failure)
         return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
 
-    def look_over(self, entry: Entry) -> None:
+    def look_over(self, entry: LookEntry) -> None:
         """Add all mistakes of a look that cannot be planned, of which one would hide the others."""
         look_over(entry, self.held, self._mistakes)
 
-    def _steps(self, entry: Entry, reads: Sequence[Path], *, is_possible: bool) -> tuple[Step, ...]:
+    def _steps(
+        self, entry: LookEntry, reads: Sequence[Path], *, is_possible: bool
+    ) -> tuple[PlanStep, ...]:
         """The answer, and its render and what other programs get, if that is wanted."""
         how: dict[str, Any] = {"force": self._force, "command": self._command, "reads": reads}
         tasks = [answer_task(entry, self._folders, **how)]
@@ -136,10 +138,10 @@ class _Planner:
             is_whole = is_whole and is_done
             if task.kind == "export":
                 is_whole = is_whole and is_as_written(folder / EXPORT)
-            steps.append(Step(task, its, is_whole))
+            steps.append(PlanStep(task, its, is_whole))
         return tuple(steps)
 
-    def _looked_at(self, entry: Entry) -> tuple[Entry, tuple[Path, ...], tuple[str, ...]]:
+    def _looked_at(self, entry: LookEntry) -> tuple[LookEntry, tuple[Path, ...], tuple[str, ...]]:
         """With all decided that follows from its files; what it reads; what is worth saying."""
         scenes = tuple(map(self.held.scene, entry.scenes))
         # Of saved bases no more than one is held, and by no look.
@@ -164,7 +166,7 @@ class _Planner:
 
     def _job(
         self,
-        entry: Entry,
+        entry: LookEntry,
         scenes: Sequence[Any],
         basis: Any,
         settings: Settings,
@@ -176,7 +178,7 @@ class _Planner:
         folder = self._folders[entry.name]
         return Job(tuple(scenes), paintings, folder, basis, asked, settings, entry.by_sensor)
 
-    def _made(self, entry: Entry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    def _made(self, entry: LookEntry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
         """Of a look that is made of lightings: those of files are looked at."""
         scenes: list[Scene] = [file.content for file in entry.scenes]
         scene = scenes[0] if scenes else None
@@ -213,7 +215,9 @@ class _Planner:
             on_film(scene, None, entry.final.resolution)
         return reads, ()
 
-    def _note_costs(self, entry: Entry, films: Sequence[Scene | None], settings: Settings) -> None:
+    def _note_costs(
+        self, entry: LookEntry, films: Sequence[Scene | None], settings: Settings
+    ) -> None:
         """What each basis costs that is to be obtained. films: on which it is rendered."""
         if entry.basis is not None:
             return

@@ -16,7 +16,7 @@ from lightpaint.basis.render.render import (
 from lightpaint.batch.plan.cost_estimate import rendered_s
 from lightpaint.batch.work.engine import Engine
 from lightpaint.batch.work.spool import Spool
-from lightpaint.batch.work.work_items import Film, Lesson, PartOfBasis
+from lightpaint.batch.work.work_items import Lesson, PartOfBasis, SceneFilm
 from lightpaint.errors import BasisError
 from lightpaint.progress import Progress
 from lightpaint.scene.scene import Scene
@@ -25,7 +25,7 @@ from lightpaint.scene.scene import Scene
 class InParts:
     """Renders bases of one film by an engine: a `render_basis` for `obtain_basis`."""
 
-    def __init__(self, engine: Engine, film: Film) -> None:
+    def __init__(self, engine: Engine, film: SceneFilm) -> None:
         self._engine = engine
         self._film = film.unread()
 
@@ -93,7 +93,7 @@ class InParts:
 
 def lesson_by(
     engine: Engine,
-    film: Film,
+    film: SceneFilm,
     scene: Scene,
     spp: int,
     seed: int,

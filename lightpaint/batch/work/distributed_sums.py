@@ -13,8 +13,8 @@ from lightpaint.batch.work.spool import Spool
 from lightpaint.batch.work.sums_answer import leave_lights
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import attempted, fields_of
-from lightpaint.batch.work.work_items import Done, Film, SumsOfRows, Wanted
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.work_items import Done, PaintingOfSums, SceneFilm, SumsOfRows
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BasisError
 from lightpaint.lighting.problem_sums import Sums
 from lightpaint.pipeline.job import Job
@@ -24,7 +24,7 @@ from lightpaint.scene.presets import samples
 
 
 def solved_by_sums(
-    tasks: Sequence[Task], engine: Engine, held: Held, listen: Listener
+    tasks: Sequence[Task], engine: Engine, held: WorkerCache, listen: Listener
 ) -> list[Done]:
     """Do looks that share one basis, of which nothing but the lighting is wanted."""
     jobs: list[Job] = []
@@ -52,7 +52,7 @@ def solved_by_sums(
 
 
 def _rendered(
-    task: Task, jobs: Sequence[Job], engine: Engine, held: Held, listen: Listener
+    task: Task, jobs: Sequence[Job], engine: Engine, held: WorkerCache, listen: Listener
 ) -> list[Sums]:
     """The sums of each job's problem, over all rows in their order."""
     scene, settings = jobs[0].views[0].scene, jobs[0].settings
@@ -61,10 +61,12 @@ def _rendered(
     spp = scene.spp if asked is None else asked
     parts = plan_parts(scene, spp)
     file = replace(fields_of(task, held)["scenes"][0])
-    film = Film(file, settings.quality, settings.resolution, tuple(map(str, scene.read_files)))
+    film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, scene.read_files)))
     spool = Spool(scene, parts, seed=settings.seed, start=None)
     lesson_by(engine, film, scene, spp, settings.seed, None, spool)
-    paintings = tuple(Wanted(_file_of(job), job.fit.emitters, job.settings.resize) for job in jobs)
+    paintings = tuple(
+        PaintingOfSums(_file_of(job), job.fit.emitters, job.settings.resize) for job in jobs
+    )
     reads = tuple(dict.fromkeys(str(x) for job in jobs for x in job.views[0].target.files))
     tiles: dict[tuple[int, int], list[Part]] = {}
     for part in sorted(parts, key=lambda part: (part.top, part.half, part.first)):

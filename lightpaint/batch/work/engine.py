@@ -5,7 +5,7 @@ from typing import Protocol
 
 from lightpaint.batch.work.work import do
 from lightpaint.batch.work.work_items import Done, Errand
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener
 
 #: How often an errand is given to a worker, where workers die over it.
@@ -44,7 +44,7 @@ class InProcess:
     is_gone = False
     workers = 1
 
-    def __init__(self, held: Held, listen: Listener) -> None:
+    def __init__(self, held: WorkerCache, listen: Listener) -> None:
         self._held, self._listen = held, listen
 
     def run(self, errands: Sequence[Errand]) -> Iterator[Done]:

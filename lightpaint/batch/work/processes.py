@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from lightpaint.batch.work.engine import LOST, TRIES
 from lightpaint.batch.work.work import do
 from lightpaint.batch.work.work_items import Done, Errand, spoken
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener, silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 
@@ -109,7 +109,7 @@ class Processes:
             worker.join()
 
 
-_HELD = Held()
+_HELD = WorkerCache()
 
 
 def _begin(threads: int) -> None:

@@ -7,12 +7,12 @@ from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.render import IN_PARTS, basis_lights, origin_of
 from lightpaint.basis.render.sums import mean_and_half_difference
 from lightpaint.batch.work.work_items import SumsOfRows
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem_sums import Sums, sums_of
 
 
-def sums_of_rows(errand: SumsOfRows, held: Held) -> list[Sums]:
+def sums_of_rows(errand: SumsOfRows, held: WorkerCache) -> list[Sums]:
     """Those with each painting, of the very images that a whole basis has in these rows."""
     renderer, scene = held.renderer(errand), held.film(errand.film)
     halves: list[Any] = [None, None]

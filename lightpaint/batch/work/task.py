@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from lightpaint.batch.manifest.entries import Entry
+from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Final, Handover, Space
 from lightpaint.batch.manifest.variations import SHIFTED
 from lightpaint.batch.work.work_items import Move
@@ -110,7 +110,7 @@ class Task:
 
 
 def answer_task(
-    entry: Entry,
+    entry: LookEntry,
     folders: Mapping[str, Path],
     *,
     reads: Sequence[Path] = (),
@@ -146,7 +146,7 @@ def answer_task(
 
 
 def render_task(
-    entry: Entry,
+    entry: LookEntry,
     folders: Mapping[str, Path],
     *,
     reads: Sequence[Path] = (),
@@ -160,7 +160,7 @@ def render_task(
 
 
 def export_task(
-    entry: Entry,
+    entry: LookEntry,
     folders: Mapping[str, Path],
     *,
     reads: Sequence[Path] = (),
@@ -176,7 +176,7 @@ def export_task(
     return Task(entry.name, "export", answer.job, (lighting,), answer.reads, **how)
 
 
-def bases_of(entry: Entry) -> tuple[str, ...]:
+def bases_of(entry: LookEntry) -> tuple[str, ...]:
     """The key of each basis that a look is solved with: equal keys, equal bases."""
     if entry.basis is not None:
         return (key_of_basis(entry.basis),)

@@ -18,7 +18,7 @@ from lightpaint.batch.work.row_sums import sums_of_rows
 from lightpaint.batch.work.sums_answer import answer_by_sums
 from lightpaint.batch.work.task import EXPORT, Task
 from lightpaint.batch.work.work_items import Done, Errand, Lesson, PartOfBasis, Passes, SumsOfRows
-from lightpaint.batch.work.worker_cache import Held
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line, write_text
 from lightpaint.images.estimate import Estimate
@@ -45,7 +45,7 @@ LONGEST = 600
 TOO_LARGE = "it takes more memory than there is: use resolution=... or fewer workers"
 
 
-def do(errand: Errand, held: Held, listen: Listener) -> Done:
+def do(errand: Errand, held: WorkerCache, listen: Listener) -> Done:
     """Do one errand; what prevents it is said in one line, and is its own failure alone."""
     return attempted(errand, lambda: _done(errand, held, listen))
 
@@ -69,7 +69,7 @@ def attempted(errand: Errand, work: Callable[[], Any]) -> Done:
     return Done(errand.name, errand.kind, said, full, lost, spent_s, value=value)
 
 
-def _done(errand: Errand, held: Held, listen: Listener) -> Any:
+def _done(errand: Errand, held: WorkerCache, listen: Listener) -> Any:
     """What an errand comes to, if that is not a folder that was filled."""
     if isinstance(errand, Lesson):
         held.rest()
@@ -98,7 +98,7 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__ or error.__context__
 
 
-def fields_of(task: Task, held: Held) -> dict[str, Any]:
+def fields_of(task: Task, held: WorkerCache) -> dict[str, Any]:
     """Those of the task's job, with scenes and basis shared."""
     fields = from_json(task.job)
     fields["scenes"] = tuple(map(held.scene, fields["scenes"]))
@@ -107,7 +107,7 @@ def fields_of(task: Task, held: Held) -> dict[str, Any]:
     return fields
 
 
-def _answer(task: Task, held: Held, listen: Listener) -> None:
+def _answer(task: Task, held: WorkerCache, listen: Listener) -> None:
     fields = fields_of(task, held)
     for key, file in zip(task.bases, task.files, strict=True):
         held.read(key, file)
@@ -124,7 +124,7 @@ def _answer(task: Task, held: Held, listen: Listener) -> None:
     run(job, listen, bases=bases)
 
 
-def _made(task: Task, fields: dict[str, Any], held: Held, listen: Listener) -> None:
+def _made(task: Task, fields: dict[str, Any], held: WorkerCache, listen: Listener) -> None:
     """An answer that is made of others: a lighting as it is, warmer, or between two."""
     settings: Settings = fields["settings"]
     scenes: list[Scene] = [file.content for file in fields["scenes"]]
@@ -154,7 +154,7 @@ def made_of(files: tuple[str, ...], basis: Basis, *, share: float, space: Space)
 
 def final_render(
     task: Task,
-    held: Held,
+    held: WorkerCache,
     listen: Listener,
     rendered: Callable[[Scene], Estimate] | None = None,
 ) -> None:
@@ -180,7 +180,7 @@ def final_render(
     )
 
 
-def _export(task: Task, held: Held, listen: Listener) -> None:
+def _export(task: Task, held: WorkerCache, listen: Listener) -> None:
     """What other programs get of a look that is answered."""
     fields = fields_of(task, held)
     lighting, folder = Path(task.lightings[0]), fields["folder"] / EXPORT

@@ -77,7 +77,7 @@ class Done:
 
 
 @dataclass(frozen=True)
-class Film:
+class SceneFilm:
     """A scene by its file, on the film that its basis is rendered on. files: all it is made of."""
 
     scene: SceneFile
@@ -85,13 +85,13 @@ class Film:
     resolution: str | None = None
     files: tuple[str, ...] = ()
 
-    def moved(self, move: Move) -> "Film":
+    def moved(self, move: Move) -> "SceneFilm":
         """The same by other paths."""
         return replace(
             self, scene=moved_scene(self.scene, move), files=tuple(map(move, self.files))
         )
 
-    def unread(self) -> "Film":
+    def unread(self) -> "SceneFilm":
         """Return the same, of which nothing is loaded yet."""
         return replace(self, scene=self.scene.unread())
 
@@ -106,7 +106,7 @@ class Lesson:
     """What parts of a basis choose emitters by is learned. spp: that they come to."""
 
     name: str
-    film: Film
+    film: SceneFilm
     spp: int
     seed: int
     expected_s: float
@@ -129,7 +129,7 @@ class PartOfBasis:
     """A part of a basis is rendered. learned: file of what the lesson came to; "" if nothing is."""
 
     name: str
-    film: Film
+    film: SceneFilm
     part: Part
     seed: int
     learned: str
@@ -154,14 +154,14 @@ class PartOfBasis:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class PaintingOfSums:
     """A painting that sums are wanted with. emitters: as of `Fit`; resize: as of `Settings`."""
 
     painting: Painting
     emitters: Emitters
     resize: bool
 
-    def moved(self, move: Move) -> "Wanted":
+    def moved(self, move: Move) -> "PaintingOfSums":
         """The same by other paths."""
         its = self.painting
         paths: dict[str, Any] = {
@@ -179,11 +179,11 @@ class SumsOfRows:
     """
 
     name: str
-    film: Film
+    film: SceneFilm
     parts: tuple[Part, ...]
     seed: int
     learned: str
-    paintings: tuple[Wanted, ...]
+    paintings: tuple[PaintingOfSums, ...]
     files: tuple[str, ...]
     expected_s: float
     kind: Literal["rows"] = "rows"

@@ -8,14 +8,20 @@ from lightpaint.basis.render.parts import PartRenderer
 from lightpaint.batch.work.render_passes import Frame
 from lightpaint.batch.work.spool import read_lesson
 from lightpaint.batch.work.task import key_of_basis
-from lightpaint.batch.work.work_items import Film, PartOfBasis, Passes, SumsOfRows, Wanted
+from lightpaint.batch.work.work_items import (
+    PaintingOfSums,
+    PartOfBasis,
+    Passes,
+    SceneFilm,
+    SumsOfRows,
+)
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.scene.presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
 
 
-class Held:
+class WorkerCache:
     """Scenes and bases that several looks share, each loaded or rendered once in this process."""
 
     def __init__(self) -> None:
@@ -47,7 +53,7 @@ class Held:
         if file and key not in self._bases:
             self._bases[key] = read_basis(file)
 
-    def film(self, film: Film) -> Scene:
+    def film(self, film: SceneFilm) -> Scene:
         """The scene on it."""
         return on_film(self.scene(film.scene).content, film.quality, film.resolution)
 
@@ -66,11 +72,11 @@ class Held:
         key = repr((errand.relit, errand.final))
         if not isinstance(self._renderer, Frame) or self._rendered != key:
             self.rest()
-            scene = self.film(Film(errand.relit, None, errand.final.resolution))
+            scene = self.film(SceneFilm(errand.relit, None, errand.final.resolution))
             self._renderer, self._rendered = Frame(scene, errand.final), key
         return self._renderer
 
-    def target(self, wanted: Wanted, size: tuple[int, int]) -> Target:
+    def target(self, wanted: PaintingOfSums, size: tuple[int, int]) -> Target:
         """A painting at the size of its basis, read once."""
         key = repr((wanted, size))
         if key not in self._targets:

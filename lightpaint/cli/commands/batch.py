@@ -15,11 +15,10 @@ from lightpaint.batch.plan.openjd import LOOK, write_openjd
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.run_options import How
-from lightpaint.batch.run_options import Outcome as BatchOutcome
+from lightpaint.batch.run_options import BatchOutcome, How
 from lightpaint.batch.work.work_items import Done
 from lightpaint.cli.output import documents, terminal
-from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import called
 from lightpaint.screen import some_of, visible
@@ -39,14 +38,14 @@ def batch(
     how: How,
     force: bool,
     log: Path | None,
-) -> Outcome:
+) -> CommandOutcome:
     """`lightpaint batch looks.toml -o DIR`, or `--init SCENE PAINTING...`"""
     if is_first:
         made = output or Path("looks.toml")
         write_first(made, paths[0], paths[1:], force=force)
         terminal.write(f"{made}: {len(paths) - 1} looks; what runs them is")
         terminal.write(f"lightpaint batch {shlex.quote(str(made))}")
-        return Outcome(lambda: {"manifest": str(made), "looks": len(paths) - 1})
+        return CommandOutcome(lambda: {"manifest": str(made), "looks": len(paths) - 1})
     if form is not None and len(paths) != 2:
         raise BatchError("where is the job to go? give looks.toml --export openjd DIR")
     if form is None and len(paths) > 1:
@@ -66,7 +65,7 @@ def batch(
         terminal.say(remark)
     if len(remarks) > LISTED:
         terminal.say(f"and {len(remarks) - LISTED} more remarks, each when its look is done")
-    listen = terminal.Listener()
+    listen = terminal.TerminalListener()
     note = _log(log)
     note(f"{command}: {len(planned.chosen_looks)} looks")
 
@@ -87,15 +86,15 @@ def batch(
     return _told(planned, outcome)
 
 
-def _exported(planned: Plan, folder: Path, *, force: bool) -> Outcome:
+def _exported(planned: Plan, folder: Path, *, force: bool) -> CommandOutcome:
     """A job for a farm, and how it is run here."""
     path = write_openjd(folder, planned, only=("--only", LOOK, "--apart"), force=force)
     terminal.write(f"{path}: {len(planned.chosen_looks)} looks; what runs them here is")
     terminal.write(f"openjd run {shlex.quote(str(path))}")
-    return Outcome(lambda: documents.files_document(folder, [path]))
+    return CommandOutcome(lambda: documents.files_document(folder, [path]))
 
 
-def _told(planned: Plan, outcome: BatchOutcome) -> Outcome:
+def _told(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
     """What a run came to, for people and programs."""
     _show(planned, outcome.rows)
     folder = planned.folder
@@ -109,7 +108,7 @@ def _told(planned: Plan, outcome: BatchOutcome) -> Outcome:
         terminal.complain("batch", f"stopped: {some_of(outcome.waiting)} not begun")
     if outcome.rows:
         terminal.write(f"{folder / FILES[0]}: {spoken_counts(outcome.rows)}")
-    return Outcome(
+    return CommandOutcome(
         lambda: {
             "folder": str(folder),
             "files": [str(folder / name) for name in FILES if outcome.rows],
@@ -132,7 +131,7 @@ def _show(planned: Plan, rows: list[Row]) -> None:
     terminal.print_table(table)
 
 
-def _dry(planned: Plan) -> Outcome:
+def _dry(planned: Plan) -> CommandOutcome:
     """What would be done, and what that takes; nothing is."""
     table, looks = terminal.table("look", "what", "of"), []
     for look in planned.chosen_looks:
@@ -150,7 +149,7 @@ def _dry(planned: Plan) -> Outcome:
     failed = [look.entry.name for look in planned.chosen_looks if look.failure]
     if failed:
         terminal.complain("batch", f"cannot be done: {some_of(failed)}")
-    return Outcome(lambda: {"looks": looks, **vars(needed)}, 1 if failed else 0)
+    return CommandOutcome(lambda: {"looks": looks, **vars(needed)}, 1 if failed else 0)
 
 
 def spoken_time(seconds: float) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lightpaint.cli.output import documents, terminal
-from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_text
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -22,11 +22,11 @@ def export(
     stage: Path | None,
     output: Path | None,
     force: bool,
-) -> Outcome:
+) -> CommandOutcome:
     """`lightpaint export lighting.json --to FORM,FORM -o DIR`"""
     finish(lighting.parent)
     answer, folder = read_lighting(lighting), output or lighting.parent
-    source, listen = Source(content(scene), content(groups), stage), terminal.Listener()
+    source, listen = Source(content(scene), content(groups), stage), terminal.TerminalListener()
     names = names_of_forms(to, source)
     writers, remark = writers_of(names, answer, source, folder, listen)
     made = {folder / name: make for name, make in writers.items()}
@@ -41,4 +41,4 @@ def export(
     if remark:
         listen.say(remark)
     files = list(made)
-    return Outcome(lambda: documents.files_document(folder, files, lighting=str(lighting)))
+    return CommandOutcome(lambda: documents.files_document(folder, files, lighting=str(lighting)))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from lightpaint.cli.output import documents, tables, terminal
-from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import BackendError, OutputError
 from lightpaint.pipeline.remarks import remarks_of_scene
 from lightpaint.pipeline.renders import check_sheet, render_sheet
@@ -19,7 +19,7 @@ def lights(
     sheet: Path | None,
     is_asked: bool = True,
     force: bool = False,
-) -> Outcome:
+) -> CommandOutcome:
     """`lightpaint lights SCENE`
 
     sheet: where what each does is drawn, if anywhere. is_asked: whether somebody named that place;
@@ -34,14 +34,14 @@ def lights(
     tables.show_lights(loaded, cd_per_unit)
     is_drawn = sheet is not None and _is_drawn(loaded, sheet, is_asked=is_asked, force=force)
     drawn = {"sheet": str(sheet)} if is_drawn else {}
-    return Outcome(lambda: {**documents.lights_document(loaded, cd_per_unit), **drawn})
+    return CommandOutcome(lambda: {**documents.lights_document(loaded, cd_per_unit), **drawn})
 
 
 def _is_drawn(scene: Scene, sheet: Path, *, is_asked: bool, force: bool) -> bool:
     """Whether the sheet of lights could be written; what keeps it from that is said."""
     try:
         check_sheet(scene, sheet, force=force)
-        with terminal.Listener() as listen:
+        with terminal.TerminalListener() as listen:
             why = render_sheet(scene, sheet, listen)
     except (OutputError, BackendError) as error:
         if is_asked and isinstance(error, OutputError):

@@ -7,12 +7,12 @@ from lightpaint.basis import cache as bases
 from lightpaint.basis.cache_folder import folder
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.output import documents, tables, terminal
-from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import BasisError
 from lightpaint.screen import some_names
 
 
-def cache(*, action: str, names: Sequence[str]) -> Outcome:
+def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
     """`lightpaint cache [list | drop NAME... | clear]`"""
     if action != "drop" and names:
         raise BasisError(f"cache {action} takes no name: cache drop {names[0]} does")
@@ -22,7 +22,7 @@ def cache(*, action: str, names: Sequence[str]) -> Outcome:
         size = sum(entry.size for entry in kept) / 1e6
         terminal.write(f"kept in {folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB")
         listed = [documents.kept_document(entry) for entry in reversed(kept)]
-        return Outcome(lambda: {**about, "kept": listed})
+        return CommandOutcome(lambda: {**about, "kept": listed})
     dropped = bases.entries() if action == "clear" else _kept_by_names(names)
     freed = bases.drop(dropped)
     if action == "clear":
@@ -31,7 +31,7 @@ def cache(*, action: str, names: Sequence[str]) -> Outcome:
         tables.show_kept(dropped)
     terminal.write(f"{len(dropped)} deleted from {folder()}: {freed / 1e6:.1f} MB are free")
     gone = [documents.kept_document(entry) for entry in dropped]
-    return Outcome(lambda: {"folder": str(folder()), "dropped": gone, "freed": freed})
+    return CommandOutcome(lambda: {"folder": str(folder()), "dropped": gone, "freed": freed})
 
 
 def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
@@ -50,7 +50,7 @@ def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
     return list(found.values())
 
 
-def doctor(*, variant: str | None) -> Outcome:
+def doctor(*, variant: str | None) -> CommandOutcome:
     """`lightpaint doctor`"""
     findings = examine(variant)
     for finding in findings:
@@ -61,4 +61,4 @@ def doctor(*, variant: str | None) -> Outcome:
         if finding.remedy:
             terminal.write(f"to mend {finding.what}: {finding.remedy}")
     terminal.write("something is missing" if missing else "everything needed is here")
-    return Outcome(lambda: documents.doctor_document(findings), 2 if missing else 0)
+    return CommandOutcome(lambda: documents.doctor_document(findings), 2 if missing else 0)

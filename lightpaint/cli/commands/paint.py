@@ -10,7 +10,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from lightpaint.cli.output import lines, terminal
-from lightpaint.cli.output.output_mode import Outcome, manner
+from lightpaint.cli.output.output_mode import CommandOutcome, manner
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -48,7 +48,7 @@ def paint(
     host: str | None,
     port: int | None,
     with_browser: bool,
-) -> Outcome:
+) -> CommandOutcome:
     """`lightpaint paint SCENE|BASIS|LIGHTS`, of one view or of several."""
     # The server and the session file bring much that no other command needs.
     from lightpaint.paint.launch import paint_in_browser, subjects_of
@@ -106,8 +106,8 @@ def paint(
         terminal.say(f"the painter has ended; what was painted is kept in {folder}")
     except OutputError as error:  # also where an interrupt has ended it
         terminal.complain("paint", str(error))
-        return Outcome(None, 2)
-    return Outcome(None)
+        return CommandOutcome(None, 2)
+    return CommandOutcome(None)
 
 
 def _say(text: str) -> None:

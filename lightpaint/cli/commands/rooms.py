@@ -12,7 +12,7 @@ from lightpaint.cli.commands.lights import note_scene
 from lightpaint.cli.commands.solve import solve
 from lightpaint.cli.options.job_options import folders_of, is_folder
 from lightpaint.cli.output import documents, tables, terminal
-from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.output.vocabulary import from_any_folder
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.demo import write_demo
@@ -48,7 +48,7 @@ from lightpaint.storage.staging import finish
 from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, files_in_the_way
 
 
-def basis(*, scene: SceneFile, output: Path, settings: Settings) -> Outcome:
+def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutcome:
     """`lightpaint basis SCENE -o F.basis.exr`"""
     if output.suffix.lower() != ".exr":
         raise OutputError(f"{output} must end in .exr, the format that is written")
@@ -56,7 +56,7 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> Outcome:
     loaded = on_film(scene.content, settings.quality, settings.resolution)
     note_scene(loaded)
     check_files([output], loaded.read_files)
-    with terminal.Listener() as listen:
+    with terminal.TerminalListener() as listen:
         of_film = remarks_of_film(loaded, settings)
         for remark in (*remarks_of_scene(loaded), *of_film, *remarks_of_memory(loaded)):
             listen.say(remark)
@@ -65,7 +65,7 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> Outcome:
     kept = " and what is kept" if made.is_fixed.any() else ""
     count = int((~made.is_fixed).sum())
     terminal.write(f"{output}: {count} lights{kept}, {made.origin.spp} samples per pixel")
-    return Outcome(lambda: documents.basis_document(output, made))
+    return CommandOutcome(lambda: documents.basis_document(output, made))
 
 
 def template(
@@ -75,7 +75,7 @@ def template(
     transform: ViewTransform | None,
     settings: Settings,
     force: bool,
-) -> Outcome:
+) -> CommandOutcome:
     """`lightpaint template SCENE|BASIS|LIGHTS -o DIR`"""
     _check_template(output, force=force)
     if not isinstance(source, SceneFile):
@@ -92,7 +92,7 @@ def template(
         "seed": settings.seed,
         "use_cache": settings.use_cache,
     }
-    with terminal.Listener() as listen:
+    with terminal.TerminalListener() as listen:
         for remark in remarks_of_scene(loaded, is_rendered=False):
             listen.say(remark)
         if is_folder(output):
@@ -107,7 +107,7 @@ def _template_of_basis(
     output: Path,
     transform: ViewTransform | None,
     settings: Settings,
-) -> Outcome:
+) -> CommandOutcome:
     """A template of what is rendered already."""
     check_nothing_idle(settings, source)
     found = source.content
@@ -123,7 +123,9 @@ def _template_of_basis(
     return _shown_template(output, files, is_denoised=made.knows_noise)
 
 
-def _shown_template(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> Outcome:
+def _shown_template(
+    output: Path, files: Sequence[Path], *, is_denoised: bool = True
+) -> CommandOutcome:
     """Return lines that say what to do with the files of a template."""
     is_tree = is_folder(output)
     picture = output / SHOWN if is_tree else output.with_suffix(".png")
@@ -132,7 +134,7 @@ def _shown_template(output: Path, files: Sequence[Path], *, is_denoised: bool = 
         terminal.write(line)
     folder = output if is_tree else output.parent
     shown = {"picture": str(picture), "light": str(linear)}
-    return Outcome(lambda: documents.files_document(folder, files, **shown))
+    return CommandOutcome(lambda: documents.files_document(folder, files, **shown))
 
 
 def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> list[str]:
@@ -154,7 +156,7 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
     return lines
 
 
-def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
+def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOutcome:
     """`lightpaint demo -o DIR`"""
     made = write_demo(folder)
     options = [f"--spp {settings.spp}"] if settings.spp else []
@@ -177,7 +179,7 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> Outcome:
 
 def relight(
     *, scene: SceneFile, lightings: Sequence[Path], output: Path | None, settings: Settings
-) -> Outcome:
+) -> CommandOutcome:
     """`lightpaint relight SCENE lighting.json...`"""
     for path in lightings:
         finish(path.parent)
@@ -195,12 +197,14 @@ def relight(
         folder = place.folder
         if lighting.scene_identity not in ("", scene_of(loaded, lighting).identity):
             terminal.say(f"{folder}: the lighting was solved for another state of the scene")
-        with terminal.Listener() as listen:
+        with terminal.TerminalListener() as listen:
             how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
             relight_look({"": loaded}, lighting, place, progress=listen, **how)
             listen.note(f"{folder} relit and rendered")
         terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
-    return Outcome(lambda: {"results": [_relit(*x) for x in zip(lightings, results, strict=True)]})
+    return CommandOutcome(
+        lambda: {"results": [_relit(*x) for x in zip(lightings, results, strict=True)]}
+    )
 
 
 def _relit(lighting: Path, place: ResultFolder) -> dict[str, Any]:
@@ -209,19 +213,19 @@ def _relit(lighting: Path, place: ResultFolder) -> dict[str, Any]:
     return documents.files_document(place.folder, files, lighting=str(lighting))
 
 
-def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) -> Outcome:
+def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) -> CommandOutcome:
     """`lightpaint verify DIR...`"""
     use_variant(variant)
     results = []
     for folder in (view for given in folders for view in result_folders(given)):
-        with terminal.Listener() as listen:
+        with terminal.TerminalListener() as listen:
             how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
             result = verify_result(folder, progress=listen, **how)
             listen.note(f"{folder} rendered and compared")
         terminal.write(f"{folder}: {tables.spoken_agreement(result)}")
         results.append((folder, result))
     agrees = all(result.agrees for _, result in results)
-    return Outcome(
+    return CommandOutcome(
         lambda: {
             "agrees": agrees,
             "results": [documents.verified_document(*result) for result in results],

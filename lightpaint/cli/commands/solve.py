@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
 from lightpaint.cli.output import documents, tables, terminal
-from lightpaint.cli.output.output_mode import Outcome
+from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.tolerances import Wanted
 from lightpaint.errors import ALONE
 from lightpaint.pipeline.job import Job
@@ -27,12 +27,12 @@ def solve(
     table: Table = "short",
     wanted: Wanted = ANY,
     several: "Several | None" = None,
-) -> Outcome:
+) -> CommandOutcome:
     """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`
 
     several: what they are to each other, where there are several.
     """
-    listen, results, shortfalls, obtained = terminal.Listener(), [], [], None
+    listen, results, shortfalls, obtained = terminal.TerminalListener(), [], [], None
     # Those of all before the first is run, which says its own again: once is enough.
     for remark in (remark for job in jobs for remark in job.remarks):
         listen.say(remark)
@@ -65,7 +65,7 @@ def solve(
         found = {"results": [documents.result_document(*x, wanted) for x in results]}
         return found | ({"variations": made} if made else {})
 
-    return Outcome(
+    return CommandOutcome(
         told,
         1 if shortfalls or (several is not None and several.failed) else 0,
     )

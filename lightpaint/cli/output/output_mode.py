@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 
-class Clock:
+class Stopwatch:
     """Seconds since it was made, and since it was last looked at."""
 
     def __init__(self) -> None:
@@ -31,11 +31,11 @@ class Manner:
     as_json: bool = False
     is_quiet: bool = False
     is_verbose: bool = False
-    clock: Clock = field(default_factory=Clock)
+    clock: Stopwatch = field(default_factory=Stopwatch)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CommandOutcome:
     """What a command came to. told: the document for programs, made if asked for; None where
     they were told already.
     """

@@ -138,7 +138,7 @@ class _Count(MofNCompleteColumn):
         return Text("") if task.total is None else super().render(task)
 
 
-class Listener:
+class TerminalListener:
     """Hears progress and remarks, and shows them on stderr; of equal remarks the first.
 
     On a terminal bars are shown while it is entered, and a line for each worker that is at work; in
@@ -152,7 +152,7 @@ class Listener:
         self._workers: dict[str, TaskID] = {}
         self._others: set[str] = set()  # workers without a line
 
-    def __enter__(self) -> "Listener":
+    def __enter__(self) -> "TerminalListener":
         if sys.stderr.isatty() and not manner().is_quiet:
             columns = (
                 TextColumn("{task.description}", markup=False),

@@ -1,6 +1,6 @@
 """OpenEXR files in and out, over the OpenEXR project's own module.
 
-A file is a list of `Part`s; a part is a set of named channels of one size. What the
+A file is a list of `ExrPart`s; a part is a set of named channels of one size. What the
 reference library lets pass silently (a cut-off file, missing parts, deep pixels) is an
 ImageError here.
 """
@@ -42,7 +42,7 @@ CHROMA_FILTER = (0.627123, -0.186077, 0.087929, -0.043159, 0.019597, -0.007540, 
 
 
 @dataclass(frozen=True)
-class Part:
+class ExrPart:
     """One part of an EXR file.
 
     channels: name → (height, width) array, float16 or float32 (uint32 when read so).
@@ -67,7 +67,7 @@ class Part:
         height, width = next(iter(self.channels.values())).shape
         return height, width
 
-    def in_display_window(self) -> "Part":
+    def in_display_window(self) -> "ExrPart":
         """The part cut or filled with zeros to its display window."""
         height, width = self.display or self.size
         if (height, width) == self.size and self.offset == (0, 0):
@@ -110,7 +110,7 @@ def read_channels(path: Path) -> set[str]:
         return {channel.name for _, header in declared for channel in header["channels"]}
 
 
-def read_parts(path: Path) -> list[Part]:
+def read_parts(path: Path) -> list[ExrPart]:
     """All parts of the EXR file at `path`.
 
     Channels that are stored at a part of the resolution, as chroma is, are interpolated. Of
@@ -164,7 +164,7 @@ def _texts(header: Mapping[str, Any]) -> dict[str, str]:
     return {key: value for key, value in header.items() if isinstance(value, str)}
 
 
-def _part(path: Path, part: Any) -> Part:
+def _part(path: Path, part: Any) -> ExrPart:
     """What is kept of a part as the library reads it."""
     if not part.channels:
         raise ImageError(f"{path} has a part without channels")
@@ -180,7 +180,7 @@ def _part(path: Path, part: Any) -> Part:
         channels[name] = pixels
     display, offset = _windows(part.header)
     views = part.header.get("multiView")
-    return Part(
+    return ExrPart(
         part.name() or "",
         channels,
         _texts(part.header),
@@ -216,7 +216,7 @@ def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, in
     return result
 
 
-def write_parts(path: Path, parts: Sequence[Part]) -> None:
+def write_parts(path: Path, parts: Sequence[ExrPart]) -> None:
     """Write a multi-part EXR without loss, by ZIP where that helps, whole or not at all.
 
     The first part says which version of lightpaint wrote it, so that nobody takes it for a render
@@ -247,7 +247,7 @@ def write_parts(path: Path, parts: Sequence[Part]) -> None:
             raise OutputError(f"cannot write {path}: {first_line(error, of=beside)}") from error
 
 
-def _compression(part: Part) -> Any:
+def _compression(part: ExrPart) -> Any:
     """ZIP where it saves much: noise in float32 it hardly packs, and takes long to unpack."""
     lines = [channel[::SAMPLED] for channel in part.channels.values()]
     if any(x.dtype != np.float32 for x in lines) or sum(x.nbytes for x in lines) < TELLING:
@@ -269,7 +269,7 @@ def rgb_channels(image: Floats, layer: str = "") -> dict[str, Floats]:
 
 def write_rgb(path: Path, image: Floats, *, attributes: Mapping[str, str] | None = None) -> None:
     """Write a (height, width, 3) linear image as one float32 RGB part."""
-    write_parts(path, [Part("rgb", rgb_channels(image), attributes or {})])
+    write_parts(path, [ExrPart("rgb", rgb_channels(image), attributes or {})])
 
 
 def _windows(header: Mapping[str, Any]) -> tuple[tuple[int, int], tuple[int, int]]:

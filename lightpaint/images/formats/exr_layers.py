@@ -17,7 +17,7 @@ from lightpaint.colour.primaries import (
     to_rec709,
 )
 from lightpaint.errors import ImageError
-from lightpaint.images.formats.exr import Part
+from lightpaint.images.formats.exr import ExrPart
 from lightpaint.screen import some_names
 
 #: Attribute by which Krita keeps its layers apart in an EXR, which has then no merged picture.
@@ -40,7 +40,7 @@ class Layer:
     """
 
     name: str
-    part: Part
+    part: ExrPart
     prefix: str
 
     def rgb(self) -> Floats:
@@ -78,7 +78,7 @@ def _by_layer(names: Iterable[str]) -> dict[str, dict[str, str]]:
     return layers
 
 
-def linear_rgb(part: Part, layer: str = "") -> Floats:
+def linear_rgb(part: ExrPart, layer: str = "") -> Floats:
     """The colour of `layer`, a prefix of channels in `part`, as (h, w, 3) float32 Rec.709.
 
     Its channels are R, G, B; or Y, which is grey; or Y, RY and BY, luminance and chroma.
@@ -106,7 +106,7 @@ def linear_rgb(part: Part, layer: str = "") -> Floats:
     return _in_rec709(image, primaries)
 
 
-def colour_layers(parts: Sequence[Part]) -> list[Layer]:
+def colour_layers(parts: Sequence[ExrPart]) -> list[Layer]:
     """Every layer of a file that holds a colour, in the file's order, the unnamed one first."""
     layers = []
     for part in parts:
@@ -116,7 +116,7 @@ def colour_layers(parts: Sequence[Part]) -> list[Layer]:
     return layers
 
 
-def choose_layer(parts: Sequence[Part], wanted: str | None = None) -> Layer:
+def choose_layer(parts: Sequence[ExrPart], wanted: str | None = None) -> Layer:
     """The layer called `wanted`: its name, that of its part or view, or its prefix.
 
     Without one, the only layer, or the only one without a prefix, unless Krita wrote it: there
@@ -156,7 +156,7 @@ def _names(layers: Sequence[Layer]) -> str:
     return some_names(layer.name or "one without a name" for layer in layers)
 
 
-def _layer_name(part: Part, prefix: str, *, several: bool) -> str:
+def _layer_name(part: ExrPart, prefix: str, *, several: bool) -> str:
     if not several or prefix == part.name or prefix.startswith(f"{part.name}."):
         return prefix
     return _joined(part.name, prefix) if prefix else part.name
@@ -169,7 +169,7 @@ def _views(layer: Layer) -> list[str]:
     return [v for v in (layer.part.attributes.get("view"), *layer.part.views[:1]) if v]
 
 
-def _is_colour(part: Part, prefix: str) -> bool:
+def _is_colour(part: ExrPart, prefix: str) -> bool:
     if _joined(prefix, "Y") in part.channels:
         # Beside X it is no luminance but a direction or a place.
         return _joined(prefix, "X") not in part.channels
@@ -191,7 +191,7 @@ def _in_rec709(image: Floats, primaries: tuple[float, ...] | None) -> Floats:
     return image if primaries is None else converted(image, to_rec709(primaries))
 
 
-def primaries_of(part: Part) -> tuple[float, ...] | None:
+def primaries_of(part: ExrPart) -> tuple[float, ...] | None:
     """Those that a part of an EXR declares, by numbers or by name; None for Rec.709's.
 
     Raises ImageError, without naming the file, for colours of a name that is not known as linear.

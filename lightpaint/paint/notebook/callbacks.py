@@ -17,7 +17,7 @@ Told = TypeVar("Told")
 Given = TypeVar("Given")
 
 
-class Live(traitlets.Any, Generic[Told, Given]):  # type: ignore[misc]
+class LiveTrait(traitlets.Any, Generic[Told, Given]):  # type: ignore[misc]
     """What the session tells with `set_trait`; what is assigned to it is a wish to the session."""
 
     if TYPE_CHECKING:

@@ -43,7 +43,7 @@ try:
     import traitlets
     from traitlets import ObserveHandler
 
-    from lightpaint.paint.notebook.callbacks import Callback, Live
+    from lightpaint.paint.notebook.callbacks import Callback, LiveTrait
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
 
@@ -117,10 +117,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     _esm = widget_script()
     _sheet = traitlets.Unicode(widget_style()).tag(sync=True)
     height = traitlets.Int(720, min=LEAST_HEIGHT).tag(sync=True)
-    target: Live[Target | None, Target | None] = Live(None)
-    targets: Live[tuple[Target | None, ...], Sequence[Target | None]] = Live(())
-    lighting: Live[Lighting | None, Lighting] = Live(None)
-    constraints: Live[Constraints | None, Constraints | None] = Live(None)
+    target: LiveTrait[Target | None, Target | None] = LiveTrait(None)
+    targets: LiveTrait[tuple[Target | None, ...], Sequence[Target | None]] = LiveTrait(())
+    lighting: LiveTrait[Lighting | None, Lighting] = LiveTrait(None)
+    constraints: LiveTrait[Constraints | None, Constraints | None] = LiveTrait(None)
 
     def __init__(
         self,

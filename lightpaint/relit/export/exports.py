@@ -13,7 +13,7 @@ import numpy as np
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.color import luminance
 from lightpaint.files import write_text
-from lightpaint.images.formats.exr import Part, rgb_channels, write_parts
+from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
@@ -127,7 +127,7 @@ def blender_script(groups: LightGroups, lighting: Lighting) -> str:
     )
 
 
-def relit_part(groups: LightGroups, lighting: Lighting) -> Part:
+def relit_part(groups: LightGroups, lighting: Lighting) -> ExrPart:
     """Σ multiplier × layer, with the rest and the alpha of the beauty, as precise as the file."""
     image = groups.basis.mix(lighting.weights_for(groups.basis))
     channels = rgb_channels(image)
@@ -138,7 +138,7 @@ def relit_part(groups: LightGroups, lighting: Lighting) -> Part:
             name: np.clip(pixels, -LARGEST_HALF, LARGEST_HALF).astype(np.float16)
             for name, pixels in channels.items()
         }
-    return Part("relit", channels)
+    return ExrPart("relit", channels)
 
 
 def _free(lighting: Lighting) -> list[LightSetting]:

@@ -20,7 +20,7 @@ from lightpaint.basis.lightgroups.layers import RenderLayer
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.files import one_line
-from lightpaint.images.formats.exr import Part, rgb_channels
+from lightpaint.images.formats.exr import ExrPart, rgb_channels
 from lightpaint.lighting.answer.lighting import Lighting
 
 #: What needs a backslash in a quoted word of Tcl that itself stands in braces.
@@ -102,7 +102,7 @@ def needs_copy(groups: LightGroups) -> bool:
     return len(called) < len(layers) or any(x.channels[0].count(".") > 2 for x in _read(groups))
 
 
-def copied_part(groups: LightGroups) -> Part:
+def copied_part(groups: LightGroups) -> ExrPart:
     """The layers in linear Rec.709 float32, under names that Nuke tells apart."""
     channels: dict[str, Floats] = {}
     *names, beauty = _copied_names(groups)
@@ -113,7 +113,7 @@ def copied_part(groups: LightGroups) -> Part:
         channels |= rgb_channels(groups.beauty.in_rec709(there), beauty)
         if groups.beauty.alpha is not None:
             channels[f"{beauty}.A"] = groups.beauty.alpha.astype(np.float32)
-    return Part("layers", channels)
+    return ExrPart("layers", channels)
 
 
 def nuke_layer(layer: RenderLayer) -> str:

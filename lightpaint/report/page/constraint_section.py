@@ -8,9 +8,9 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.clean_pictures import Looks
+from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.measures import relative_residual
-from lightpaint.report.page.figures import Picture, figure
+from lightpaint.report.page.figures import PagePicture, figure
 from lightpaint.report.page.html import SHOWN, SPARE, row, share_cell, table
 from lightpaint.report.sentences import spoken_percent
 
@@ -27,7 +27,7 @@ def constraints_section(
     free: Solution | None,
     *,
     transform: ViewTransform,
-    looks: Looks | None = None,
+    looks: CleanLooks | None = None,
 ) -> str:
     """The best lighting without constraints, `free`, beside the one as asked, from the basis.
 
@@ -71,7 +71,7 @@ def _curve(solution: Solution, free: Solution) -> str:
 
 
 def _numbers(
-    basis: Basis, solution: Solution, transform: ViewTransform, looks: Looks | None
+    basis: Basis, solution: Solution, transform: ViewTransform, looks: CleanLooks | None
 ) -> str:
     """With `sparse`, pictures with fewer and with more lights."""
     used, missed_with = _used(solution), dict(solution.certificate.curve)
@@ -87,7 +87,7 @@ def _figures(
     basis: Basis,
     pictures: list[tuple[Doubles, str, str]],
     transform: ViewTransform,
-    looks: Looks | None,
+    looks: CleanLooks | None,
 ) -> str:
     """Pictures of weights (n, 3), each with its name and a caption."""
     factor = max(1, min(basis.size[1] // WIDTH, *basis.size))
@@ -96,7 +96,7 @@ def _figures(
         # Reduced it is quick to denoise, and needs no features.
         image = np.asarray(block_mean(basis.mix(weights), factor), np.float32)
         pixels = transform.encode(denoised(image) if looks and looks.is_clean else image)
-        figures.append(figure(Picture(name, f"{name}, predicted.", pixels), caption, ""))
+        figures.append(figure(PagePicture(name, f"{name}, predicted.", pixels), caption, ""))
     return "".join(figures)
 
 

@@ -21,7 +21,7 @@ from lightpaint.report.answer_pictures import (
     unpainted_look,
 )
 from lightpaint.report.measures import energy_shares
-from lightpaint.report.page.figures import Picture, figure, signed_scale
+from lightpaint.report.page.figures import PagePicture, figure, signed_scale
 from lightpaint.report.page.html import folded, listed, name_of, row, share_cell, table
 from lightpaint.report.sentences import (
     brightness,
@@ -163,7 +163,9 @@ def _maps(
         colours = diverging(-luminance(image) / limit)
         figures.append(
             figure(
-                Picture(name, f"False-colour map: {name}.", share * colours + (1 - share) * grey),
+                PagePicture(
+                    name, f"False-colour map: {name}.", share * colours + (1 - share) * grey
+                ),
                 caption,
                 signed_scale(limit),
             )
@@ -172,7 +174,7 @@ def _maps(
         colours = diverging(-diagnosis.ignored_map / limit)
         figures.append(
             figure(
-                Picture("Not counted", "False-colour map of what does not count.", colours),
+                PagePicture("Not counted", "False-colour map of what does not count.", colours),
                 "Painted and missed where the importance is small.",
                 signed_scale(limit),
             )

@@ -47,7 +47,7 @@ ENOUGH = 4
 
 
 @dataclass(frozen=True)
-class Picture:
+class PagePicture:
     """A picture of the page, (h, w, 3) in display values. alt: what it shows, in words.
 
     raw: the same as it was rendered, where `pixels` were denoised.
@@ -118,13 +118,13 @@ def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
     return float(np.round(-np.log2(np.percentile(lit, 98)), 1)) if lit.size else 0.0
 
 
-def _raw_uri(look: Picture) -> str:
+def _raw_uri(look: PagePicture) -> str:
     if look.raw is None:
         return ""
     return data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)
 
 
-def wipe(looks: list[Picture]) -> str:
+def wipe(looks: list[PagePicture]) -> str:
     """Two of the looks over each other, with a movable border between them."""
     # The verification may be larger than the rest, which the page then enlarges.
     height, width = max(look.pixels.shape[:2] for look in looks)
@@ -186,13 +186,13 @@ def maps(
     picture = residual_picture(missed, solution, current, transform=transform)
     figures = [
         figure(
-            Picture("Residual", "False-colour map of the residual.", picture),
+            PagePicture("Residual", "False-colour map of the residual.", picture),
             f"Luminance, answer − painting, as rendered{missed.spoken}. Hatched pixels do not "
             "count.",
             signed_scale(missed.limit),
         ),
         figure(
-            Picture(
+            PagePicture(
                 "Importance",
                 "Map of how much each pixel counts.",
                 importance_picture(solution.importance, current, transform=transform),
@@ -206,7 +206,7 @@ def maps(
         z = verification.z.mean(axis=-1, dtype=np.float64)
         figures.append(
             figure(
-                Picture("Verification", "False-colour map of z.", diverging(z / LIMIT)),
+                PagePicture("Verification", "False-colour map of z.", diverging(z / LIMIT)),
                 "Answer − render in standard errors, mean of the channels. Noise alone "
                 "looks like even grain; a shape in it is an error.",
                 scale(SIGNED, f"−{LIMIT:g} answer darker", "0", f"answer brighter +{LIMIT:g}"),
@@ -215,7 +215,7 @@ def maps(
     return "".join(figures)
 
 
-def figure(picture: Picture, caption: str, legend: str) -> str:
+def figure(picture: PagePicture, caption: str, legend: str) -> str:
     """A map with its legend, as `scale` makes it, and what it shows."""
     height, width = picture.pixels.shape[:2]
     return (

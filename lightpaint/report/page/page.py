@@ -30,12 +30,12 @@ from lightpaint.report.answer_pictures import (
     target_picture,
     transform_of,
 )
-from lightpaint.report.clean_pictures import MOST_THUMBNAILS, Looks
+from lightpaint.report.clean_pictures import MOST_THUMBNAILS, CleanLooks
 from lightpaint.report.influences import spoken_meaning
 from lightpaint.report.page.color_section import colors_section
 from lightpaint.report.page.constraint_section import constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
-from lightpaint.report.page.figures import Picture, maps, wipe
+from lightpaint.report.page.figures import PagePicture, maps, wipe
 from lightpaint.report.page.fit_tables import fit_table, render_table, verification_table, versions
 from lightpaint.report.page.html import SHOWN, SPARE
 from lightpaint.report.page.lights_table import lights_table, thumbnails_of
@@ -60,7 +60,7 @@ def report_page(
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
     seen: Seen | None = None,
-    looks: Looks | None = None,
+    looks: CleanLooks | None = None,
     color_choices: Choices = (),
     missed: Residual | None = None,
 ) -> str:
@@ -77,7 +77,7 @@ def report_page(
     """
     target = target.fitted_to(basis.size, resize=False)
     verified = None if verification is None else verification.verified.image
-    raw = Looks.raw(basis, predicted.image, verified)
+    raw = CleanLooks.raw(basis, predicted.image, verified)
     looks = looks or raw
     transform = looks.through(transform_of(target, basis, predicted.image))
     current = looks.current
@@ -140,18 +140,23 @@ def prepare_page(basis: Basis) -> None:
 
 
 def _wipe(
-    target: Target, solution: Solution, looks: Looks, raw: Looks, *, transform: ViewTransform
+    target: Target,
+    solution: Solution,
+    looks: CleanLooks,
+    raw: CleanLooks,
+    *,
+    transform: ViewTransform,
 ) -> str:
     """What can be put side by side, in the order of its lists."""
 
-    def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> Picture:
+    def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> PagePicture:
         size = looks.predicted.shape[:2]
         both = [covered(transform.encode(x), size) for x in (clean, noisy)]
-        return Picture(name, alt, both[0], both[1] if looks.is_clean else None)
+        return PagePicture(name, alt, both[0], both[1] if looks.is_clean else None)
 
     pictures = [
         picture("now", "The scene as it is.", looks.current, raw.current),
-        Picture(
+        PagePicture(
             "painting",
             "What was painted. Unpainted pixels are grey, dim and hatched.",
             target_picture(target, solution, looks.current, transform=transform),
@@ -170,7 +175,7 @@ def _wipe(
 
 
 def _mixer(
-    basis: Basis, target: Target, solution: Solution, looks: Looks, *, transform: ViewTransform
+    basis: Basis, target: Target, solution: Solution, looks: CleanLooks, *, transform: ViewTransform
 ) -> str:
     """The lights by hand."""
     scene = basis.origin.scene

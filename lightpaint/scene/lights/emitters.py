@@ -1,6 +1,7 @@
 """The emitters of a loaded scene, as Mitsuba has them."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,12 +22,14 @@ from lightpaint.scene.lights.emission import (
     read_emission,
     why_not_adjusted,
 )
-from lightpaint.scene.lights.emitter_names import hangs_on, has_name
 from lightpaint.scene.scene_tree import ParsedScene
 from lightpaint.validation import MAX_NAME
 
 #: Emitters that no RGB variant of Mitsuba renders as they are meant, and what to do about them.
 NOT_RENDERED = {"timed_sunsky": "use sunsky with the hour you want"}
+
+#: Ids that Mitsuba's own writer and parser make up.
+_MADE_UP = re.compile(r"(__)?elm__\d+|_(unnamed|arg)_\d+")
 
 
 @dataclass(frozen=True)
@@ -209,3 +212,34 @@ def describe_form(emitter: Any, plugin: str) -> str:
     if plugin == "directional":
         return f"towards {at(matrix[:3, 2])}"
     return f"at {at(matrix[:3, 3])} towards {at(matrix[:3, 2])}"
+
+
+def has_name(parsed: ParsedScene, emitter: int) -> bool:
+    """Whether that node, or the shape that it belongs to, has an id that somebody chose."""
+    nodes = (emitter, parsed.shape_of.get(emitter))
+    return any(node is not None and _id(parsed, node) for node in nodes)
+
+
+def hangs_on(parsed: ParsedScene, emitter: int) -> str:
+    """Name of what that node without one belongs to; "" if nothing there has a name.
+
+    That is what its shape is part of, the shape's material, or its file.
+    """
+    import mitsuba as mi
+
+    shape = parsed.shape_of.get(emitter)
+    if shape is None:
+        return ""
+    parents = [parsed.parent_of[shape]] if shape in parsed.parent_of else []
+    materials = parsed.children_of(shape, mi.ObjectType.BSDF)
+    # What is under a twosided or a mask, too.
+    materials += [k for m in materials for k in parsed.children_of(m, mi.ObjectType.BSDF)]
+    named = (_id(parsed, node) for node in (*parents, *materials))
+    props = parsed.state.nodes[shape].props
+    file = Path(str(props["filename"])).stem if "filename" in props else ""
+    return next(filter(None, named), file)
+
+
+def _id(parsed: ParsedScene, node: int) -> str:
+    said = str(parsed.state.nodes[node].props.id())
+    return "" if _MADE_UP.fullmatch(said) else said
