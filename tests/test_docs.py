@@ -5,22 +5,31 @@ import re
 import tomllib
 from argparse import ArgumentParser
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import lightpaint as lp
+from lightpaint.basis.cache import LARGEST
 from lightpaint.batch.cluster.cluster import LEAST_S, PATIENCE
+from lightpaint.batch.manifest.checks import WANTED
+from lightpaint.batch.manifest.entries import MOST_LOOKS
+from lightpaint.batch.manifest.keys import MOST_FRAMES
 from lightpaint.cli.commands.rooms import template_lines
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.lighting.constraints.white_lights import WHITES
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint.server.address import PORT
+from lightpaint.paint.server.client import MOST_HEARD, MOST_HEARD_BYTES
+from lightpaint.paint.server.http_connections import MOST_STRANGERS
+from lightpaint.paint.server.session_clients import MOST_PAGES
 from lightpaint.scene.lights.similar_emitters import FEW
 from lightpaint.scene.presets import PRESETS
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.template import PLAIN
+from lightpaint.validation import MAX_NAME
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -259,3 +268,42 @@ def test_every_option_is_in_some_document() -> None:
         if action.option_strings and not named & set(action.option_strings)
     }
     assert sorted(lost) == []
+
+
+def test_snippets_name_what_there_is() -> None:
+    """Names that snippets of Python import from modules, in all documents."""
+    lost = []
+    for document in DOCUMENTS:
+        for snippet in re.findall(r"```python\n(.*?)```", document.read_text(), re.DOTALL):
+            for node in ast.walk(ast.parse(snippet)):
+                if isinstance(node, ast.ImportFrom) and str(node.module).startswith("lightpaint."):
+                    module = import_module(str(node.module))
+                    lost += [x.name for x in node.names if not hasattr(module, x.name)]
+    assert lost == []
+
+
+def test_numbers_in_documents_are_those_of_the_code() -> None:
+    def text(name: str) -> str:
+        return " ".join((ROOT / "docs" / name).read_text().split())
+
+    assert f"by default {PATIENCE:g} times what is expected, and {LEAST_S:g} at least" in text(
+        "batch.md"
+    )
+    *most, last = (f"`{step}`" for step in WANTED)
+    assert f"by default {', '.join(most)} and {last}" in text("batch.md")
+    assert f"chooses the port ({PORT}, or any if that is taken)" in text("painter.md")
+    assert f"Of such connections {MOST_STRANGERS} may be open" in text("painter.md")
+    assert f"More than {FEW} emitters that are alike" in text("lights.md")
+    assert f"{LARGEST // 2**30} GiB at most" in text("solving.md")
+    limits = text("limits.md")
+    for said in (
+        f"at most {MOST_PAGES} tabs at a time",
+        f"{MOST_STRANGERS} connections that have not shown its key",
+        f"{MOST_HEARD} messages or {MOST_HEARD_BYTES // 2**20} MiB of a page",
+        f"A batch has {MOST_LOOKS:,} looks, beside {MOST_FRAMES:,} frames",
+        f"a name has {MAX_NAME} characters",
+    ):
+        assert said in limits
+    solving = text("solving.md")
+    for preset in PRESETS.values():
+        assert f"{preset.spp} samples per pixel" in solving
