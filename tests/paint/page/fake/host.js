@@ -84,11 +84,22 @@ export class FakeHost {
     const { room } = this;
     return {
       kind: 'state',
-      version: 1,
-      generation: 1,
+      version: 2,
       size: [room.h, room.w],
       scene: 'gallery',
-      session: 'evening',
+      can_report: true,
+      is_back: false,
+      verified: [],
+      command: '',
+      lut: { side: 2, low: 0, high: 1 },
+      views: [
+        {
+          name: '',
+          size: [room.h, room.w],
+          objects: room.objects,
+          scales: room.lights.map(() => 1),
+        },
+      ],
       lights: room.lights.map(({ name, present }, k) => ({
         name,
         label: name,
@@ -104,15 +115,15 @@ export class FakeHost {
         group: room.n > 12 && k >= 8 ? `Row ${'ABCDEFG'[Math.floor((k - 8) / 8)]}` : null,
       })),
       objects: room.objects,
-      transforms: ['srgb', 'filmic', 'agx', 'linear'].map((name) => ({ name })),
+      transforms: ['srgb', 'filmic', 'agx', 'linear'],
       transform: { name: 'srgb', stops: 0 },
       resources: this.resources,
       can_render: true,
       stroke: 0,
       looks: this.looks,
       basis: this.isFirst
-        ? { spp: 4, wanted: 64, done: false, method: 'one pass' }
-        : { spp: 64, wanted: 64, done: true, method: '' },
+        ? { spp: 4, wanted: 64, done: false }
+        : { spp: 64, wanted: 64, done: true },
       first: !this.steps.length,
       folder: '/shows/gallery-evening',
       answer: this.exact(),
@@ -149,6 +160,7 @@ export class FakeHost {
         stops: null,
         kelvin: 2400 + 377 * k,
         swatch: '#ffcc88',
+        is_on: true,
         share: level(rgb) / total,
         error: '±4 %',
         held: false,
@@ -170,11 +182,17 @@ export class FakeHost {
   }
 
   patch() {
+    // What is known of the answer comes by itself, later.
+    setTimeout(() => this.tell(this.answer()));
     return {
       kind: 'patch',
       version: (this.version = (this.version ?? 0) + 1),
       region: [0, 0, 0, 0],
-      ...this.exact(),
+      view: 0,
+      views: [],
+      stroke: this.stroke,
+      exact: false,
+      mode: 'linear',
       ...this.asks(),
       arrays: flat(this.weights),
     };
@@ -250,7 +268,7 @@ export class FakeHost {
     return this.answer();
   }
   kept() {
-    return { kind: 'looks', looks: [...this.looks] };
+    return { kind: 'looks', looks: [...this.looks], resources: this.resources };
   }
   save_look({ name }) {
     const id = (this.ids += 1);
@@ -258,9 +276,9 @@ export class FakeHost {
       id,
       name,
       weights: this.weights.map((rgb) => [...rgb]),
-      delta_e: 2.3,
       stamp: 0,
       thumbnail: `look/${id}`,
+      is_proposal: false,
     });
     return this.kept();
   }
@@ -311,6 +329,8 @@ export class FakeHost {
   explain() {
     return {
       kind: 'explained',
+      view: 0,
+      is_old: false,
       sentences: ['No light reaches the floor at the left.', 'The cove is at its limit.'],
     };
   }
@@ -323,6 +343,7 @@ export class FakeHost {
         view,
         text: 'Closes 63 % of what is missed, and changes the annex by ΔE 49. That is more than it brings.',
         is_at_cost: true,
+        is_old: false,
         arrays: { before: picture, after: picture },
       }),
     );

@@ -1,0 +1,68 @@
+"""The session that page tests make up says what a real one could, in the protocol's messages."""
+
+from dataclasses import MISSING, fields, make_dataclass
+from typing import Any, get_origin, get_type_hints
+
+import numpy as np
+
+from lightpaint.paint.protocol import EVENTS, KINDS
+from lightpaint.storage.json_records import read_record
+
+#: One request of each kind that the page sends.
+ASKED = {
+    "paint": {"stroke": 1, "region": [0, 1, 0, 1], "done": True, "label": "brush"},
+    "drop": {"stroke": 2},
+    "ask": {"light": 0, "asked": {"off": True}, "done": True},
+    "ask_all": {"asked": {}},
+    "tie": {"ties": []},
+    "set": {"values": {"hold": 1}},
+    "preview": {"number": 1, "view": 0},
+    "save_look": {"name": "one"},
+    "copy_look": {"look": 1},
+    "mix_looks": {"first": 1, "second": 2, "part": 0.5, "name": "between"},
+    "rename_look": {"look": 1, "name": "two"},
+    "load_look": {"look": 1},
+    "drop_look": {"look": 3},
+    "undo": {},
+    "redo": {},
+    "export": {"what": ["target", "lighting"]},
+    "verify": {"run": True},
+    "explain": {"view": 0},
+    "take_over": {},
+}
+
+
+def check(told: dict[str, Any]) -> None:
+    """Fail unless the dataclass of its kind could have said it."""
+    event = EVENTS[told["kind"]]
+    hints, known = get_type_hints(event), {one.name: one for one in fields(event)}
+    arrays = {name for name in known if get_origin(hints[name]) is np.ndarray}
+    plain = {k: v for k, v in told.items() if k not in ("kind", "reply", "arrays")}
+    assert set(plain) <= set(known), (told["kind"], set(plain) - set(known))
+    assert set(told["arrays"]) <= arrays
+    for name, value in plain.items():
+        read_record(make_dataclass("One", [(name, hints[name])]), {name: value})
+    needed = {k for k, one in known.items() if one.default is MISSING and k not in arrays}
+    assert needed <= set(plain), (told["kind"], needed - set(plain))
+
+
+def test_a_made_up_session_says_what_a_real_one_could(painter: Any) -> None:
+    assert set(ASKED) == set(KINDS) - {"hello", "fetch", "observe", "propose"}
+    told = painter.page.evaluate(
+        """async (asked) => {
+            const told = [];
+            const tell = host.tell.bind(host);
+            host.tell = (message) => (told.push(message), tell(message));
+            const pixel = { image: { data: new Float32Array(3), shape: [1, 1, 3] } };
+            for (const [kind, fields] of Object.entries(asked))
+                await host.send(kind, fields, pixel);
+            await new Promise((done) => setTimeout(done, 50));
+            return told.map((one) => ({ ...one, arrays: Object.fromEntries(
+                Object.entries(one.arrays ?? {}).map(([name, { shape }]) => [name, shape])) }));
+        }""",
+        ASKED,
+    )
+    assert {one["kind"] for one in told} >= {"state", "answer", "patch", "looks", "exported"}
+    assert [one for one in told if one["kind"] == "failed"] == []
+    for one in told:
+        check(one)
