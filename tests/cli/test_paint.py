@@ -255,6 +255,20 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(here: Path) ->
         assert file.exists() == (ends == signal.SIGKILL)
 
 
+def test_the_observer_of_the_document_hears_the_state(here: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
+    [code] = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    with painting(here, "room.basis.exr"):
+        listening = [sys.executable, "-u", "-c", code]
+        with subprocess.Popen(listening, cwd=here, stdout=subprocess.PIPE, text=True) as observer:
+            try:
+                assert observer.stdout is not None
+                lines = iter(observer.stdout.readline, "")
+                assert next(line for line in lines if not line.startswith("waiting")) == "state \n"
+            finally:
+                observer.kill()
+
+
 @pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM])
 def test_who_asks_twice_for_the_end_gets_one(here: Path, second: signal.Signals) -> None:
     with painting(here, "room.basis.exr") as (process, url), live(url):
