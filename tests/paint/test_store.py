@@ -1,6 +1,5 @@
 """The session file: what was done is there again, whatever ended the process that did it."""
 
-import json
 import os
 import random
 import shutil
@@ -9,8 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -360,30 +358,6 @@ def test_a_view_may_come_later_and_none_may_go(tmp_path: Path) -> None:
         Store.open(path, IDENTITY)
 
 
-def test_a_session_of_the_first_version_goes_on(tmp_path: Path) -> None:
-    path, steps = tmp_path / "session.db", [step(1), step(3), step(4)]
-    with Store.open(path, IDENTITY) as store:
-        for one in steps:
-            store.append(one)
-        store.put_look(look(1, of=2))
-        store.move_to(2)
-        was = content(store)
-    [view] = IDENTITY.views
-    about = {key: value for key, value in asdict(IDENTITY).items() if key != "views"}
-    first = {**about, "size": view.size, "sensor": view.sensor}
-    with closing(sqlite3.connect(path)) as database, database:
-        database.execute("ALTER TABLE step RENAME COLUMN places TO region")
-        for number, places in database.execute("SELECT id, region FROM step").fetchall():
-            region = [where[1:] for where in json.loads(places)] or [None]
-            values = (json.dumps(region[0]), number)
-            database.execute("UPDATE step SET region = ? WHERE id = ?", values)
-        database.execute("UPDATE about SET value = ? WHERE name = 'identity'", (json.dumps(first),))
-        database.execute("PRAGMA user_version = 1")
-    for _ in range(2):
-        with Store.open(path, IDENTITY) as store:
-            assert content(store) == was
-
-
 def _done(path: Path, statement: str) -> None:
     other = sqlite3.connect(path)
     other.execute(statement)
@@ -397,6 +371,7 @@ def _done(path: Path, statement: str) -> None:
         lambda path: path.write_bytes(b"junk" * 1000),
         lambda path: path.write_bytes(path.read_bytes()[:40_000]),
         lambda path: _done(path, "DROP TABLE step"),
+        lambda path: _done(path, "PRAGMA user_version=1"),
         lambda path: _done(path, "PRAGMA user_version=9"),
         lambda path: _done(path, "PRAGMA application_id=9"),
     ],

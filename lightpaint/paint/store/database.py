@@ -16,7 +16,7 @@ from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line, flush
 from lightpaint.paint.store.steps import Identity, SeenFrom
 from lightpaint.screen import some_names
-from lightpaint.storage.json_records import strict_json
+from lightpaint.storage.json_records import read_record, strict_json
 
 #: "lpnt", by which files know what they are, and which tables there are.
 APPLICATION, VERSION = 0x6C706E74, 2
@@ -79,8 +79,6 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
             database.execute(f"PRAGMA user_version = {VERSION}")
         elif application != APPLICATION:
             raise PaintError(f"{path} is no session of the painter: {AFRESH}")
-        elif version == 1:
-            _renew(database)
         elif version != VERSION:
             raise PaintError(
                 f"{path} was written by another version of lightpaint (format {version}, not "
@@ -101,17 +99,6 @@ def identify(database: sqlite3.Connection, path: Path | None, identity: Identity
         _keep(database, json.dumps(asdict(identity)))
 
 
-def _renew(database: sqlite3.Connection) -> None:
-    """Of the first version, which knew one view: a region becomes a list of one place."""
-    database.execute("ALTER TABLE step RENAME COLUMN region TO places")
-    rows = database.execute("SELECT id, places FROM step").fetchall()
-    for number, region in rows:
-        where = strict_json(region)
-        places = json.dumps([] if where is None else [[0, *where]])
-        database.execute("UPDATE step SET places = ? WHERE id = ?", (places, number))
-    database.execute(f"PRAGMA user_version = {VERSION}")
-
-
 def _keep(database: sqlite3.Connection, identity: str) -> None:
     """That it is of this; nothing is written if it is already, as the disk may be full."""
     if (identity,) not in database.execute("SELECT value FROM about WHERE name = 'identity'"):
@@ -127,7 +114,7 @@ AFRESH = f"{ELSEWHERE}, or start afresh, which keeps it under another name (new=
 def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
     """Raise PaintError for a session of something else."""
     for (said,) in database.execute("SELECT value FROM about WHERE name = 'identity'"):
-        its = Identity.of_json(strict_json(said))
+        its = read_record(Identity, strict_json(said))
         if len(its.views) > len(identity.views):
             raise PaintError(
                 f"{path} is a session of {len(its.views)} views, and this is of "

@@ -31,7 +31,7 @@ from lightpaint.paint.store.lazy_arrays import DTYPES
 from lightpaint.paint.store.light_requests import Wishes
 from lightpaint.paint.store.steps import Identity, of_view
 from lightpaint.screen import some_names
-from lightpaint.storage.json_records import strict_json
+from lightpaint.storage.json_records import read_record, strict_json
 
 #: What comes of a value that is another than was written.
 DAMAGES = (
@@ -106,7 +106,7 @@ def _carried_over(copy: Path, new: Path, path: Path, identity: Identity | None) 
 def _identity(old: sqlite3.Connection) -> Identity | None:
     with suppress(*DAMAGES):
         [(said,)] = old.execute("SELECT value FROM about WHERE name = 'identity'")
-        return Identity.of_json(strict_json(said))
+        return read_record(Identity, strict_json(said))
     return None
 
 

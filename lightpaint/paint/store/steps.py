@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from lightpaint.basis.basis import Basis
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
-from lightpaint.storage.json_records import read_record
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +95,6 @@ class Identity:
         origin, names = bases[0].origin, bases[0].names
         views = tuple(SeenFrom(basis.origin.sensor, basis.size) for basis in bases)
         return cls(origin.scene, f"{origin.scene_identity} {origin.sensor}", names, views)
-
-    @classmethod
-    def of_json(cls, data: Mapping[str, Any]) -> "Identity":
-        """From what a session file says, also one of the first version. Raises ValueError."""
-        if "size" in data:
-            old = {"sensor": data.get("sensor", ""), "size": data["size"]}
-            rest = {k: v for k, v in data.items() if k not in ("size", "sensor")}
-            data = {**rest, "views": [old]}
-        return read_record(cls, data)
 
     @property
     def largest(self) -> int:
