@@ -16,7 +16,6 @@ from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.paint.store.store import Store
-from lightpaint.storage import staging
 from lightpaint.storage.staging import staged
 
 
@@ -54,15 +53,9 @@ def _unsafe(monkeypatch: pytest.MonkeyPatch) -> None:
 
         return rename
 
-    def exchange(one: Path, other: Path) -> None:
-        disk.rename(one)
-        swapped(one, other)
-
-    swapped = staging.exchange
     monkeypatch.setattr(os, "fsync", fsync)
     for name in ("replace", "rename"):
         monkeypatch.setattr(os, name, renaming(name))
-    monkeypatch.setattr(staging, "exchange", exchange)
 
 
 def lighting(emission: float) -> Lighting:

@@ -47,7 +47,7 @@ def no_render(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("this was to be refused before it renders")
 
     for name in ("pipeline.obtain", "renders.render", "renders.render_surfaces"):
-        monkeypatch.setattr(f"lightpaint.{name}", never)
+        monkeypatch.setattr(f"lightpaint.pipeline.{name}", never)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -1,10 +1,9 @@
-"""Files that appear in a folder together: at any kill it has all earlier ones, or all new ones.
+"""Files that appear in a folder together: after any kill it gets all earlier ones, or all new ones.
 
 New files are written to a hidden folder beside the true one, which is left as it is meanwhile. At
-the end the other files of the true folder are linked into the hidden one, and the two exchange
-their names, which the system does in one step. Where it cannot (the folder is mounted, somebody
-works in it, the disk knows no links), a journal is written and the files are moved, one by one,
-in less than a millisecond; what a kill leaves of that, `finish` does when the folder is next used.
+the end a journal is written, and the files are moved, one by one, in less than a millisecond. A
+kill in just that time leaves a mixture, until `finish` does what the journal says when the folder
+is next used.
 """
 
 import fcntl
@@ -13,7 +12,7 @@ import os
 import secrets
 import shutil
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -22,16 +21,13 @@ from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.files import MAX_TEXT, flush, read_text, write_text
 from lightpaint.signals import interruptible_between_pieces
 from lightpaint.storage.json_records import read_record, strict_json
-from lightpaint.storage.linux_calls import exchange, is_mounted, is_somebody_in
+from lightpaint.storage.linux_calls import is_mounted
 
 #: In the names of hidden folders, `.evening.lightpaint-1a2b3c4d` beside `evening`.
 MARK = ".lightpaint-"
 
-#: What is still to be done, in a hidden folder or, once that has taken its place, the true one.
+#: What is still to be done, in a hidden folder.
 JOURNAL = ".lightpaint.json"
-
-#: Other files in a folder, beyond which they are not linked but left where they are.
-MANY = 1000
 
 #: Seconds after which a hidden folder is nobody's, where disks know no locks.
 LEFTOVER_S = 86_400.0
@@ -41,20 +37,16 @@ LEFTOVER_S = 86_400.0
 class _Journal:
     """What is still to be done for a folder, by names relative to it.
 
-    move: files to bring there from the hidden folder. gone: files to delete, in the hidden folder
-    `old` where it has exchanged names with the true one, else in the true one.
+    move: files to bring there from the hidden folder. gone: files to delete there.
     """
 
     move: tuple[str, ...] = ()
     gone: tuple[str, ...] = ()
-    old: str = ""
 
     def __post_init__(self) -> None:
-        for name in (*self.move, *self.gone, self.old):
+        for name in (*self.move, *self.gone):
             if not is_below(name):
                 raise ValueError(f"{name!r} is no name of a file in the folder")
-        if "/" in self.old:
-            raise ValueError(f"{self.old!r} is no name of a folder")
 
 
 def is_below(name: str) -> bool:
@@ -91,7 +83,7 @@ def staged(folder: Path, gone: Iterable[Path] = ()) -> Iterator[Path]:
             _publish(stage, folder, {file.relative_to(folder).as_posix() for file in gone})
     except BaseException as error:
         with interruptible_between_pieces():
-            _give_up(stage, real, made)
+            _give_up(stage, made)
         if isinstance(error, LightpaintError):
             raise type(error)(str(error).replace(str(stage), str(folder))) from error
         raise
@@ -102,8 +94,6 @@ def staged(folder: Path, gone: Iterable[Path] = ()) -> Iterator[Path]:
 def finish(folder: Path) -> None:
     """Do what killed runs have left to do in `folder`, and delete what else they left beside it."""
     real = Path(os.path.realpath(folder))
-    with suppress(OSError):
-        _finish_exchange(real)
     for stage in _hidden_folders(real):
         with suppress(OSError):
             _finish_stage(stage, real)
@@ -126,18 +116,12 @@ def _hidden_folder(folder: Path) -> tuple[Path, int]:
     lock = os.open(stage, os.O_RDONLY | os.O_DIRECTORY)
     with suppress(OSError):
         fcntl.flock(lock, fcntl.LOCK_EX)
-    if real.exists():
-        with suppress(OSError):  # they will not exchange names then
-            status = real.stat()
-            os.chown(stage, status.st_uid, status.st_gid)
-            shutil.copystat(real, stage)
     return stage, lock
 
 
-def _give_up(stage: Path, real: Path, made: Iterable[Path]) -> None:
+def _give_up(stage: Path, made: Iterable[Path]) -> None:
     """Delete `stage`, unless something in it is still to be moved, and folders `made` for it."""
-    waiting = _journal_in(real)
-    if _journal_in(stage) is None and (waiting is None or waiting.old != stage.name):
+    if _journal_in(stage) is None:
         shutil.rmtree(stage, ignore_errors=True)
     for parent in made:
         with suppress(OSError):
@@ -173,77 +157,24 @@ def _publish(stage: Path, folder: Path, gone: set[str]) -> None:
     """Bring all that is in `stage` to `folder`, and delete there what is `gone`."""
     real, new = Path(os.path.realpath(folder)), _files_in(stage)
     try:
-        is_free = stage.parent.samefile(real.parent) and not is_somebody_in(real)
-        if is_free and (not real.exists() or not os.listdir(real)):
+        if not real.exists() and stage.parent.samefile(real.parent):
             os.rename(stage, real)
-        elif not (is_free and _exchanged(stage, real, new, gone - new)):
-            _write_journal(stage, _Journal(tuple(sorted(new)), tuple(sorted(gone - new))))
-            _finish_stage(stage, real, is_mine=True)
+            return
+        _write_journal(stage, _Journal(tuple(sorted(new)), tuple(sorted(gone - new))))
+        _finish_stage(stage, real, is_mine=True)
     except OSError as error:
         raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from error
 
 
-def _exchanged(stage: Path, real: Path, new: set[str], gone: set[str]) -> bool:
-    """Whether the two could exchange their names, after the other files of `real` were linked."""
-    try:
-        here, there = stage.stat(), real.stat()
-        if (here.st_uid, here.st_gid, here.st_mode) != (there.st_uid, there.st_gid, there.st_mode):
-            return False
-        ours = new | gone
-        others = _files_in(real) - ours - {JOURNAL}
-        if len(others) > MANY:
-            return False
-        for name in others:
-            (stage / name).parent.mkdir(parents=True, exist_ok=True)
-            os.link(real / name, stage / name, follow_symlinks=False)
-        _keep_folders(real, stage, ours)
-        _write_journal(stage, _Journal(gone=tuple(sorted(ours)), old=stage.name))
-        exchange(stage, real)
-    except OSError:
-        (stage / JOURNAL).unlink(missing_ok=True)
-        return False
-    _finish_exchange(real, is_mine=True)
-    return True
-
-
-def _keep_folders(real: Path, stage: Path, ours: Collection[str]) -> None:
-    """Make the folders of `real` in `stage`, but for those that only held what is replaced."""
-    for top, folders, files in os.walk(real):
-        inside = {(Path(top) / name).relative_to(real).as_posix() for name in files}
-        if folders or not files or inside - set(ours):
-            made = stage / Path(top).relative_to(real)
-            made.mkdir(parents=True, exist_ok=True)
-            shutil.copystat(top, made)
-
-
-def _finish_exchange(real: Path, *, is_mine: bool = False) -> None:
-    """Empty the folder that has exchanged names with `real`, and forget it.
-
-    What came into it while names were exchanged is brought over. is_mine: whether it is this
-    process that holds the lock.
-    """
-    journal = _journal_in(real)
-    if journal is None or not (is_mine or _is_left(real)):
-        return
-    old = real.parent / journal.old
-    if journal.old.startswith(f".{real.name}{MARK}") and old.is_dir():
-        for name in _files_in(old) - set(journal.gone):
-            if not _is_same(old / name, real / name):
-                (real / name).parent.mkdir(parents=True, exist_ok=True)
-                os.replace(old / name, real / name)
-        shutil.rmtree(old, ignore_errors=True)
-    (real / JOURNAL).unlink(missing_ok=True)
-
-
 def _finish_stage(stage: Path, real: Path, *, is_mine: bool = False) -> None:
-    """Bring to `real` what a journal in `stage` names, or nothing, and delete `stage`."""
+    """Bring to `real` what a journal in `stage` names, or nothing, and delete `stage`.
+
+    is_mine: whether it is this process that holds the lock.
+    """
     if not (is_mine or _is_left(stage)):
         return
-    waiting = _journal_in(real)
-    if waiting is not None and waiting.old == stage.name:
-        return  # of a process that is just emptying it
     journal = _journal_in(stage)
-    if journal is not None and not journal.old:
+    if journal is not None:
         for name in journal.move:
             if os.path.lexists(stage / name):
                 (real / name).parent.mkdir(parents=True, exist_ok=True)
@@ -281,12 +212,3 @@ def _is_left(folder: Path) -> bool:
         return time.time() - folder.stat().st_mtime > LEFTOVER_S
     finally:
         os.close(descriptor)
-
-
-def _is_same(one: Path, other: Path) -> bool:
-    """Whether two names are links to one file."""
-    try:
-        a, b = one.lstat(), other.lstat()
-    except FileNotFoundError:
-        return False
-    return (a.st_dev, a.st_ino) == (b.st_dev, b.st_ino)
