@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from least_squares import stacked
+from nightly import seeds
 from qp import least
 from scipy.optimize import lsq_linear, nnls
 
@@ -26,7 +27,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 SAME = 1e-9
 
 #: Random problems for each kind of constraint.
-PROBLEMS = range(60)
+PROBLEMS = list(seeds(20, 60))
 
 
 def _problem(make_basis: Any, seed: int, n: int = 4, *, scalar: tuple[int, ...] = ()) -> Any:
