@@ -1,4 +1,4 @@
-"""What people call a colour of light, in a word."""
+"""Names that people have for colours of light."""
 
 import numpy as np
 

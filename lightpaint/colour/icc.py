@@ -28,7 +28,7 @@ SAME = 2e-3
 
 @dataclass(frozen=True)
 class Profile:
-    """What a picture's numbers mean.
+    """The meaning of a picture's numbers.
 
     name: what the profile calls itself. curves: for each of R, G, B, from values in [0, 1] to
     light. matrix: (3, 3), from that light to linear Rec.709.
@@ -64,7 +64,7 @@ def read_icc(data: bytes) -> Profile:
 
 
 def gamma_profile(gamma: float, primaries: tuple[float, ...] | None) -> Profile:
-    """What PNG's gAMA and cHRM chunks say: light is value^gamma, of these primaries."""
+    """Return the profile of PNG's gAMA and cHRM: light is value^gamma, of these primaries."""
     matrix = np.eye(3) if primaries is None else to_rec709(primaries)
     curve = _power(gamma)
     return Profile(f"gamma {gamma:.3g}", (curve, curve, curve), matrix)

@@ -1,4 +1,4 @@
-"""What a light is to an eye: colour, colour temperature, luminous quantities and flux.
+"""A light as an eye sees it: colour, colour temperature, luminous quantities and flux.
 
 A scene in RGB has no absolute scale: only its author knows what radiance 1 stands for. Told
 once, in cd/m², it holds for everything: with radiance 1 W/(m² sr) ≙ u cd/m², the luminance-

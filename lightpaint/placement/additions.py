@@ -127,7 +127,7 @@ class _Solver:
         return self.reduction.weights(x)
 
     def objective(self, chosen: Iterable[int]) -> float:
-        """What is missed with these weights, as the images they were solved with have it."""
+        """Return the miss at these weights, by the images they were solved with."""
         return float(self.equations.objective(self.weights(chosen)).sum())
 
     def estimated_gains(self, chosen: Iterable[int]) -> Doubles:

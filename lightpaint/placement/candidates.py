@@ -90,7 +90,7 @@ class Candidates:
         return np.asarray(self.pictures + self.noise * _column(scale), np.float32)
 
     def noise_of_half(self, k: int) -> Floats:
-        """What has the variance of `half(k)`, as its square."""
+        """Return images whose squares are the variance of `half(k)`."""
         return np.asarray(self.noise * _column(2 * np.sqrt(self.halves[:, 1 - k])), np.float32)
 
     def equations(self, images: Floats) -> NormalEquations:
@@ -111,7 +111,7 @@ def _with_free_lights(reduction: Reduction, count: int) -> Reduction:
 
 
 def _pull(solution: Solution, count: int) -> NormalEquations | None:
-    """What draws the lights to their present emission; nothing draws the candidates."""
+    """Return the pull of the lights to their present emission; candidates have none."""
     if (pull := solution.problem.pull) is None:
         return None
     return NormalEquations(

@@ -32,7 +32,7 @@ FORMS: dict[str, tuple[str | None, str | None]] = {
 
 @dataclass(frozen=True)
 class Source:
-    """What a lighting is of: a scene, light groups, or none of them is known.
+    """The origin of a lighting: a scene, light groups, or none of them is known.
 
     stage: of USD, whose lights have the names of the scene's.
     """

@@ -153,7 +153,7 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
 
 
 def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:
-    """What each emitter that is adjusted is set to. emission: by name of light."""
+    """Return the setting of each adjusted emitter. emission: by name of light."""
     for light in scene.lights:
         if not light.is_fixed:
             for member in light.members:
@@ -162,7 +162,7 @@ def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emi
 
 @dataclass
 class _Edits:
-    """What changes in one file: the settings of the emitters in it, by byte offset.
+    """The changes in one file: the settings of the emitters in it, by byte offset.
 
     integrators: what is put in the place of elements, by byte offset; at None, what is added.
     """

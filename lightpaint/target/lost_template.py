@@ -1,4 +1,4 @@
-"""What became of a template of which next to nothing is left: repainted, or converted and moved?
+"""Diagnosis of a template of which next to nothing is left: repainted, or converted and moved?
 
 Another view or profile makes each colour of the template one other colour, by a smooth function,
 wherever that colour is. Paint does not: it puts different colours on one wall.
@@ -51,7 +51,7 @@ def _is_function(mine: Floats, its: Floats) -> bool:
 
 
 def _terms(rgb: Doubles) -> Doubles:
-    """What a curve on each channel and a little crosstalk are made of, (n, 13)."""
+    """Return terms of a curve on each channel and a little crosstalk, (n, 13)."""
     r, g, b = rgb.T
     ones = np.ones_like(r)
     terms = (ones, r, g, b, r * r, g * g, b * b, r * g, r * b, g * b, r**3, g**3, b**3)
@@ -76,7 +76,7 @@ def _moved(mine: Floats, its: Floats) -> tuple[int, int]:
 
 
 def _overlap(mine: Floats, its: Floats, down: int, right: int) -> tuple[Floats, Floats]:
-    """What is in both pictures, if one is moved over the other so."""
+    """Return the parts that both pictures share if one is moved over the other so."""
     height, width = mine.shape[0] - abs(down), mine.shape[1] - abs(right)
     top, left = max(down, 0), max(right, 0)
     here = mine[top : top + height, left : left + width]

@@ -1,4 +1,4 @@
-"""What was painted: where a picture differs from the template it was painted on.
+"""The painted pixels: where a picture differs from the template it was painted on.
 
 A file that comes back from a paint program was rounded to its format, and maybe compressed; all
 that differs by more is paint. Faint paint counts for less, so that a soft brush leaves a soft

@@ -37,7 +37,7 @@ class Painted:
 
     @property
     def transform(self) -> ViewTransform | None:
-        """What it was seen through."""
+        """The transform it was seen through."""
         return ViewTransform(self.view, self.stops) if self.view else None
 
 

@@ -129,7 +129,7 @@ def read_over_look(
 
 
 def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint = "look") -> Target:
-    """What was painted, and where. Arguments as of `read_target`."""
+    """Find what was painted, and where. Arguments as of `read_target`."""
     picture, made = reading.picture, reading.template
     importance, notes = _importance(reading, mask)
     # Pixels that the file does not store were not painted, whatever a mask says.
@@ -242,7 +242,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
 
 
 def _of_all(picture: Picture, template: Template) -> str:
-    """What was done to a template of which next to nothing is left, but for painting over it."""
+    """Say what was done to a template of which little is left, but for painting over it."""
     transform = picture.transform or template.transform
     mine, its = (transform.encode(x) for x in (picture.image, template.image))
     if picture.lossy:  # which leaves the means of a few pixels as they are

@@ -65,7 +65,7 @@ class Template:
 
     @property
     def looks(self) -> list[Floats]:
-        """What may have been painted on, in linear light: what template.png shows comes first."""
+        """The pictures that may have been painted on, linear, that of template.png first."""
         return [self.image] if self.clean is None else [self.clean, self.image]
 
     @property
@@ -84,7 +84,7 @@ class _Shown:
 
 @dataclass(frozen=True)
 class _About:
-    """What template.json says. size: (width, height); files: of the template, relative to it."""
+    """Content of template.json. size: (width, height); files: of the template, relative to it."""
 
     format: Literal["lightpaint-template 1"]
     scene: str
@@ -176,7 +176,7 @@ def earlier_files(folder: Path) -> list[Path]:
 
 
 def files_in_the_way(folder: Path) -> list[Path]:
-    """What a template in `folder` may take the place of, an earlier one's files and others'."""
+    """List the files that a new template in `folder` would replace, whosever they are."""
     plain = [folder / name for name in PLAIN]
     # What things and lights are called is not known yet.
     pictures = [*(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
@@ -185,7 +185,7 @@ def files_in_the_way(folder: Path) -> list[Path]:
 
 
 def template_files(folder: Path) -> list[Path]:
-    """What is read of the template in `folder`."""
+    """Return the files that are read of the template in `folder`."""
     return [folder / name for name in (ABOUT, LIGHT, CLEAN, ALBEDO)]
 
 
@@ -267,5 +267,5 @@ def file_names(names: Iterable[str]) -> list[str]:
 
 
 def texts_of(transform: ViewTransform) -> dict[str, str]:
-    """What a PNG says of the transform that it is shown through."""
+    """Read the transform that a PNG says it is shown through."""
     return {TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}

@@ -208,7 +208,7 @@ def _batch(parser: argparse.ArgumentParser) -> None:
         type=arguments.at_least(0, most=100),
         default=0,
         metavar="N",
-        help="try what fails so often again (default: %(default)s)",
+        help="try a failed step up to N more times (default: %(default)s)",
     )
     parser.add_argument(
         "--workers",

@@ -147,7 +147,7 @@ def _named(display_and_view: str, config: Any) -> tuple[str, str]:
 def _processors(
     ocio: Any, config: Any, display: str, view: str, *, inverse: bool = False
 ) -> list[Any]:
-    """What leads from linear Rec.709 to the display, one after the other, or back."""
+    """Return the steps from linear Rec.709 to the display, in order, or back."""
     towards = ocio.TRANSFORM_DIR_INVERSE if inverse else ocio.TRANSFORM_DIR_FORWARD
     own = next((n for n in LINEAR_REC709 if config.getColorSpace(n) is not None), None)
     source = own or "scene_linear"

@@ -131,11 +131,11 @@ class ViewTransform:
         return np.asarray(slopes.transpose(2, 0, 1).reshape(*image.shape, 3))
 
     def encode_planes(self, planes: Floats) -> Floats:
-        """What `encode` says of pixels whose channels lie apart, (3, p) linear."""
+        """Encode pixels whose channels lie apart, (3, p) linear, as `encode` does."""
         return _encoding(self.name).encode_planes(planes * 2.0**self.stops)
 
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        """What `encode` and `jacobian` say of pixels whose channels lie apart, at once.
+        """Return `encode` and `jacobian` of pixels whose channels lie apart, at once.
 
         planes: (3, p) linear. Returns display values, (3, p), and derivatives, (3, 3, p) or, where
         no channel has a say in another, the diagonal of these, (3, p).
@@ -148,7 +148,7 @@ class ViewTransform:
 @keywords()
 @dataclass(frozen=True)
 class TransformChoice:
-    """What somebody asks of a transform, maybe half of one; the rest is what a picture says.
+    """A choice of transform, maybe half of one; a picture says the rest.
 
     Attributes:
         name: As of `ViewTransform.parse`.

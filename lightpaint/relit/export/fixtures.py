@@ -26,7 +26,7 @@ FULL = 255
 
 @dataclass(frozen=True)
 class Dmx:
-    """What a fixture is sent: 0 to 255 each."""
+    """DMX values for a fixture: 0 to 255 each."""
 
     dimmer: int
     red: int

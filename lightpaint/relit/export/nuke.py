@@ -117,7 +117,7 @@ def copied_part(groups: LightGroups) -> ExrPart:
 
 
 def nuke_layer(layer: RenderLayer) -> str:
-    """What Nuke calls a layer of an EXR file; of plain R, G, B in a file of one part, `rgba`.
+    """Return Nuke's name of a layer of an EXR file; of plain R, G, B in a file of one part, `rgba`.
 
     It takes digits from the front of each piece between dots, makes every byte that is no letter
     or digit an underscore, and joins the pieces with underscores. Two names may become one.
@@ -134,7 +134,7 @@ def _in_nuke(name: str) -> str:
 
 
 def _copied_names(groups: LightGroups) -> list[str]:
-    """What the lights and the beauty are called in the copy, no two the same."""
+    """Return names of the lights and the beauty in the copy, no two the same."""
     names: list[str] = []
     for light in (*(light.name for light in groups.basis.lights[: len(groups.layers)]), "beauty"):
         names.append(free_name(_in_nuke(light) or "light", names))
