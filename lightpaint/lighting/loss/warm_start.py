@@ -10,6 +10,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, PixelLoss
 from lightpaint.lighting.loss.reweighting import STEP, Asked, Solve, change, rounds, value_of
@@ -93,7 +94,9 @@ def sample(lit: LitPixels, power: Doubles, size: int) -> LitPixels:
     chance = np.minimum(chance, 1)
     drawn = np.flatnonzero(np.diff(np.floor(np.cumsum(chance) + 0.5), prepend=0))
     pixels = lit.pixels.at(drawn).weighed(1 / chance[drawn])
-    return LitPixels(lit.planes.picked(drawn), pixels)
+    # In the order in which they are walked, again and again.
+    rows = np.ascontiguousarray(lit.planes.pixels(drawn))
+    return LitPixels(MemoryPlanes(rows[:, None]), pixels)
 
 
 def _said(lit: LitPixels, power: Doubles) -> Doubles:
