@@ -133,7 +133,8 @@ def test_a_kernel_that_does_not_answer_is_said_to_until_it_does(opened: Any) -> 
     painter.page.clock.run_for(1_100)
     assert "has not answered for 10 s" in alert(painter)
     painter.page.clock.resume()
-    painter.page.evaluate("() => { model.isBusy = false; return model.work(); }")
+    painter.page.evaluate("() => { model.isBusy = false; void model.work(); }")
+    painter.page.wait_for_function("() => !document.querySelector('[role=alert]')")
     assert painter.said("paint")[-1]["done"] is True
     assert alert(painter) == ""
     painter.page.clock.fast_forward(60_000)  # nothing is waited for
