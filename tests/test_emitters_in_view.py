@@ -101,16 +101,6 @@ def test_emitters_that_rule_the_fit_are_named(basis: lp.Basis, image: Any):
     assert _said(basis, lp.Target.of(image, ~basis.emitters_seen))[1] == []
 
 
-def test_strokes_over_an_emitter_are_left_out_where_it_is_asked(basis: lp.Basis, image: Any):
-    where = (slice(4, 8), slice(4, 8))
-    for emitters, counts in (("auto", 1), ("skip", 0)):
-        problem = lp.Problem.of(basis, lp.Target.of(image), fit=lp.Fit(emitters=emitters))
-        painted = problem.painted(where, image[where], 1.0)
-        importance = painted.views.targets[0].importance
-        assert (importance[basis.emitters_seen] == counts).all()
-        assert (importance[~basis.emitters_seen] == 1).all()
-
-
 def test_nothing_left_is_an_error(basis: lp.Basis, image: Any):
     only = lp.Target.of(image, basis.emitters_seen)
     with pytest.raises(lp.LightpaintError, match=r'sees an emitter in every painted.*"count"'):

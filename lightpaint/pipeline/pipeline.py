@@ -48,7 +48,8 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         A look for each view.
 
     Examples:
-        >>>         >>> job = lp.Job((), (lp.Painting("painting.exr"),), Path("evening"), basis)
+        >>> from pathlib import Path
+        >>> job = lp.Job((), (lp.Painting("painting.exr"),), Path("evening"), basis)
         >>> [look] = lp.run(job)
         >>> np.round(look.lighting.emission["panel"], 3).tolist()
         [2.0, 1.5, 1.0]

@@ -266,9 +266,9 @@ def test_what_a_basis_must_be(make_basis: Any, basis: Basis):
     with pytest.raises(BasisError, match="light names repeat: a, a"):
         make_basis(2, SIZE, names=["a", "a"])
     for changes, message in [
-        ({"images": basis.images[:2]}, "for 3 lights"),
-        ({"images": basis.images[..., :2]}, "for 3 lights"),
-        ({"half_differences": basis.half_differences[:, 1:]}, "half differences"),
+        ({"planes": basis.images[:2]}, "for 3 lights"),
+        ({"planes": basis.images[..., :2]}, "for 3 lights"),
+        ({"noise": basis.half_differences[:, 1:]}, "half differences"),
         ({"emitters_seen": basis.emitters_seen.T}, "mask of seen emitters"),
     ]:
         with pytest.raises(BasisError, match=message):

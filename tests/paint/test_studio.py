@@ -690,8 +690,8 @@ def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
 def both(basis: lp.Basis) -> list[lp.Basis]:
     """The same lights, from another place, too."""
     part = {
-        "images": np.ascontiguousarray(basis.images[:, 2:12, 4:20]),
-        "half_differences": np.ascontiguousarray(basis.half_differences[:, 2:12, 4:20]),
+        "planes": np.ascontiguousarray(basis.images[:, 2:12, 4:20]),
+        "noise": np.ascontiguousarray(basis.half_differences[:, 2:12, 4:20]),
         "emitters_seen": basis.emitters_seen[2:12, 4:20],
     }
     return [basis, replace(basis, **part, origin=replace(basis.origin, sensor="side"))]

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from lightpaint import threads
-from lightpaint.basis import basis as basis_module
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
@@ -171,7 +170,7 @@ def test_writing_neither_solves_nor_sums_anew(
     count(solve_module, "_solution")
     count(reduced_problem, "_optima")
     count(solve_module, "descend")
-    count(basis_module, "mix")
+    count(Basis, "mix")
     count(Basis.__dict__["totals"], "func")
     # One that has kept nothing yet.
     write_report(tmp_path, replace(look, basis=replace(look.basis)), command="")

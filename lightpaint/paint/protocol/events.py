@@ -60,7 +60,7 @@ class SessionPending(Message, kind="waiting"):
     can_report: bool
     text: str
     progress: ProgressReport | None
-    is_back: bool = False
+    is_back: bool = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,8 +72,8 @@ class SessionState(Standing, Message, kind="state"):
     lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
     that grows when one is made anew. verified: the last render of each view. first: whether nothing
     was ever done. stroke: number of the last stroke that was heard of. command: that answers the
-    exported paintings. is_back: the client had the session before, and nobody since. weights:
-    (lights, 3) float64, the last answer.
+    exported paintings. is_back: the client had the session before, and nobody since, as whoever is
+    told unasked. weights: (lights, 3) float64, the last answer.
     """
 
     version: int
@@ -97,7 +97,7 @@ class SessionState(Standing, Message, kind="state"):
     command: str
     answer: Findings
     weights: Doubles
-    is_back: bool = False
+    is_back: bool = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

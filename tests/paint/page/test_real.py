@@ -563,8 +563,8 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
 def two(subject: Subject, basis: lp.Basis) -> Iterator[Served]:
     """A painter of two views: the second one is smaller, and sees a part of the first."""
     half = {
-        "images": np.ascontiguousarray(basis.images[:, 10:, :48]),
-        "half_differences": np.ascontiguousarray(basis.half_differences[:, 10:, :48]),
+        "planes": np.ascontiguousarray(basis.images[:, 10:, :48]),
+        "noise": np.ascontiguousarray(basis.half_differences[:, 10:, :48]),
         "emitters_seen": basis.emitters_seen[10:, :48],
         "objects": Objects(basis.objects.index[10:, :48], ("wall", "floor")),
         "origin": replace(basis.origin, sensor="side"),

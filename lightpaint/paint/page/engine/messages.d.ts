@@ -183,8 +183,8 @@ export interface Standing {
  * lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
  * that grows when one is made anew. verified: the last render of each view. first: whether nothing
  * was ever done. stroke: number of the last stroke that was heard of. command: that answers the
- * exported paintings. is_back: the client had the session before, and nobody since. weights:
- * (lights, 3) float64, the last answer.
+ * exported paintings. is_back: the client had the session before, and nobody since, as whoever is
+ * told unasked. weights: (lights, 3) float64, the last answer.
  */
 export interface SessionState {
   kind: 'state';
