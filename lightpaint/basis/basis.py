@@ -210,7 +210,7 @@ class Basis(Shown):
 
     @property
     def asked(self) -> Asked:
-        """What the lights file of its scene asks of the lights."""
+        """The wishes of its scene's lights file, by light."""
         return self.lights.asked
 
     @property

@@ -16,7 +16,7 @@ from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
 @dataclass(frozen=True)
 class BasisLight:
-    """What a basis knows of a light.
+    """A light as a basis knows it.
 
     parameter, unit: what one unit of weight is (`radiance`, `W/(m² sr)`).
     emission: its present RGB emission in the scene, in that unit.

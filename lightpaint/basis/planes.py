@@ -69,7 +69,7 @@ class Planes(Protocol):
 
 
 class PlanesBase:
-    """What follows of the rest for any planes, wherever they are kept."""
+    """Shared code of all planes: mixes and sums by rows, wherever these are kept."""
 
     @property
     def count(self) -> int:

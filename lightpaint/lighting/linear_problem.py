@@ -39,7 +39,7 @@ class LinearProblem:
 
         @property
         def name(self) -> str:
-            """What was painted, for people."""
+            """Name of the painting, for people."""
 
         @property
         def lights(self) -> Lights:
@@ -94,7 +94,7 @@ class LinearProblem:
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """What pulls to the present, or to the present colours, adds; None where none is asked."""
+        """Penalty of leaving the present, or its colours; None where none is asked."""
         return pull_of(
             self.power,
             self.lights.present_weights,

@@ -1,1 +1,1 @@
-"""What the terminal shows: tables, JSON documents, progress, and the words for them."""
+"""Output of the terminal: tables, JSON documents, progress, and the words for them."""

@@ -36,7 +36,7 @@ class Manner:
 
 @dataclass(frozen=True)
 class CommandOutcome:
-    """What a command came to. told: the document for programs, made if asked for; None where
+    """The outcome of a command. told: the document for programs, made if asked for; None where
     they were told already.
     """
 

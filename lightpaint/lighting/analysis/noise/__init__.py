@@ -1,1 +1,1 @@
-"""What noise does to an answer: error bars, outliers, directions, and a better answer."""
+"""Noise in an answer: error bars, outliers, directions, and a better answer."""
