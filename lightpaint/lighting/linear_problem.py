@@ -174,7 +174,7 @@ class SummedProblem(LinearProblem):
 def reduced_by(
     asked: Constraints, lights: Lights, fit: Fit, gamuts: Gamuts | None = None
 ) -> Reduction:
-    """What constraints leave of the lights, and the fit of their colours.
+    """Reduce the lights to the unknowns that constraints and the fit of their colours leave.
 
     gamuts: as of `gamuts_for`. Raises ConstraintError for a light that is to be white and cannot be
     what else is asked of it.

@@ -12,8 +12,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import lit_pixels, loss
-from lightpaint.lighting.loss import warm_start as approach
+from lightpaint.lighting.loss import lit_pixels, loss, warm_start
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.warm_start import sample
 from lightpaint.lighting.problem import Problem
@@ -28,8 +27,8 @@ VIEWS = [ViewTransform("srgb"), ViewTransform("agx", 1.0), ViewTransform("filmic
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Samples of 400 pixels, and strips of 500."""
-    monkeypatch.setattr(approach, "SAMPLE", 400)
-    monkeypatch.setattr(approach, "EACH", 1)
+    monkeypatch.setattr(warm_start, "SAMPLE", 400)
+    monkeypatch.setattr(warm_start, "EACH", 1)
     monkeypatch.setattr(loss, "STRIP", 500)
     return monkeypatch
 
@@ -50,7 +49,7 @@ def _random(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, Target]:
 def _alone(few: pytest.MonkeyPatch, *args: Any, **how: Any) -> Solution:
     """By rounds over all pixels alone."""
     with few.context() as patch:
-        patch.setattr(approach, "SAMPLE", 10**9)
+        patch.setattr(warm_start, "SAMPLE", 10**9)
         return solve(*args, **how)
 
 
@@ -193,7 +192,7 @@ def test_few_pixels_need_no_sample(make_basis: Any, few: Any):
     counted = np.zeros(SIZE, np.float32)
     counted[:10] = 1
     asked: list[int] = []
-    few.setattr(approach, "sample", lambda *args: asked.append(1))
+    few.setattr(warm_start, "sample", lambda *args: asked.append(1))
     solution = solve(basis, replace(target, importance=counted), transform=VIEWS[0])
     assert not asked
     assert solution.certificate.converged

@@ -1,1 +1,1 @@
-"""What a picture costs beside its painting, and the linear problems that stand for it."""
+"""Losses of a picture beside its painting, and the linear problems that stand for them."""

@@ -1,4 +1,4 @@
-"""What a picture costs: the interface of a loss, and the one that is a linear problem itself.
+"""The interface of a loss, and the one that is a linear problem itself.
 
 A solve asks of any other loss two things: what some pixels cost, and squares with the same
 gradient there (`PixelLoss`). `reweighting.py` solves such squares again and again, and decides on
@@ -110,7 +110,7 @@ class PixelLoss(ABC):
 
 
 class Loss(ABC):
-    """What pictures (h, w, 3), linear, cost."""
+    """A loss of pictures (h, w, 3), linear."""
 
     #: Whether the loss is a linear problem itself.
     is_linear = False
@@ -139,7 +139,7 @@ class Loss(ABC):
 
     @cached_property
     def norm2(self) -> Doubles:
-        """What a black picture costs, (3,)."""
+        """The loss of a black picture, (3,)."""
         return self.objective(np.zeros((*self.importance.shape, 3)))
 
     def meant(self, x: Floats) -> Floats:

@@ -17,7 +17,7 @@ from lightpaint.lighting.loss.loss import STRIP, Cut, Loss, image_of, planes_of
 
 @dataclass(frozen=True)
 class PaintingLoss(Loss):
-    """What pictures cost by a painting, as a display shows both, or as light.
+    """The loss of pictures beside a painting, as a display shows both, or as light.
 
     With the importance D, the part q of it that is for the current look C, and the view
     transform V:

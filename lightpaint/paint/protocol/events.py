@@ -1,4 +1,4 @@
-"""What clients of a session are told, as replies or unasked."""
+"""Events: messages from a session to its clients, as replies or unasked."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -118,7 +118,7 @@ class AnswerUpdate(Standing, Findings, Message, kind="answer"):
 
     @property
     def findings(self) -> Findings:
-        """What it says of the answer, by itself."""
+        """The findings of the answer, by themselves."""
         return Findings(**{name: getattr(self, name) for name in Findings.__dataclass_fields__})
 
 

@@ -1,4 +1,4 @@
-"""What clients of a session send: requests, with arrays beside them.
+"""Requests: messages from clients to their session, with arrays beside them.
 
 Clients number their messages (`seq`), and every one of them is answered by one that gives the
 number back (`reply`), errors included: a page keeps one stroke in flight, and the newest wins.
