@@ -23,7 +23,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.bound_release import bounds_of
 from lightpaint.lighting.analysis.noise.directions import all_columns
 from lightpaint.lighting.analysis.noise.grain import grain
-from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
+from lightpaint.lighting.analysis.noise.noise import pseudo_inverse, residual_and_noise
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.solution import Solution
@@ -159,7 +159,8 @@ def diagnose(solution: Solution) -> Diagnosis:
     noise, painting_noise = (
         min(float(power.sum()), out_of_reach)
         for power in (
-            D * np.square(predicted.half_difference, dtype=np.float64),
+            # Not the noise that the painting shares where it is to look as it does now.
+            D * np.square(residual_and_noise(solution)[1]).reshape(missed.shape),
             grain(np.sqrt(D) * unreachable, solution.importance > 0),
         )
     )

@@ -156,3 +156,21 @@ def test_texture_is_no_grain_of_the_painting(make_basis: Any):
     # Some of it is: albedo from pixel to pixel is finer than any surface's. It was all of it.
     assert found.share(found.unreachable) > 0.5
     assert found.share(found.painting_noise) < 0.4
+
+
+def test_the_look_that_is_kept_has_the_noise_of_the_prediction(make_basis: Any):
+    # One light, noisy on the right, which is to stay as it is; the left is painted brighter.
+    noise = np.zeros((1, *SIZE, 3))
+    noise[0, :, 9:] = np.random.default_rng(3).normal(0, 0.3, (SIZE[0], 9, 3))
+    basis = make_basis(images=np.ones((1, *SIZE, 3)) + noise, half_differences=noise)
+    left = np.broadcast_to(np.arange(SIZE[1]) < 9, SIZE)
+    brighter = np.broadcast_to(1.5 * basis.present_weights[0], (*SIZE, 3))
+    target = replace(_target(brighter, left), over_look=True)
+    solution = solve(basis, target, unpainted=1.0, space="linear")
+    found = diagnose(solution)
+    moved = solution.weights[0] - basis.present_weights[0]
+    assert moved.min() > 0
+    # The residual on the right is (now − w) Φ, whose half difference is (now − w) h, not w h.
+    expected = np.square(moved * noise[0, :, 9:]).sum()
+    assert found.noise == pytest.approx(expected, rel=1e-5)  # float32
+    assert found.share(found.unreachable) > 0.5
