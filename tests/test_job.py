@@ -18,7 +18,14 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
-from lightpaint.errors import BasisError, ConstraintError, LightpaintError, SceneError, TargetError
+from lightpaint.errors import (
+    BasisError,
+    ConstraintError,
+    LightpaintError,
+    SceneError,
+    SizeError,
+    TargetError,
+)
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.sources import BasisFile, GroupsFile
 from lightpaint.scene.scene import load_scene
@@ -341,3 +348,25 @@ def test_a_basis_that_was_obtained_serves_the_next_painting(
         rtol=1e-6,
         atol=1e-9,
     )
+
+
+def test_a_painting_over_a_smaller_template_is_solved_at_its_size(room: Path, tmp_path: Path):
+    scene = load_scene(room)
+    height, width = (length // 2 for length in scene.size)
+    image = np.full((height, width, 3), 0.5, np.float32)
+    importance = np.ones((height, width), np.float32)
+    painted = Target("half", image, importance, everything=False)
+    made = replace(painted, content=scene.content, over_look=True)
+
+    def job(target: Target, **how: Any) -> Job:
+        return Job((scene,), (target,), tmp_path / "out", settings=Settings(**how))
+
+    its = job(made)
+    assert its.views[0].scene is not None
+    assert its.views[0].scene.size == (height, width)
+    assert its.remarks[-1] == f"half: solved at {width}x{height} pixels, the size of its template"
+    # Whoever says how large wins, and a picture that came from elsewhere has no say.
+    for target, how in ((made, {"resolution": "1/1"}), (painted, {})):
+        with pytest.raises(SizeError, match=f"half is {width}x{height} but the basis is"):
+            job(target, **how)
+    assert job(made, resize=True).views[0].target.size == scene.size

@@ -15,6 +15,7 @@ from lightpaint.basis.render.obtain import check_same_view
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
@@ -146,7 +147,7 @@ class Job:
         born = vars(self)
         fit = meant_by(self.settings, [view.target for view in views])
         born.update(views=views, asked=asked, fit=fit, results=results)
-        born.update(remarks=tuple(self._remarks(targets)))
+        born.update(remarks=tuple(self._remarks(targets, scenes)))
 
     @property
     def groups(self) -> LightGroups | None:
@@ -257,22 +258,31 @@ class Job:
         if scene is not None:
             check_same_picture(target, scene)
         if scene is not None and basis is None:
-            scene = on_film(scene, self.settings.quality, self.settings.resolution)
+            scene = on_film(scene, self.settings.quality, self._resolution(scene, target))
         given = scene if basis is None else basis
         assert given is not None
         fitted = target.fitted_to(given.size, resize=self.settings.resize)
         return scene, fitted if self.groups is None else fitted.without(self.groups.holes)
 
-    def _remarks(self, targets: Sequence[Target]) -> list[str]:
-        """What a person should know before this is run. targets: as they were read."""
+    def _resolution(self, scene: Scene, target: Target) -> str | None:
+        """Return the resolution asked for; else, of a smaller template, that it was painted at."""
+        asked = self.settings
+        if asked.quality is not None or asked.resolution is not None or asked.resize:
+            return asked.resolution
+        factor = whole_factor(scene.size, target.size)
+        return f"1/{factor}" if target.content and factor and factor > 1 else None
+
+    def _remarks(self, targets: Sequence[Target], scenes: Sequence[Scene]) -> list[str]:
+        """Say what a person should know before this is run. targets, scenes: as they were read."""
         remarks = []
         if self.groups is not None:
             remarks += [*self.groups.remarks, *spoken_unreadable(self.groups, self.folder)]
         rendered = [] if self.basis is not None else [x.scene for x in self.views if x.scene]
         if (first := self.views[0].scene) is not None:
             remarks += remarks_of_scene(first, is_rendered=bool(rendered))
-        for target, view in zip(targets, self.views, strict=True):
-            remarks += remarks_of_target(target, view.target.size, view.scene, self.fit)
+        films = [scene.size for scene in scenes] if rendered else [None] * len(targets)
+        for target, view, film in zip(targets, self.views, films, strict=True):
+            remarks += remarks_of_target(target, view.target.size, view.scene, self.fit, film=film)
         for scene in rendered:
             remarks += [*remarks_of_film(scene, self.settings), *remarks_of_memory(scene)]
         return remarks + remarks_of_pictures()

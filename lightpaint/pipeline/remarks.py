@@ -3,7 +3,7 @@
 from lightpaint.basis.render.integrators import remark_on_separate_renders
 from lightpaint.basis.render.render import memory_needed
 from lightpaint.images.denoiser import LACKING, is_there
-from lightpaint.images.pixel_blocks import left_over, whole_factor
+from lightpaint.images.pixel_blocks import Size, left_over, whole_factor
 from lightpaint.pipeline.settings import Settings
 from lightpaint.scene.presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
@@ -85,9 +85,18 @@ def remarks_of_memory(scene: Scene) -> list[str]:
 
 
 def remarks_of_target(
-    target: Target, size: tuple[int, int], scene: Scene | None, fit: Settings
+    target: Target,
+    size: Size,
+    scene: Scene | None,
+    fit: Settings,
+    *,
+    film: Size | None = None,
 ) -> list[str]:
-    """How `target` was read. size: of the basis that it is solved on. fit: with all decided."""
+    """Say how `target` was read.
+
+    size: of the basis that it is solved on. fit: with all decided. film: size of the whole film of
+    a scene that is rendered.
+    """
     remarks = []
     if scene is not None and target.content not in ("", scene.content):
         remarks.append("the scene has changed since its template was made")
@@ -99,6 +108,8 @@ def remarks_of_target(
         if any(rest):
             remark += f": {_spoken_rest((rest[1], rest[0]))} left over, and nowhere counted"
         remarks.append(remark)
+    if film not in (None, size) and not is_asked_for:
+        remarks.append(f"solved at {width}x{height} pixels, the size of its template")
     name = "srgb" if target.transform is None else target.transform.name
     if fit.space == "linear" and name not in ("srgb", "linear"):
         remarks.append(
