@@ -19,7 +19,7 @@ from lightpaint.batch.manifest.entries import MOST_LOOKS
 from lightpaint.batch.manifest.keys import MOST_FRAMES
 from lightpaint.cli.commands.rooms import template_lines
 from lightpaint.cli.options.parser import command_parser
-from lightpaint.lighting.constraints.white_lights import WHITES
+from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
 from lightpaint.lighting.fit import HOLD
 from lightpaint.paint.server.address import PORT
 from lightpaint.paint.server.client import MOST_HEARD, MOST_HEARD_BYTES
@@ -187,7 +187,7 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
     for said in (
         f"preview: {preview.spp} samples per pixel on some {pixels:,} pixels",
         f"final: {final.spp} on the whole film",
-        f"white: {WHITES[0]} to {WHITES[1]} K",
+        f"white: {LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K",
         f"more than {FEW} are alike",
     ):
         assert said in texts
@@ -200,8 +200,8 @@ def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
     assert f"`--hold {HOLD:g}`" in solving
     assert f"It is {HOLD:g} by default where something was painted over" in method
     for text in (page, solving):
-        assert f"{WHITES[0]} to {WHITES[1]} K" in text
-    assert f"`--kelvin '*={WHITES[0]}:{WHITES[1]}'`" in method
+        assert f"{LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K" in text
+    assert f"`--kelvin '*={LAMP_KELVINS[0]}:{LAMP_KELVINS[1]}'`" in method
 
 
 def test_which_files_are_painted_over_is_said_alike():

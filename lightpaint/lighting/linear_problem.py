@@ -10,7 +10,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.gamuts import Gamuts
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
-from lightpaint.lighting.constraints.white_lights import white_where_free
+from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.weight_penalty import pull_of
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -180,6 +180,6 @@ def reduced_by(
     what else is asked of it.
     """
     if fit.colors == "white":
-        asked = white_where_free(asked, lights)
+        asked = whiten_open_lights(asked, lights)
     reduction = replace(reduce_to(asked, lights), is_joined=fit.colors == "gentle")
     return reduction if gamuts is None else reduction.with_gamuts(gamuts)

@@ -10,9 +10,9 @@ from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.software_versions import Software
-from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, problems
-from lightpaint.lighting.constraints.reduction import only
-from lightpaint.lighting.constraints.sparse_lights import best_knobs
+from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, reduced_problems
+from lightpaint.lighting.constraints.reduction import only_knobs
+from lightpaint.lighting.constraints.sparse_lights import choose_knobs
 from lightpaint.lighting.constraints.white_neighbours import solve_on_locus
 from lightpaint.lighting.linear_problem import LinearProblem
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -42,15 +42,15 @@ def solve_linear(problem: _Problem, start: Doubles) -> Answer[_Problem]:
     if count is None or not problem.full.knobs:
         return solve_reduction(problem, start)
     equations, curve = problem.pulled(problem.solved), []
-    path = best_knobs(problems(equations, problem.full), problem.full, count)
+    path = choose_knobs(reduced_problems(equations, problem.full), problem.full, count)
     for chosen in path:
-        _, found = solve_on_locus(equations, only(problem.full, chosen), start)
+        _, found = solve_on_locus(equations, only_knobs(problem.full, chosen), start)
         curve.append((len(chosen), found.weights))
     best = max((chosen for chosen in path if len(chosen) <= count), key=len)
-    answer = solve_reduction(problem.with_reduction(only(problem.full, best)), start)
+    answer = solve_reduction(problem.with_reduction(only_knobs(problem.full, best)), start)
     # What was chosen and has come out dark is left out as well.
     on = [k for k, x in enumerate(problem.full.knobs) if answer.weights[list(x.lights)].any()]
-    left = answer.problem.with_reduction(only(answer.problem.full, on))
+    left = answer.problem.with_reduction(only_knobs(answer.problem.full, on))
     norm = np.where(problem.norm2 > 0, problem.norm2, 1).sum()
     told = [(n, float(np.sqrt(problem.objective(w).sum() / norm))) for n, w in curve]
     certificate = answer.lighting.certificate

@@ -13,7 +13,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.errors import SizeError
-from lightpaint.lighting.algebra.quadratic import UNREACHED
+from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class NormalEquations:
     def reached(self) -> npt.NDArray[np.bool_]:
         """(n, 3), whether a light reaches something that counts in a channel."""
         power = np.einsum("cii->ic", self.M)
-        return np.asarray(power > UNREACHED * power.max(initial=0))
+        return np.asarray(power > UNREACHED_POWER * power.max(initial=0))
 
     def objective(self, w: Doubles) -> Doubles:
         """‖Ψ − Σ w_i Φ_i‖² per channel, (3,). w: (n, 3).

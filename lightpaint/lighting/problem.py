@@ -18,7 +18,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.white_neighbours import tangent
+from lightpaint.lighting.constraints.white_neighbours import tangent_reduction
 from lightpaint.lighting.fit import Fit, Space, meant_by
 from lightpaint.lighting.linear_problem import LinearProblem, reduced_by
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -214,7 +214,7 @@ class Problem(LinearProblem):
     @cached_property
     def about_answer(self) -> Reduction:
         """`reduction` where an answer is asked about: whites of a range along a straight line."""
-        return tangent(self.reduction, REACH)
+        return tangent_reduction(self.reduction, REACH)
 
     @cached_property
     def painted_share(self) -> float:

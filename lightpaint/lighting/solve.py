@@ -198,12 +198,12 @@ def _descended(
         reduction, optimum = next_whites(equations, at.reduction, solution.weights)
         if all(a is b for a, b in zip(reduction.knobs, at.reduction.knobs, strict=True)):
             break
-        kept_within = reduction.gamut_knobs != at.reduction.gamut_knobs
+        is_confined = reduction.gamut_knobs != at.reduction.gamut_knobs
         at = at.reduced(reduction)
         nearer = _descended_between(at, optimum.weights, reached, blocks, is_near=True)
         count, missed = count + nearer.certificate.rounds, _missed(nearer)
         # What left its gamut may not, whatever that costs.
-        if not kept_within and missed > value * (1 - WORTH):
+        if not is_confined and missed > value * (1 - WORTH):
             break
         solution, value = nearer, missed
     return solution.told(rounds=count)

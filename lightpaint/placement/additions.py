@@ -16,7 +16,7 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.planes import mix
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse, without_noise
-from lightpaint.lighting.constraints.reduced_problem import ReducedProblem, problems
+from lightpaint.lighting.constraints.reduced_problem import ReducedProblem, reduced_problems
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.placement.candidates import Candidates
 
@@ -116,14 +116,14 @@ class _Solver:
         self.equations = equations
         if candidates.pull is not None:
             equations = equations + candidates.pull
-        self.problems = problems(equations, self.reduction)
+        self.problems = reduced_problems(equations, self.reduction)
         self.first = len(self.reduction.knobs) - candidates.count
 
     def weights(self, chosen: Iterable[int]) -> Doubles:
         """(n + m, 3), the best with the candidates `chosen`; the others are 0."""
         x = np.zeros(len(self.reduction.unknowns))
         for problem, here, values in self._solved(chosen):
-            x[problem.its[here]] = values
+            x[problem.unknowns[here]] = values
         return self.reduction.weights(x)
 
     def objective(self, chosen: Iterable[int]) -> float:
@@ -143,7 +143,7 @@ class _Solver:
             power = np.diag(problem.M)
             alone = power - np.einsum("ik,ij,jk->k", cross, inverse, cross, optimize=True)
             safe = np.where(alone > ALONE * power, alone, np.inf)
-            gains[problem.its] = np.square(np.maximum(gradient, 0)) / safe
+            gains[problem.unknowns] = np.square(np.maximum(gradient, 0)) / safe
         places = self.reduction.places[self.first :]
         return np.array([gains[list(its)].sum() for its in places])
 
@@ -153,9 +153,9 @@ class _Solver:
         off -= {self.first + k for k in chosen}
         unknowns = {i for knob in off for i in self.reduction.places[knob]}
         for problem in self.problems:
-            left = [k for k, i in enumerate(problem.its.tolist()) if i not in unknowns]
+            left = [k for k, i in enumerate(problem.unknowns.tolist()) if i not in unknowns]
             here = np.array(left, dtype=np.intp)
-            p = problem.of(here)
+            p = problem.restricted(here)
             x = minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps).x
             yield problem, here, x
 

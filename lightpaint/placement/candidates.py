@@ -101,10 +101,10 @@ class Candidates:
 
 def _with_free_lights(reduction: Reduction, count: int) -> Reduction:
     """`reduction` with that many lights more, of which nothing is asked."""
-    n = len(reduction.held)
+    n = len(reduction.fixed_weights)
     more = tuple(Knob.of_any_colour(k) for k in range(n, n + count))
     return Reduction(
-        np.vstack([reduction.held, np.zeros((count, 3))]),
+        np.vstack([reduction.fixed_weights, np.zeros((count, 3))]),
         (*reduction.labels, *[""] * count),
         (*reduction.knobs, *more),
     )

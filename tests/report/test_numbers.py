@@ -168,7 +168,7 @@ def test_writing_neither_solves_nor_sums_anew(
         monkeypatch.setattr(where, name, counted)
 
     count(solve_module, "_solution")
-    count(reduced_problem, "_optima")
+    count(reduced_problem, "_solve_blocks")
     count(solve_module, "descend")
     count(Basis, "mix")
     count(Basis.__dict__["totals"], "func")

@@ -19,10 +19,11 @@ class _Working:
 
 
 def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tuple[Doubles, int]:
-    """From a feasible x to the optimum, exact in what is at its bounds. Returns (x, steps).
+    """Find the optimum from a feasible x by its active set, exact in what is at its bounds. Returns
+    (x, steps).
 
     Each step is Newton's on the free unknowns. If it leaves the box, it is clipped there and
-    what it hit is held; if that would not lower the objective, it goes up to the first limit.
+    the bounds it hit are held; if that would not lower the objective, it ends at the first limit.
     At the optimum of a working set all limits that pull the wrong way are released, or, once
     that has failed to lower the objective, only the first of them (Bland's rule). The objective
     never rises. Stops at a KKT residual of `tolerance`, or where round-off allows no progress.
@@ -38,9 +39,9 @@ def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tup
         move = _newton(q, x, gradient, working)
         target = x + move
         beyond = working.free & ((target < q.lower) | (target > q.upper))
-        exceeded = _exceeded(q, target, working)
+        exceeded = _exceeded_caps(q, target, working)
         if not beyond.any() and not exceeded.any():
-            progress += _rise(q, gradient, move)
+            progress += _objective_change(q, gradient, move)
             x = target
             left, multipliers, residual = q.violations(x)
             since_best = 0 if residual < 0.5 * best else since_best + 1
@@ -54,24 +55,26 @@ def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tup
             continue
         if not q.groups:
             clipped = np.where(beyond, np.clip(target, q.lower, q.upper), target)
-            rise = _rise(q, gradient, clipped - x)
+            rise = _objective_change(q, gradient, clipped - x)
             if rise < 0:
                 x = clipped
                 progress += rise
                 working.free &= ~beyond
                 continue
-        share = _up_to_the_first_limit(q, x, move, target, beyond, exceeded, working)
-        progress += _rise(q, gradient, share)
+        share = _move_to_first_limit(q, x, move, target, beyond, exceeded, working)
+        progress += _objective_change(q, gradient, share)
         x = x + share
-        # What was hit is there to the last bit.
+        # An unknown that hit a bound equals it to the last bit.
         x = np.where(working.free, x, np.where(x - q.lower <= q.upper - x, q.lower, q.upper))
     return x, max_steps
 
 
 def _working_set(q: Quadratic, x: Doubles) -> _Working:
-    """What holds x: bounds at which it is and whose gradient keeps it there, and caps."""
+    """Return the limits that hold x: bounds at which it is and whose gradient keeps it there, and
+    caps.
+    """
     gradient = q.gradient(x)
-    at_lower, at_upper = q.caps_met(x)
+    at_lower, at_upper = q.active_caps(x)
     multipliers = q.cap_multipliers(x, gradient)
     gradient = gradient - multipliers @ q.A
     stays = ((x <= q.lower) & (gradient > 0)) | ((x >= q.upper) & (gradient < 0))
@@ -81,7 +84,7 @@ def _working_set(q: Quadratic, x: Doubles) -> _Working:
 
 
 def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> Doubles:
-    """The step to the optimum of the free unknowns, with held caps kept (n,)."""
+    """Return the step (n,) to the optimum of the free unknowns; held caps stay as they are."""
     free = np.flatnonzero(working.free)
     held = np.flatnonzero(working.capped & (q.A[:, working.free] > 0).any(axis=1))
     f, k = free.size, held.size
@@ -98,15 +101,15 @@ def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> D
         A = q.A[np.ix_(held, free)]
         matrix[f:, :f], matrix[:f, f:] = A, A.T
         value = q.A[held] @ x
-        # Round-off in a held cap is mended on the way.
+        # The same step corrects round-off in held caps.
         at_lower = np.abs(value - q.cap_lower[held]) <= np.abs(value - q.cap_upper[held])
         rest[f:] = np.where(at_lower, q.cap_lower[held], q.cap_upper[held]) - value
     move[free] = np.linalg.solve(matrix, rest)[:f]
     return move
 
 
-def _exceeded(q: Quadratic, target: Doubles, working: _Working) -> Bools:
-    """Caps, not held yet, that the step to target would leave."""
+def _exceeded_caps(q: Quadratic, target: Doubles, working: _Working) -> Bools:
+    """Return which caps (k,), not held yet, the step to `target` would violate."""
     if not q.groups:
         return np.zeros(0, bool)
     value, room = q.A @ target, 64 * EPSILON * (q.A @ np.abs(target))
@@ -114,12 +117,12 @@ def _exceeded(q: Quadratic, target: Doubles, working: _Working) -> Bools:
     return out & ~working.capped
 
 
-def _rise(q: Quadratic, gradient: Doubles, move: Doubles) -> float:
-    """Change of ½ xᵀM x − bᵀx by a move from where its gradient is this."""
+def _objective_change(q: Quadratic, gradient: Doubles, move: Doubles) -> float:
+    """Return the change of ½ xᵀM x − bᵀx by a move from a point with this gradient."""
     return float(gradient @ move + 0.5 * (move @ (q.M @ move)))
 
 
-def _up_to_the_first_limit(
+def _move_to_first_limit(
     q: Quadratic,
     x: Doubles,
     move: Doubles,
@@ -128,7 +131,9 @@ def _up_to_the_first_limit(
     exceeded: Bools,
     working: _Working,
 ) -> Doubles:
-    """The part of the move that keeps to all limits; what ends it joins the working set."""
+    """Return the part of the move that violates no limit, and add the limit that ends it to the
+    working set.
+    """
     hit = np.flatnonzero(beyond)
     limit = np.where(target[hit] < q.lower[hit], q.lower[hit], q.upper[hit])
     shares = (limit - x[hit]) / move[hit]
@@ -157,10 +162,10 @@ def _release(
     working: _Working,
     release_all: bool,
 ) -> None:
-    """Let go of what pulls the wrong way: all of it, or the first."""
+    """Release limits that pull the wrong way: all of it, or the first."""
     movable = ~working.free & (q.lower < q.upper)
     wrong = movable & np.where(x <= q.lower, gradient < 0, gradient > 0)
-    # A cap that has come to hold nothing takes nothing of the gradient.
+    # A cap whose unknowns are all at bounds has no part in the gradient.
     idle = working.capped & (multipliers == 0) & (q.cap_lower < q.cap_upper)
     if release_all:
         working.free |= wrong

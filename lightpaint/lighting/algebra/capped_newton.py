@@ -1,8 +1,8 @@
-"""`clipped_newton` under caps: the step of what is free, with the caps that hold as equations.
+"""`clipped_newton` under caps: Newton's step on the free unknowns, with held caps as equations.
 
-Which caps hold is guessed anew at each step, as which bounds do: one that is exceeded is held, one
-that would have to push is let go. It may go in circles, or leave the caps on its way; what it
-finds is certified, and where that fails nothing is lost but time.
+Each step guesses anew which caps hold, as it does for bounds: it holds a cap that is exceeded and
+releases one that would have to push outwards. The steps may cycle or violate caps on their way. The
+caller certifies the result, so a failure costs nothing but time.
 """
 
 import numpy as np
@@ -12,14 +12,16 @@ from lightpaint.lighting.algebra.clipped_newton import RIDGE
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic, kkt_residual
 from lightpaint.progress import wanted
 
-#: Steps after which it is left to methods that cannot go in circles.
+#: Steps after which methods take over that cannot cycle.
 MAX_STEPS = 20
 
 
 def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Doubles, float, int]:
-    """From x, (n,), to the optimum: (x, KKT residual, steps). Of no use above `tolerance`."""
+    """Find the optimum from x, (n,), and return (x, KKT residual, steps). The result is of no use
+    if its residual is above `tolerance`.
+    """
     multipliers = q.cap_multipliers(x, q.gradient(x))
-    at_lower, at_upper = q.caps_met(x)
+    at_lower, at_upper = q.active_caps(x)
     at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
     check = wanted()
     for step in range(MAX_STEPS + 1):
@@ -38,7 +40,7 @@ def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Double
         x = np.clip(x + move, q.lower, q.upper)
         multipliers = np.zeros(len(q.groups))
         multipliers[held] = pushes
-        # Only what pushes inwards goes on to hold, and what is exceeded begins to.
+        # A cap goes on holding only if it pushes inwards; one that is exceeded begins to hold.
         at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
         value, room = q.A @ x, 64 * EPSILON * (q.A @ np.abs(x))
         at_lower |= value < q.cap_lower - room
@@ -50,9 +52,10 @@ def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Double
 def _newton(
     q: Quadratic, gradient: Doubles, free: Indices, held: Indices, short: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """The step to the optimum of what is free, (n,), and what held caps take per unit, (h,).
+    """Return the step to the optimum of the free unknowns, (n,), and the multipliers of held caps,
+    (h,).
 
-    short: (h,), by how much the sums of these are to change.
+    short: (h,), the changes that the sums under these caps need.
     """
     f, k = free.size, held.size
     move = np.zeros(q.n)

@@ -1,10 +1,11 @@
-"""Newton's step on what is free, clipped to the bounds: the optimum in a few steps, or not at all.
+"""Newton's step on the free unknowns, clipped to the bounds: the optimum in a few steps, or not at
+all.
 
 Unlike `active_set.polish` it lets the objective rise on its way, and holds and releases as many
-unknowns at a time as the gradient asks for. So it is fast, also from an answer to another target,
-and might go in circles: what it finds is certified, and where that fails nothing is lost but time.
-It takes several problems at once. For few lights numpy's calls cost more than the arithmetic in
-them, and three channels in one call hardly more than one.
+unknowns at a time as the gradient suggests. So it is fast, also from an answer to another target,
+and may cycle. The caller certifies the result, so a failure costs nothing but time.
+It solves several problems together: for few lights numpy's calls cost more than the arithmetic in
+them, and three channels in one call cost hardly more than one.
 """
 
 import numpy as np
@@ -14,12 +15,12 @@ from lightpaint.lighting.algebra.nearest_optimum import is_suspect
 from lightpaint.lighting.algebra.quadratic import EPSILON, kkt_step
 from lightpaint.progress import wanted
 
-#: Times √n, added to the unit diagonal of M, so that no set of lights, coincident ones
-#: included, is singular. A step then is that of the proximal-point method: repeated, it loses
-#: nothing.
+#: Ridge per √n on the unit diagonal of M, so that no set of lights is singular, not even of
+#: coincident ones. Each step is then one of the proximal-point method, whose repetition converges
+#: to an optimum without the ridge.
 RIDGE = 8 * EPSILON
 
-#: Steps after which it is left to methods that cannot go in circles.
+#: Steps after which methods take over that cannot cycle.
 MAX_STEPS = 10
 
 
@@ -38,10 +39,9 @@ def clipped_newton(
     M: (c, n, n), scaled to a unit diagonal, with rows of 0 where an unknown changes nothing;
     b, lower, upper: (c, n), or one bound for all. x: (c, n), between the bounds, to begin with.
     size: (c,), what the KKT residuals are relative to.
-    Returns x, to the last bit at the bounds that hold it, the KKT residuals, (c,), how many steps
-    were taken, and whether the last was of a matrix that may be singular: there are then other x
-    that are as good (see nearest_optimum.py). Where a residual is more than `tolerance`, x is of no
-    use.
+    Returns x, which equals the bounds that hold it to the last bit, the KKT residuals, (c,), the
+    number of steps, and whether the matrix of the last step may be singular: other x are then as
+    good (see nearest_optimum.py). Where a residual is above `tolerance`, x is of no use.
     """
     matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0
     check = wanted()
@@ -53,16 +53,18 @@ def clipped_newton(
         if step == MAX_STEPS or not is_open.any():
             break
         stays = ((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0))
-        # Problems that are solved stay as they are, whatever the others still need.
+        # Solved problems stay as they are while others still need steps.
         move, matrix = _newton(M, gradient, counts & ~stays & is_open[:, None])
         x = np.minimum(np.maximum(x + move, lower), upper)
     return x, residual, step, is_suspect(matrix)
 
 
 def _newton(M: Doubles, gradient: Doubles, free: Bools) -> tuple[Doubles, Doubles]:
-    """Steps to the optima of the free unknowns, (c, n), 0 for the others, and their matrices."""
-    # All matrices are of those unknowns that are free in any problem. What is not free there
-    # has a row of the identity, which moves nothing.
+    """Return steps to the optima of the free unknowns, (c, n), 0 for the others, and the matrices
+    solved.
+    """
+    # All matrices have the unknowns that are free in any problem. An unknown that is not free in
+    # one has a row of the identity there, which moves nothing.
     rows = np.flatnonzero(free.any(axis=0))
     here = free[:, rows]
     matrix = M.copy() if rows.size == M.shape[1] else M[:, rows][:, :, rows]

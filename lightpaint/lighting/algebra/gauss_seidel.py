@@ -7,15 +7,15 @@ from lightpaint.lighting.algebra.active_set import polish
 from lightpaint.lighting.algebra.quadratic import Quadratic
 
 #: Steps for the few unknowns of one cap.
-BLOCK_STEPS = 60
+MAX_BLOCK_STEPS = 60
 
 
 def sweep(q: Quadratic, x: Doubles, gradient: Doubles) -> None:
-    """One pass over the unknowns, in place: each goes to where it is best, the others as they are.
+    """Update each unknown in turn, in place, to its best value while the others stay.
 
         x_i ← min(max((b_i − Σ_{j≠i} M_ij x_j) / M_ii, lower_i), upper_i),   M_ii = 1
 
-    The unknowns of a cap are one block, whose best point is found exactly. gradient:
+    The unknowns of a cap form one block, which is solved exactly. gradient:
     M x − b, kept up to date. The objective never rises.
     """
     lower, upper = q.lower.tolist(), q.upper.tolist()
@@ -32,7 +32,7 @@ def sweep(q: Quadratic, x: Doubles, gradient: Doubles) -> None:
             gradient += (new - now) * row
     for k, group in enumerate(q.groups):
         part = _block(q, k, x, gradient)
-        best, _ = polish(part, x[group], tolerance=1e-15, max_steps=BLOCK_STEPS)
+        best, _ = polish(part, x[group], tolerance=1e-15, max_steps=MAX_BLOCK_STEPS)
         move = best - x[group]
         if move.any():
             x[group] = best
@@ -40,7 +40,7 @@ def sweep(q: Quadratic, x: Doubles, gradient: Doubles) -> None:
 
 
 def _block(q: Quadratic, k: int, x: Doubles, gradient: Doubles) -> Quadratic:
-    """The problem in the unknowns of cap k, the others as they are."""
+    """Return the problem in the unknowns of cap k while the others stay."""
     group = q.groups[k]
     M = q.M[np.ix_(group, group)]
     return Quadratic(

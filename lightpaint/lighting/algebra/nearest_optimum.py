@@ -1,7 +1,8 @@
-"""Of equally good answers, the one nearest to where the solve began.
+"""The optimum nearest to the start, where several are equally good.
 
-Two lights at one place make M singular: what one of them gains the other may lose. A solver moves
-along such a direction by round-off over round-off, another way on every processor.
+Two lights at one place make M singular: light moved from one to the other changes no picture. A
+solver's steps in such a direction are round-off divided by round-off, which differs between
+processors.
 """
 
 import numpy as np
@@ -9,24 +10,24 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.algebra.quadratic import Quadratic
 
-#: Eigenvalues of M, of unit diagonal, along which no step that is taken changes what counts; and
-#: the pivot of a Cholesky factor, squared, below which it is worth while to look for such.
-NULL, SUSPECT = 1e-13, 1e-10
+#: The eigenvalue of M, of unit diagonal, below which a step along its vector changes nothing that
+#: counts; and the squared pivot of a Cholesky factor below which such vectors are worth a search.
+NULL_EIGENVALUE, SUSPECT_PIVOT = 1e-13, 1e-10
 
 
 def is_suspect(M: Doubles) -> bool:
-    """Whether any of these matrices, (…, n, n), is singular or nearly so."""
+    """Return whether any of these matrices, (…, n, n), is singular or nearly so."""
     try:
         pivots = np.linalg.cholesky(M).diagonal(axis1=-2, axis2=-1)
     except np.linalg.LinAlgError:
         return True
-    return bool(np.square(pivots.min(initial=1.0)) < SUSPECT)
+    return bool(np.square(pivots.min(initial=1.0)) < SUSPECT_PIVOT)
 
 
 def nearest_equal(q: Quadratic, x: Doubles, begin: Doubles) -> Doubles:
-    """The point nearest to `begin` among those that are as good as x, (n,), as far as bounds allow.
+    """Return the point nearest to `begin` among those as good as x, (n,), as far as bounds allow.
 
-    What is at a bound stays there, and so do the sums that caps limit.
+    Unknowns at bounds stay there, and the sums that caps limit keep their values.
     """
     free: Bools = (x > q.lower) & (x < q.upper) & (np.diag(q.M) > 0)
     f = np.flatnonzero(free)
@@ -38,9 +39,9 @@ def nearest_equal(q: Quadratic, x: Doubles, begin: Doubles) -> Doubles:
     if not is_suspect(matrix):
         return x
     values, vectors = np.linalg.eigh(matrix)
-    idle = vectors[:, values <= NULL]
+    idle = vectors[:, values <= NULL_EIGENVALUE]
     away = idle @ (idle.T @ (x - begin)[f])
-    # What is where it was has all the room there is.
+    # An unknown that has not moved limits nothing.
     f, away = f[away != 0], away[away != 0]
     # Straight back, up to the first bound.
     room = np.where(away > 0, x[f] - q.lower[f], q.upper[f] - x[f])

@@ -13,18 +13,18 @@ from lightpaint.lighting.algebra.capped_newton import capped_newton
 from lightpaint.lighting.algebra.clipped_newton import clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
-from lightpaint.lighting.algebra.quadratic import UNREACHED, Cap, Quadratic, scaled
+from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
 from lightpaint.progress import wanted
 from lightpaint.threads import one_thread, side_by_side
 
 #: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
 Method = Literal["polished", "gauss-seidel"]
 
-#: What there is to say of caps where there are none.
+#: The multipliers of a problem without caps.
 NO_CAPS = np.zeros(0)
 
-#: Unknowns up to which several problems are solved in the same calls; beyond, each on a thread.
-FEW = 64
+#: Unknowns up to which numpy solves several problems in one call; larger ones get a thread each.
+MAX_BATCHED_UNKNOWNS = 64
 
 #: Sweeps before a polish is tried again, if one did not do.
 SWEEPS_BETWEEN = 50
@@ -32,16 +32,16 @@ SWEEPS_BETWEEN = 50
 
 @dataclass(frozen=True)
 class Optimum:
-    """The best x, and what shows that it is.
+    """The best x, with the multipliers that prove it.
 
     x: (n,), at a bound exactly where it is held there.
     multipliers: (n,), gradient M x − b of each unknown less what caps take of it: 0 between
-    the bounds, >= 0 where x is held at the lower, <= 0 where it is held at the upper one.
-    cap_multipliers: (k,), what a cap takes per unit of coefficient: by how much the objective
-    would change if its limit rose by one. <= 0 at the upper, >= 0 at the lower limit.
+    the bounds, >= 0 where the lower bound holds x, <= 0 where the upper one does.
+    cap_multipliers: (k,), the change of the objective if the limit of a cap rose by one. <= 0 at
+    the upper, >= 0 at the lower limit.
     kkt_residual: largest violation of the above, after scaling (see `kkt_residual`).
     sweeps: Gauss–Seidel passes; steps: of Newton's method on what is free.
-    tolerance: what kkt_residual was to come down to, raised to the round-off of M x − b.
+    tolerance: the limit for kkt_residual, raised to the round-off of M x − b.
     """
 
     x: Doubles
@@ -54,7 +54,7 @@ class Optimum:
 
     @property
     def converged(self) -> bool:
-        """Whether the tolerance was met."""
+        """True if the residual is within the tolerance."""
         return self.kkt_residual <= self.tolerance
 
 
@@ -73,13 +73,12 @@ def minimise(
     """Minimise ½ xᵀM x − bᵀx over lower ≤ x ≤ upper and the caps.
 
     M: (n, n) symmetric, positive semidefinite up to round-off; b: (n,). lower, upper: numbers
-    or (n,); equal ones hold an unknown. start: (n,), moved into the bounds; their nearest point
+    or (n,); equal ones fix an unknown. start: (n,), moved into the bounds; their nearest point
     to 0 by default. max_sweeps: the limit of Gauss–Seidel passes; running out of them is a
     result.
 
-    If M is singular, as with two lights at one place, many x are optimal: the answer is near
-    `start` (nearest_optimum.py), but which one it is, is not promised. Unknowns with M_ii = 0
-    keep their start.
+    If M is singular, as with two lights at one place, many x are optimal: the answer is one near
+    `start` (nearest_optimum.py). Unknowns with M_ii = 0 keep their start.
 
     Raises ValueError if shapes do not fit or no x satisfies bounds and caps.
     """
@@ -87,10 +86,10 @@ def minimise(
     begin = np.zeros(q.n) if start is None else np.asarray(start, np.float64)
     x = q.feasible(begin / q.scale)
     if not (q.b > 0).any():
-        # Nothing in the target asks for light. Where bounds allow it, all off is exactly optimal.
+        # The target needs no light. Where bounds allow it, all lights off is exactly optimal.
         dark = q.feasible(np.where(np.diag(q.M) > 0, 0.0, x))
         x = dark if q.violations(dark)[2] == 0 else x
-    by_method = _by_sweeps if method == "gauss-seidel" else _polished
+    by_method = _solve_by_sweeps if method == "gauss-seidel" else _solve_polished
     start_at = x
     with one_thread():
         x, sweeps, steps = by_method(q, x, tolerance, max_sweeps)
@@ -121,15 +120,15 @@ def minimise_each(
     tolerance: float = 1e-12,
     max_sweeps: int = 20_000,
 ) -> list[Optimum]:
-    """`minimise` for each of c problems of one size, without caps.
+    """Minimise as `minimise` does, for each of c problems of one size, without caps.
 
     M: (c, n, n); b, lower, upper, start: (c, n). For few unknowns numpy's calls cost more than
-    the arithmetic in them, so that all are solved by the same calls; many are solved side by side.
+    the arithmetic in them, so that the same calls solve all problems; larger ones run on threads.
     """
     count, n = b.shape
     found: dict[int, Optimum] = {}
-    if n <= FEW and method == "polished" and max_sweeps > 0:
-        found = _at_once(M, b, lower, upper, start, tolerance)
+    if n <= MAX_BATCHED_UNKNOWNS and method == "polished" and max_sweeps > 0:
+        found = _solve_together(M, b, lower, upper, start, tolerance)
 
     def solve(c: int) -> Optimum:
         return minimise(
@@ -144,22 +143,29 @@ def minimise_each(
         )
 
     left = [c for c in range(count) if c not in found]
-    solved = side_by_side(solve, left) if n > FEW and len(left) > 1 else map(solve, left)
+    solved = (
+        side_by_side(solve, left)
+        if n > MAX_BATCHED_UNKNOWNS and len(left) > 1
+        else map(solve, left)
+    )
     found.update(zip(left, solved, strict=True))
     return [found[c] for c in range(count)]
 
 
-def _at_once(
+def _solve_together(
     M: Doubles, b: Doubles, lower: Doubles, upper: Doubles, start: Doubles, tolerance: float
 ) -> dict[int, Optimum]:
-    """Those of the problems that clipped steps solve. Arguments as of `minimise_each`."""
+    """Solve those of the problems that clipped steps solve, by their index. For the arguments see
+    `minimise_each`.
+    """
     power = np.einsum("cii->ci", M)
-    counts = power > UNREACHED * power.max(axis=1, keepdims=True, initial=0)
-    # A problem in which nothing asks for light has an answer that takes no steps.
+    counts = power > UNREACHED_POWER * power.max(axis=1, keepdims=True, initial=0)
+    # A problem that needs no light has an answer that takes no steps.
     asks = np.any((b > 0) & counts, axis=1)
     if not (asks.any() and np.isfinite(M).all() and np.isfinite(b).all()):
         return {}
-    # What changes nothing is left out: the others then have the bits that they have without it.
+    # Unknowns that change nothing are left out, so that the others get the same bits as without
+    # them.
     rows: slice | Indices = slice(None)
     if not (reached := counts.any(axis=0)).all():
         rows = np.flatnonzero(reached)
@@ -194,10 +200,10 @@ def _at_once(
     }
 
 
-def _polished(
+def _solve_polished(
     q: Quadratic, x: Doubles, tolerance: float, max_sweeps: int
 ) -> tuple[Doubles, int, int]:
-    """(x, sweeps, steps): Newton's clipped steps, or else the polish with sweeps between tries."""
+    """Solve by Newton's clipped steps, or else by polishes with sweeps between them."""
     _, _, residual = q.violations(x)
     sweeps, steps = 0, 0
     if residual > tolerance and max_sweeps > 0 and q.groups:
@@ -231,16 +237,17 @@ def _polished(
     return x, sweeps, steps
 
 
-def _by_sweeps(
+def _solve_by_sweeps(
     q: Quadratic, x: Doubles, tolerance: float, max_sweeps: int
 ) -> tuple[Doubles, int, int]:
-    """(x, sweeps, 0): Gauss–Seidel alone."""
+    """Solve by Gauss–Seidel sweeps alone; return (x, sweeps, 0)."""
     _, _, residual = q.violations(x)
     sweeps = 0
     check = wanted()
     while residual > tolerance and sweeps < max_sweeps:
         check()
-        # Computed anew each time, the gradient's round-off does not decide when to stop.
+        # The gradient is computed anew each time, so that its round-off does not decide when to
+        # stop.
         sweep(q, x, q.gradient(x))
         sweeps += 1
         _, _, residual = q.violations(x)
@@ -248,7 +255,7 @@ def _by_sweeps(
 
 
 def _unscaled(q: Quadratic, x: Doubles, lower: npt.ArrayLike, upper: npt.ArrayLike) -> Doubles:
-    """x in its own units, at its own bounds to the last bit."""
+    """Return x in its own units; one at a bound equals it to the last bit."""
     value = x * q.scale
     value = np.where(x <= q.lower, lower, value)
     value = np.where(x >= q.upper, upper, value)

@@ -15,7 +15,7 @@ from lightpaint.arrays import Bools, Doubles, Indices
 EPSILON = float(np.finfo(np.float64).eps)
 
 #: An unknown whose M_ii is below this share of the greatest changes nothing that counts.
-UNREACHED = 1e-24
+UNREACHED_POWER = 1e-24
 
 
 @dataclass(frozen=True)
@@ -56,11 +56,11 @@ class Quadratic:
         return self.b.size
 
     def gradient(self, x: Doubles) -> Doubles:
-        """M x − b."""
+        """Return M x − b."""
         return self.M @ x - self.b
 
     def feasible(self, x: Doubles) -> Doubles:
-        """The nearest point to x that keeps to all bounds and caps."""
+        """Return the nearest point to x that keeps to all bounds and caps."""
         x = np.clip(x, self.lower, self.upper)
         value = self.A @ x
         wanted = np.minimum(np.maximum(value, self.cap_lower), self.cap_upper)
@@ -69,25 +69,27 @@ class Quadratic:
             caps = np.array([k for k in out if self.groups[k].size == size])
             its = np.stack([self.groups[k] for k in caps])
             low, high = self.lower[its], self.upper[its]
-            x[its] = moved_along(self.A[caps[:, None], its], x[its], low, high, wanted[caps])
+            x[its] = clip_to_sums(self.A[caps[:, None], its], x[its], low, high, wanted[caps])
         return x
 
-    def caps_met(self, x: Doubles) -> tuple[Bools, Bools]:
-        """Which caps hold x at their lower, and which at their upper limit; both (k,)."""
+    def active_caps(self, x: Doubles) -> tuple[Bools, Bools]:
+        """Return which caps x meets at their lower limits, and which at their upper ones; both
+        (k,).
+        """
         value = self.A @ x
-        # The sum over a group is not exact to the last bit, wherever x comes from.
+        # The sum over a group has round-off.
         room = 64 * EPSILON * (np.abs(self.A) @ np.abs(x))
         return value <= self.cap_lower + room, value >= self.cap_upper - room
 
     def cap_multipliers(self, x: Doubles, gradient: Doubles) -> Doubles:
-        """λ (k,) for which gradient − λ A leaves the least to wish for; 0 where there is slack.
+        """Return λ (k,) that minimises gradient − λ A; 0 for caps with slack.
 
         λ <= 0 at an upper limit, >= 0 at a lower one, as the gradient itself is at bounds.
         """
         multipliers = np.zeros(len(self.groups))
         if not self.groups:
             return multipliers
-        at_lower, at_upper = self.caps_met(x)
+        at_lower, at_upper = self.active_caps(x)
         low, high = x <= self.lower, x >= self.upper
         between = self.A * (~low & ~high)
         weight = np.einsum("kn,kn->k", between, between)
@@ -106,10 +108,10 @@ class Quadratic:
         return multipliers
 
     def violations(self, x: Doubles) -> tuple[Doubles, Doubles, float]:
-        """(gradient after what caps take, λ, KKT residual) at x.
+        """Return (gradient less the multipliers of caps, λ, KKT residual) at x.
 
-        The residual is ‖x − P(x − gradient)‖∞ over `size`, P the projection onto the box, or by
-        how much a cap is exceeded, if that is more.
+        The residual is ‖x − P(x − gradient)‖∞ over `size`, P the projection onto the box, or the
+        largest violation of a cap, if that is more.
         """
         gradient = self.gradient(x)
         multipliers = self.cap_multipliers(x, gradient)
@@ -123,7 +125,7 @@ class Quadratic:
         return gradient, multipliers, residual
 
     def round_off(self, x: Doubles) -> float:
-        """What the KKT residual at x is uncertain by: no solver gets safely below."""
+        """Return the round-off of the KKT residual at x: no solver gets safely below."""
         terms = np.abs(self.M) @ np.abs(x) + np.abs(self.b)
         return 4 * EPSILON * float(terms.max(initial=0)) / self.size
 
@@ -131,7 +133,7 @@ class Quadratic:
 def kkt_residual(
     gradient: Doubles, x: Doubles, size: float, lower: Doubles | float, upper: Doubles | float
 ) -> float:
-    """How far x is from optimal: ‖x − P(x − gradient)‖∞ / size, P onto lower..upper.
+    """Return the distance of x from optimal: ‖x − P(x − gradient)‖∞ / size, P onto lower..upper.
 
     It is 0 exactly if the gradient vanishes for every unknown between its bounds, is not
     negative at lower and not positive at upper ones. All scaled to a unit diagonal of M.
@@ -142,10 +144,10 @@ def kkt_residual(
 def kkt_step(
     gradient: Doubles, x: Doubles, lower: Doubles | float, upper: Doubles | float
 ) -> Doubles:
-    """x − P(x − gradient), up to its sign; of the shape of x."""
+    """Return x − P(x − gradient), up to its sign, in the shape of x."""
     target = x - gradient
     inside = (target > lower) & (target < upper)
-    # x − (x − gradient) would lose what is small beside x.
+    # x − (x − gradient) would lose a gradient that is small beside x.
     return np.where(inside, gradient, np.minimum(np.maximum(target, lower), upper) - x)
 
 
@@ -156,7 +158,9 @@ def scaled(
     upper: npt.ArrayLike,
     caps: tuple[Cap, ...],
 ) -> Quadratic:
-    """Scale the problem. Raises ValueError if its parts do not fit, or nothing satisfies it."""
+    """Scale the problem to a unit diagonal of M. Raises ValueError if its parts do not fit, or
+    nothing satisfies it.
+    """
     n = b.size
     if M.shape != (n, n):
         raise ValueError(f"M is {M.shape} and b {b.shape}: expected ({n}, {n})")
@@ -168,7 +172,7 @@ def scaled(
         i = int(np.flatnonzero(~(low <= high))[0])
         raise ValueError(f"unknown {i}: lower bound {low[i]:g} is above upper bound {high[i]:g}")
     power = np.diag(M)
-    counts = power > UNREACHED * power.max(initial=0)
+    counts = power > UNREACHED_POWER * power.max(initial=0)
     scale = np.where(counts, 1 / np.sqrt(np.where(counts, power, 1)), 1.0)
     inward = np.where(counts, scale, 0.0)
     # No product of two scales: it could overflow where what it multiplies is small.
@@ -203,7 +207,7 @@ def _scaled_caps(
         np.array([getattr(cap, end) for cap in caps], np.float64) / length
         for end in ("lower", "upper")
     )
-    # Where a cap has no part, no bound counts, were it infinite.
+    # Bounds of unknowns outside a cap do not count, not even infinite ones.
     least, most = (np.where(A > 0, A * np.where(A > 0, x, 0), 0).sum(axis=1) for x in (low, high))
     limits = np.stack([least, most, cap_lower, cap_upper])
     room = 16 * EPSILON * np.abs(np.where(np.isfinite(limits), limits, 0)).max(axis=0, initial=0)
@@ -217,27 +221,28 @@ def _scaled_caps(
     return A, cap_lower, cap_upper, length, groups
 
 
-def moved_along(a: Doubles, x: Doubles, low: Doubles, high: Doubles, wanted: Doubles) -> Doubles:
-    """clip(x + t a) with the t for which a · clip(x + t a) is `wanted`, for each of k rows.
+def clip_to_sums(a: Doubles, x: Doubles, low: Doubles, high: Doubles, goal: Doubles) -> Doubles:
+    """Return clip(x + t a) with the t for which a · clip(x + t a) equals `goal`, for each of k
+    rows.
 
-    a, x, low, high: (k, m), a > 0; wanted: (k,). The sum rises with t, in a straight line between
+    a, x, low, high: (k, m), a > 0; goal: (k,). The sum rises with t, in a straight line between
     the t at which an unknown comes to a bound.
     """
     ends = np.sort(np.concatenate([(low - x) / a, (high - x) / a], axis=1), axis=1)
     at_ends = x[:, None] + ends[..., None] * a[:, None]
     sums = np.einsum("km,kem->ke", a, np.clip(at_ends, low[:, None], high[:, None]))
-    after = (sums < wanted[:, None]).sum(axis=1)
+    after = (sums < goal[:, None]).sum(axis=1)
     walls = np.empty((len(a), ends.shape[1] + 2))
     walls[:, 0], walls[:, 1:-1], walls[:, -1] = -np.inf, ends, np.inf
     rows = np.arange(len(a))
     first, last = walls[rows, after], walls[rows, after + 1]
-    # Some t between the two that the answer lies between.
+    # A t between the two that enclose the answer.
     least, most = (np.where(np.isfinite(end), end, 0) for end in (first, last))
     some = (least + most) / 2
     some = np.where(np.isfinite(last), some, least + 1)
     some = np.where(np.isfinite(first), some, np.where(np.isfinite(last), most - 1, 0))
     there = x + some[:, None] * a
     slope = (np.square(a) * ((there > low) & (there < high))).sum(axis=1)
-    short = wanted - (a * np.clip(there, low, high)).sum(axis=1)
+    short = goal - (a * np.clip(there, low, high)).sum(axis=1)
     t = np.clip(some + short / np.where(slope > 0, slope, np.inf), first, last)
     return np.asarray(np.clip(x + t[:, None] * a, low, high))

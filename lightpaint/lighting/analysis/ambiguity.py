@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
-from lightpaint.lighting.algebra.quadratic import UNREACHED
+from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 from lightpaint.lighting.solution import Solution
 
 #: Two images are taken for one if their normalised inner product is above 1 − ALIKE, and
@@ -77,7 +77,7 @@ def indistinguishable(
     channels = M[None] if M.ndim == 2 else M
     # Each channel is scaled on its own: another colour is another weight, not another light.
     power = np.einsum("cii->ci", channels)
-    lit = power > UNREACHED * power.max(initial=0)
+    lit = power > UNREACHED_POWER * power.max(initial=0)
     scale = np.where(lit, 1 / np.sqrt(np.where(lit, power, 1)), 0)
     cosines = channels * scale[:, :, None] * scale[:, None, :]
     reached = np.flatnonzero(lit.any(axis=0))

@@ -14,7 +14,7 @@ from lightpaint.lighting.answer.active_bound import Bound, Tint
 from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.white_neighbours import at_best_white, next_whites
+from lightpaint.lighting.constraints.white_neighbours import move_to_best_white, next_whites
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 
@@ -95,7 +95,7 @@ def _without(o: Answer, held: Held) -> tuple[Reduction, Doubles]:
     """The reduction with that alone let go, and the answer in its unknowns."""
     knobs, x = [*o.reduction.knobs], o.found.x
     if held.kind == "left out":
-        knobs[held.knob] = at_best_white(o.full.knobs[held.knob], o.gradient)
+        knobs[held.knob] = move_to_best_white(o.full.knobs[held.knob], o.gradient)
     elif held.kind == "zero":
         knob, its = knobs[held.knob], o.reduction.places[held.knob]
         below = tuple(
@@ -106,10 +106,10 @@ def _without(o: Answer, held: Held) -> tuple[Reduction, Doubles]:
     if held.kind in ("left out", "zero"):
         return replace(o.reduction, knobs=tuple(knobs)), x
     left = [k for k, knob in enumerate(knobs) if not set(knob.lights) & set(held.lights)]
-    weights = o.reduction.held.copy()
+    weights = o.reduction.fixed_weights.copy()
     weights[list(held.lights)] = 0
     freed = [Knob.of_any_colour(k, is_scalar=o.basis.lights[k].is_scalar) for k in held.lights]
     values = [x[list(o.reduction.places[k])] for k in left]
     values += [o.w[k.lights[0], : len(k.unknowns)] for k in freed]
-    made = replace(o.reduction, held=weights, knobs=(*(knobs[k] for k in left), *freed))
+    made = replace(o.reduction, fixed_weights=weights, knobs=(*(knobs[k] for k in left), *freed))
     return made, np.concatenate(values)

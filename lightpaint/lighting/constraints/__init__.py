@@ -1,1 +1,1 @@
-"""What is asked of lights, and the unknowns that this leaves."""
+"""Constraints on lights, and the unknowns that they leave."""

@@ -1,8 +1,8 @@
-"""What may be asked of lights, in the terms of people who light: locked, limited, dimmed.
+"""Constraints on lights, in the terms of people who light: locked, limited, dimmed.
 
-The same keys and values stand in a lights file, in options of the command line and in
-`Constraints.of`. They are checked here, when they are born; `reduction.py` makes of them
-the unknowns of the solve. docs/formats.md lists them.
+A lights file, the options of the command line and `Constraints.of` share keys and values. This
+module checks them once; `reduction.py` derives the unknowns of the solve from them.
+docs/formats.md lists them.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,34 +18,35 @@ from lightpaint.lighting.constraints.values import (
     Lock,
     check_keys,
     check_lengths,
-    color_of,
-    count_of,
-    described,
-    limits_of,
-    lock_of,
-    primaries_of,
-    strength_of,
-    whites_of,
+    describe_constraint,
+    parse_color,
+    parse_count,
+    parse_limits,
+    parse_lock,
+    parse_primaries,
+    parse_strength,
+    parse_whites,
 )
 from lightpaint.screen import some_of
 from lightpaint.validation import MAX_LISTED
 
-#: What may be asked of one light.
+#: Keys of the constraints on one light.
 LIGHT_KEYS = ("lock", "off", "limits", "color", "kelvin", "duv", "primaries")
 
-#: Of these a light can have one: each says which colours it has.
-COLOURS = ("color", "kelvin", "primaries")
+#: Keys that determine the colours of a light, which can have one of them.
+COLOR_KEYS = ("color", "kelvin", "primaries")
 
 
 @dataclass(frozen=True)
 class LightConstraint:
-    """What is asked of one light.
+    """A constraint on one light.
 
-    lock: to stay at this. off: to be black. least, most: limits of its emission.
+    lock: the emission at which it stays. off: whether it is black. least, most: limits of its
+    emission.
     primaries: the colours it can mix, each of luminance 1: one for a fixed colour, the two
     ends of a range of white, the LEDs of a fixture; None if any colour will do.
-    whites: the range of white that it keeps to, if it does.
-    label: all this in few words. where: what errors call it.
+    whites: the range of white that it keeps to, if there is one.
+    label: all this in few words. where: the name of the source in errors.
     """
 
     lock: Lock | None = None
@@ -58,46 +59,48 @@ class LightConstraint:
     where: str = ""
 
     @property
-    def is_held(self) -> bool:
-        """Whether it leaves nothing to solve for."""
+    def is_fixed(self) -> bool:
+        """True if it leaves nothing to solve for."""
         return self.off or self.lock is not None
 
     @classmethod
-    def of(cls, asked: Mapping[str, Any], *, where: str = "constraint") -> "LightConstraint":
-        """From keys and values as they stand in a lights file.
+    def of(cls, table: Mapping[str, Any], *, where: str = "constraint") -> "LightConstraint":
+        """Make a constraint of keys and values as they stand in a lights file.
 
         Raises ConstraintError for values that mean nothing, and for keys that contradict
         each other.
         """
-        check_keys(asked, LIGHT_KEYS, where)
-        check_lengths(asked, where)
-        asked = {key: value for key, value in asked.items() if value is not False}
-        _check_contradictions(asked, where)
-        lock = lock_of(asked["lock"], f"{where}.lock") if "lock" in asked else None
-        if "off" in asked and asked["off"] is not True:
-            raise ConstraintError(f"{where}.off is {asked['off']!r}: expected true or false")
+        check_keys(table, LIGHT_KEYS, where)
+        check_lengths(table, where)
+        table = {key: value for key, value in table.items() if value is not False}
+        _check_contradictions(table, where)
+        lock = parse_lock(table["lock"], f"{where}.lock") if "lock" in table else None
+        if "off" in table and table["off"] is not True:
+            raise ConstraintError(f"{where}.off is {table['off']!r}: expected true or false")
         least, most = (
-            limits_of(asked["limits"], f"{where}.limits") if "limits" in asked else (None,) * 2
+            parse_limits(table["limits"], f"{where}.limits") if "limits" in table else (None,) * 2
         )
-        primaries = primaries_of(asked, where)
-        whites = whites_of(asked, where)
+        primaries = parse_primaries(table, where)
+        whites = parse_whites(table, where)
         if lock is not None and primaries is not None:
             if lock.level is None or lock.color is not None or isinstance(lock.level.amount, tuple):
                 raise ConstraintError(
-                    f"{where} has a lock that holds its colour and {_first(asked, COLOURS)!r} that "
+                    f"{where} has a lock that holds its colour and "
+                    f"{_first_key(table, COLOR_KEYS)!r} that "
                     "sets one: lock it at a number or at a percentage, or leave one out"
                 )
             if len(primaries) > 1:
                 raise ConstraintError(
-                    f"{where} has both lock and {_first(asked, COLOURS)!r}, which leaves the mix "
+                    f"{where} has both lock and {_first_key(table, COLOR_KEYS)!r}, which leaves "
+                    f"the mix "
                     "of its colours open: lock it at a colour"
                 )
             lock, primaries = Lock(lock.level, primaries[0]), None
-        return cls(lock, "off" in asked, least, most, primaries, whites, _label(asked), where)
+        return cls(lock, "off" in table, least, most, primaries, whites, _label(table), where)
 
 
-def _label(asked: Mapping[str, Any]) -> str:
-    return ", ".join(described(key, asked[key]) for key in LIGHT_KEYS if key in asked)
+def _label(table: Mapping[str, Any]) -> str:
+    return ", ".join(describe_constraint(key, table[key]) for key in LIGHT_KEYS if key in table)
 
 
 @dataclass(frozen=True)
@@ -116,19 +119,19 @@ class Tie:
 @keywords()
 @dataclass(frozen=True)
 class Constraints:
-    """What is asked of the lights, besides to come close to the painting.
+    """Constraints on the lights: what a solution has to keep to besides the painting.
 
     Attributes:
-        lights: Name or pattern, what is asked of it, and what errors call it. What stands later
-            replaces what it contradicts; `of` puts patterns before names.
+        lights: Name or pattern, its keys and values, and the name of their source in errors. Later
+            entries replace what they contradict; `of` puts patterns before names.
         ties: Lights on one dimmer.
         prefer_current: Strength of the pull towards the present lighting. At 1 a light that changes
-            costs as much as if the whole picture it makes, painted or not, were missed.
-        sparse: How many lights may be on at most.
+            costs as much as an error of the whole picture it makes, painted or not.
+        sparse: The most lights that may be on.
 
     Examples:
-        >>> asked = lp.Constraints.of({"panel": {"lock": True}})
-        >>> lighting = lp.solve(basis, target, constraints=asked).lighting
+        >>> constraints = lp.Constraints.of({"panel": {"lock": True}})
+        >>> lighting = lp.solve(basis, target, constraints=constraints).lighting
         >>> np.round(lighting.emission["panel"], 3).tolist()
         [4.0, 3.0, 2.0]
         >>> lp.Constraints.of({"panel": {"lock": True}, "bulb": {"color": "3200K"}}, sparse=2)
@@ -141,11 +144,11 @@ class Constraints:
     sparse: int | None = None
 
     def __repr__(self) -> str:
-        told = [f"{name} {_label(asked)}" for name, asked, _ in self.lights]
-        told += [f"tie {' + '.join(tie.lights)}" for tie in self.ties]
-        told += [f"prefer_current {self.prefer_current:g}"] if self.prefer_current else []
-        told += [] if self.sparse is None else [f"sparse {self.sparse}"]
-        return f"Constraints({some_of(told, '; ', room=600)})"
+        parts = [f"{name} {_label(table)}" for name, table, _ in self.lights]
+        parts += [f"tie {' + '.join(tie.lights)}" for tie in self.ties]
+        parts += [f"prefer_current {self.prefer_current:g}"] if self.prefer_current else []
+        parts += [] if self.sparse is None else [f"sparse {self.sparse}"]
+        return f"Constraints({some_of(parts, '; ', room=600)})"
 
     def __bool__(self) -> bool:
         return bool(self.lights or self.ties or self.prefer_current or self.sparse is not None)
@@ -161,11 +164,11 @@ class Constraints:
         sparse: int | None = None,
         where: str = "",
     ) -> "Constraints":
-        """From what a lights file says.
+        """Make constraints of the tables of a lights file.
 
         light: name or pattern → keys and values (`{"key": {"color": "3200K"}}`).
         tie: lists of names, or tables with `lights` and `color`; one list of names is one tie.
-        where: what errors call the source.
+        where: the name of the source in errors.
 
         Raises ConstraintError, naming the light, the key and what is expected.
         """
@@ -177,22 +180,23 @@ class Constraints:
                 f"{lead}light has {len(light)} names: at most {MAX_LISTED} are read"
             )
         lights = []
-        for name, asked in (light or {}).items():
-            # Looked at now, so that no mistake waits for the light to be met.
-            LightConstraint.of(asked, where=f"{lead}light.{name}")
-            lights.append((name, dict(asked), f"{lead}light.{name}"))
+        for name, table in (light or {}).items():
+            # Checked now, so that a mistake shows even if no such light is there.
+            LightConstraint.of(table, where=f"{lead}light.{name}")
+            lights.append((name, dict(table), f"{lead}light.{name}"))
         lights.sort(key=lambda entry: not is_pattern(entry[0]))
         return cls(
             tuple(lights),
-            _ties(tie, f"{lead}tie"),
-            strength_of(prefer_current, f"{lead}prefer_current"),
-            count_of(sparse, f"{lead}sparse"),
+            _parse_ties(tie, f"{lead}tie"),
+            parse_strength(prefer_current, f"{lead}prefer_current"),
+            parse_count(sparse, f"{lead}sparse"),
         )
 
     def and_then(self, others: "Constraints") -> "Constraints":
-        """These and `others`, which replace what they contradict, ties of the same lights too.
+        """Return these constraints and `others`, which replace what they contradict and ties of the
+        same lights.
 
-        What both say is said once: `a.and_then(a.and_then(b)) == a.and_then(b)`.
+        A constraint in both occurs once: `a.and_then(a.and_then(b)) == a.and_then(b)`.
         """
         tied = [set(tie.lights) for tie in others.ties]
         return Constraints(
@@ -204,12 +208,12 @@ class Constraints:
 
 
 def is_pattern(name: str) -> bool:
-    """Whether `name` can stand for several lights."""
+    """Return whether `name` can stand for several lights."""
     return any(c in name for c in "*?[")
 
 
-def overlaid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of `below` that `above` does not contradict, and all of `above`."""
+def merge_tables(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of `below` that `above` does not contradict, and all of `above`."""
     gone = set(above)
     for key, value in above.items():
         gone |= set(_CONTRADICTS.get(key, ())) if value is not False else set()
@@ -219,46 +223,46 @@ def overlaid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, An
 
 
 _CONTRADICTS = {
-    "lock": ("off", "limits", *COLOURS),
-    "off": ("lock", "limits", *COLOURS),
+    "lock": ("off", "limits", *COLOR_KEYS),
+    "off": ("lock", "limits", *COLOR_KEYS),
     "limits": ("lock", "off"),
-    **{key: ("lock", "off", *(x for x in COLOURS if x != key)) for key in COLOURS},
+    **{key: ("lock", "off", *(x for x in COLOR_KEYS if x != key)) for key in COLOR_KEYS},
 }
 
 
-def _check_contradictions(asked: Mapping[str, Any], where: str) -> None:
+def _check_contradictions(table: Mapping[str, Any], where: str) -> None:
     for first in LIGHT_KEYS:
         for second in _CONTRADICTS.get(first, ()):
             # A fixed colour and a level to lock it at go together.
             if (
-                first in asked
-                and second in asked
-                and not ("lock" in (first, second) and {first, second} & set(COLOURS))
+                first in table
+                and second in table
+                and not ("lock" in (first, second) and {first, second} & set(COLOR_KEYS))
             ):
                 raise ConstraintError(
                     f"{where} has both {first!r} and {second!r}, which contradict each other: "
                     "leave one out"
                 )
-    if "duv" in asked and not (
-        "kelvin" in asked or str(asked.get("color", "")).upper().endswith("K")
+    if "duv" in table and not (
+        "kelvin" in table or str(table.get("color", "")).upper().endswith("K")
     ):
         raise ConstraintError(f"{where} has 'duv' without a 'kelvin' that it is the distance from")
 
 
-def _ties(given: Any, where: str) -> tuple[Tie, ...]:
-    expected = f'{where} is {given!r}: expected lists of names, [["a", "b"]], or tables [[tie]]'
-    if isinstance(given, str | Mapping) or not isinstance(given, Sequence):
+def _parse_ties(value: Any, where: str) -> tuple[Tie, ...]:
+    expected = f'{where} is {value!r}: expected lists of names, [["a", "b"]], or tables [[tie]]'
+    if isinstance(value, str | Mapping) or not isinstance(value, Sequence):
         raise ConstraintError(expected)
-    if given and all(isinstance(name, str) for name in given):
-        given = [given]  # one tie
-    if len(given) > MAX_LISTED:
-        raise ConstraintError(f"{where} lists {len(given)}: at most {MAX_LISTED} are read")
+    if value and all(isinstance(name, str) for name in value):
+        value = [value]  # one tie
+    if len(value) > MAX_LISTED:
+        raise ConstraintError(f"{where} lists {len(value)}: at most {MAX_LISTED} are read")
     ties = []
-    for entry in given:
+    for entry in value:
         if isinstance(entry, Mapping):
             check_keys(entry, ("lights", "color"), where)
             names = entry.get("lights")
-            color = color_of(entry["color"], f"{where}.color") if "color" in entry else None
+            color = parse_color(entry["color"], f"{where}.color") if "color" in entry else None
         else:
             names, color = entry, None
         if isinstance(names, str) or not isinstance(names, Sequence):
@@ -267,5 +271,5 @@ def _ties(given: Any, where: str) -> tuple[Tie, ...]:
     return tuple(ties)
 
 
-def _first(asked: Mapping[str, Any], keys: Iterable[str]) -> str:
-    return next(key for key in keys if key in asked)
+def _first_key(table: Mapping[str, Any], keys: Iterable[str]) -> str:
+    return next(key for key in keys if key in table)

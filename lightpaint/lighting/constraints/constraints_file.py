@@ -8,16 +8,16 @@ from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.values import check_keys, strength_of
+from lightpaint.lighting.constraints.values import check_keys, parse_strength
 from lightpaint.scene.lights.lights_file import Asked, read_keys
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
-MAX_SAID = 1000
+MAX_MESSAGE_LENGTH = 1000
 
 
 @keywords()
 def read_constraints(path: str | Path) -> Constraints:
-    """What the lights file at `path` asks of the lights; nothing if it only chooses them.
+    """Read the constraints of the lights file at `path`; none if it only chooses lights.
 
     Args:
         path: TOML (docs/formats.md).
@@ -27,18 +27,18 @@ def read_constraints(path: str | Path) -> Constraints:
         ConstraintError: For a value that means nothing, naming file, light and key.
 
     Examples:
-        >>> asked = lp.read_constraints("hall.lights.toml")
-        >>> lp.solve(basis, target, constraints=asked).lighting.emission["bulb"]
+        >>> constraints = lp.read_constraints("hall.lights.toml")
+        >>> lp.solve(basis, target, constraints=constraints).lighting.emission["bulb"]
         (0.0, 0.0, 0.0)
     """
     return constraints_of(Asked.of(Path(path), read_keys(Path(path))))
 
 
 def constraints_of(asked: Asked) -> Constraints:
-    """The same of what was read already. Raises ConstraintError."""
+    """Return the constraints in the keys of a lights file. Raises ConstraintError."""
     keys = asked.keys
     try:
-        strength = _preferred(keys, asked.source)
+        strength = _pull_strength(keys, asked.source)
         return Constraints.of(
             keys.get("light"),
             tie=keys.get("tie", ()),
@@ -47,14 +47,14 @@ def constraints_of(asked: Asked) -> Constraints:
             where=asked.source,
         )
     except ConstraintError as error:
-        # What stands in the file may be of any length.
-        raise ConstraintError(one_line(str(error), limit=MAX_SAID)) from None
+        # A value in the file may be of any length.
+        raise ConstraintError(one_line(str(error), limit=MAX_MESSAGE_LENGTH)) from None
 
 
-def _preferred(keys: Mapping[str, Any], source: str) -> Any:
-    """The strength of the pull to the present, or what stands for it.
+def _pull_strength(keys: Mapping[str, Any], source: str) -> Any:
+    """Return the strength of the pull to the present, also from its older keys.
 
-    `prefer = { current = 0.01 }` and `prefer = 0.01` are what files had before `prefer_current`.
+    Files had `prefer = { current = 0.01 }` or `prefer = 0.01` before `prefer_current`.
     """
     if "prefer" not in keys:
         return keys.get("prefer_current", 0.0)
@@ -66,4 +66,4 @@ def _preferred(keys: Mapping[str, Any], source: str) -> Any:
     if isinstance(strength, Mapping):
         check_keys(strength, ("current",), where)
         strength, where = strength.get("current", 0.0), f"{where}.current"
-    return strength_of(strength, where)
+    return parse_strength(strength, where)

@@ -1,8 +1,8 @@
-"""Lights at the bounds of their gamuts, found while the brush moves.
+"""Lights at the bounds of their gamuts under the moving brush.
 
-A gamut is a polygon of many corners, of which a colour is a mix in many ways: exact answers take
-all of them. Under the brush each light mixes those of one triangle, of the middle and one side,
-and goes on to the next one when it comes to its end.
+A gamut is a polygon of many corners, and many mixes of them give the same colour. Exact answers
+use all corners. Under the brush each light mixes the corners of one triangle, the middle and one
+side, and moves to the next triangle when it comes to the end of this one.
 """
 
 import numpy as np
@@ -12,11 +12,11 @@ from lightpaint.colour.color_hull import ColorHull
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.white_neighbours import beyond_gamuts
+from lightpaint.lighting.constraints.white_neighbours import knobs_outside_gamuts
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Times that lights go on to other sides for one answer, at most.
-TURNS = 3
+#: Times that lights move to other sides for one answer, at most.
+MAX_TURNS = 3
 
 
 def solve_near_sides(
@@ -26,52 +26,54 @@ def solve_near_sides(
 
     start: (n, 3). Return the reduction with the sides that lights came to, and the weights (n, 3).
     """
-    reduction = reduction.kept_near(_repainted(reduction))
+    reduction = reduction.confined_to_sides(_repainted_sides(reduction))
     found = solve_reduced(equations, reduction, start, method=method)
-    for _ in range(TURNS):
-        sides = _beyond(reduction, found.weights) | _onward(equations, reduction, found)
+    for _ in range(MAX_TURNS):
+        sides = _sides_outside(reduction, found.weights) | _next_sides(equations, reduction, found)
         if not sides:
             break
-        reduction = reduction.kept_near(sides)
+        reduction = reduction.confined_to_sides(sides)
         found = solve_reduced(equations, reduction, found.weights, method=method)
     return reduction, found.weights
 
 
-def _repainted(reduction: Reduction) -> dict[int, int]:
+def _repainted_sides(reduction: Reduction) -> dict[int, int]:
     """Return places of the knobs whose gamuts the painting has changed, and their sides of now."""
     sides, gamuts = {}, reduction.gamuts
-    for k in reduction.kept_knobs:
-        its, side, light = _kept(reduction, k)
+    for k in reduction.confined_knobs:
+        its, side, light = _confined_gamut(reduction, k)
         assert gamuts is not None
         if gamuts[light] is not its:
             sides[k] = gamuts[light].side_towards(its.fan(side)[1:].sum(axis=0))
     return sides
 
 
-def _beyond(reduction: Reduction, weights: Doubles) -> dict[int, int]:
+def _sides_outside(reduction: Reduction, weights: Doubles) -> dict[int, int]:
     """Return places of the knobs of lights that leave their gamuts, and the sides where they do."""
     sides, gamuts = {}, reduction.gamuts
-    for k in beyond_gamuts(reduction, weights):
+    for k in knobs_outside_gamuts(reduction, weights):
         assert gamuts is not None
         light = reduction.knobs[k].lights[0]
         sides[k] = gamuts[light].side_towards(weights[light])
     return sides
 
 
-def _onward(
+def _next_sides(
     equations: NormalEquations, reduction: Reduction, found: ReducedOptimum
 ) -> dict[int, int]:
-    """Return places of the knobs that would gain beyond the ends of their sides, and the next ones.
+    """Return places of the knobs that would gain beyond the ends of their sides, and the next
+    sides.
 
-    A mix of both ends of a side is best in the whole gamut where it is so in its triangle: what
-    rises towards the middle, and is level along a side, rises towards all other corners.
+    A mix of both ends of a side that is best in its triangle is best in the whole gamut: an
+    objective that rises towards the middle, and is level along a side, rises towards all other
+    corners.
     """
     sides: dict[int, int] = {}
-    if not reduction.kept_knobs:
+    if not reduction.confined_knobs:
         return sides
     gradient = equations.gradient(found.weights)
-    for k in reduction.kept_knobs:
-        its, side, light = _kept(reduction, k)
+    for k in reduction.confined_knobs:
+        its, side, light = _confined_gamut(reduction, k)
         x = found.x[list(reduction.places[k])]
         if x[1] and x[2]:
             continue
@@ -87,7 +89,7 @@ def _onward(
     return sides
 
 
-def _kept(reduction: Reduction, k: int) -> tuple[ColorHull, int, int]:
+def _confined_gamut(reduction: Reduction, k: int) -> tuple[ColorHull, int, int]:
     """Return the gamut that a knob is kept within, towards which side, and its light."""
     knob = reduction.knobs[k]
     assert knob.gamut is not None

@@ -1,10 +1,10 @@
-"""Colours that lamps may take which keep their own unless the painting asks for another.
+"""Colours of lamps that keep their own unless the painting clearly needs others.
 
-A lamp that hardly shines, or whose light comes off a coloured surface, can lower what is missed by
-colours that nobody painted: a little green that makes up for other lamps. So of each lamp the light
-is limited to mixes of its own colour, of whites, and of the light that the painting asks for where
-the lamp counts: as much redder or bluer than the lamps' light there as painted Ψ is than the look,
-and no more so than Ψ is than the surface.
+A lamp that hardly shines, or whose light comes off a coloured surface, can lower the error by
+colours that nobody painted: a little green that makes up for other lamps. So each lamp is limited
+to mixes of its own colour, of whites, and of the light that the painting needs where the lamp
+counts. This light is redder or bluer than the lamps' light there by the ratio of the painted Ψ to
+the look, and by no more than the ratio of Ψ to the surface.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,44 +25,44 @@ from lightpaint.colour.color_hull import (
     sides_of,
 )
 from lightpaint.colour.white_range import white_range
-from lightpaint.lighting.constraints.white_lights import WHITES
+from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
 
-#: Part of the painted light beyond which what is painted says nothing: noise, edges of strokes.
-OUTLYING = 0.05
+#: Share of the painted light that is ignored as outliers: noise, edges of strokes.
+OUTLIER_SHARE = 0.05
 
-#: By how much a lamp's colour may leave whites, in (u', v'): less than is called green.
-MARGIN = 0.004
+#: Distance from whites that a lamp's colour may have, in (u', v'): too small to look green.
+WHITE_MARGIN = 0.004
 
-#: By how much it may leave what is painted, at most: people paint hues that much off. It is twice
-#: as far as the paint itself leaves whites, since whoever paints white means white.
+#: Largest distance from painted colours: people paint hues that much off. The distance allowed is
+#: twice that of the paint itself from whites, since whoever paints white means white.
 PAINTED_MARGIN = 0.01
 
-#: What a bound is rounded to, in (u', v'): less than people see; it lasts while one paints.
-STEP = 0.001
+#: Rounding of bounds, in (u', v'): too small to see, and it keeps bounds equal between strokes.
+REACH_STEP = 0.001
 
-#: Painted pixels that are looked at, about.
-LOOKED_AT = 2**12
+#: Painted pixels that are sampled, about.
+MAX_SAMPLED_PIXELS = 2**12
 
-#: Light of a painted pixel, beside what is bright there now, below which it has no colour: in 8
-#: bits the codes from 0 to 10.
-DARK = 0.003
+#: Light of a painted pixel, relative to the brightest ones of the look, below which its colour does
+#: not count: codes 0 to 10 of 8 bits.
+DARK_SHARE = 0.003
 
-#: Times as many pixels among which painted ones are looked for, where there are enough of them.
-SEARCHED = 2**5
+#: Pixels searched for each painted pixel that is needed, where enough of them are painted.
+SEARCH_FACTOR = 2**5
 
-#: Brightness, beside that of the mean lamp, at which a lamp counts that is off.
-FAINT = 0.01
+#: Brightness assumed for a lamp that is off, relative to the mean lamp.
+FAINT_BRIGHTNESS = 0.01
 
-#: Albedo below which painted light is not known by it.
-BLACK = 0.02
+#: Albedo below which it does not tell the painted light.
+BLACK_ALBEDO = 0.02
 
 
 @dataclass(frozen=True)
 class PaintedLight:
-    """Some of the painted pixels.
+    """A sample of the painted pixels.
 
-    rows: (n, p, 3), Φ. image: (p, 3), Ψ. weight: (p,). albedo: (p, 3), of what is seen, 1 where it
-    is not known.
+    rows: (n, p, 3), Φ. image: (p, 3), Ψ. weight: (p,). albedo: (p, 3), of the visible
+    surface, 1 where it is not known.
     """
 
     rows: Floats
@@ -72,15 +72,15 @@ class PaintedLight:
 
     @classmethod
     def of(
-        cls, views: Sequence[tuple[Basis, Floats, Floats]], most: int = LOOKED_AT
+        cls, views: Sequence[tuple[Basis, Floats, Floats]], max_pixels: int = MAX_SAMPLED_PIXELS
     ) -> "PaintedLight":
-        """Choose painted pixels of views, evenly spread.
+        """Sample the painted pixels of views, evenly spread.
 
         views: of each the basis, the painting (h, w, 3), linear, and its importance (h, w). most:
         pixels, about.
         """
-        its = [_painted_pixels(importance, most) for _, _, importance in views]
-        step = max(1, sum(x.size for x in its) // most)
+        its = [_painted_pixels(importance, max_pixels) for _, _, importance in views]
+        step = max(1, sum(x.size for x in its) // max_pixels)
         rows, image, weight, albedo = [], [], [], []
         for (basis, painting, importance), where in zip(views, its, strict=True):
             some = where[::step]
@@ -97,55 +97,59 @@ class PaintedLight:
         )
 
 
-def _painted_pixels(importance: Floats, most: int) -> Indices:
-    """Return places of painted pixels, (p,): of evenly spread ones, where these are enough."""
+def _painted_pixels(importance: Floats, max_pixels: int) -> Indices:
+    """Return places of painted pixels, (p,): every few pixels, where these give enough."""
     every = importance.ravel()
-    thin = max(1, every.size // (SEARCHED * most)) | 1
+    thin = max(1, every.size // (SEARCH_FACTOR * max_pixels)) | 1
     found = np.flatnonzero(every[::thin]) * thin
-    return found if thin == 1 or found.size >= most // 4 else np.flatnonzero(every)
+    return found if thin == 1 or found.size >= max_pixels // 4 else np.flatnonzero(every)
 
 
 class Gamuts:
     """The colours that each lamp may take.
 
-    How far the painting lets them reach is found only where a lamp takes a colour that is none of
-    its own and of whites: most never do, and under a brush each answer would wait for it.
+    The painting's part is computed only for a lamp that leaves its own colour and whites: most
+    never do, and under the brush each answer would wait for it.
 
-    light: finds painted pixels; whoever paints on says so (`repainted`). power, present: (n, 3),
-    ‖Φᵢ‖² of the lamps' pictures, and their weights now.
+    light: samples the painted pixels; call `refresh` after strokes. power, present: (n, 3), ‖Φᵢ‖²
+    of the lamps' pictures, and their present weights.
     """
 
     def __init__(self, light: Callable[[], PaintedLight], power: Doubles, present: Doubles) -> None:
         self._light, self._power, self._present = light, power, present
         self._own = np.where(luminance(present)[:, None] > 0, present, 1.0)
         # Its own colour is within its gamut, and not at the edge of it.
-        own = chromaticity(self._own) @ DIRECTIONS.T + 2 * STEP
-        self._reach = np.maximum(own, reach_of(white_range(*WHITES).colors) + MARGIN)
-        self._sides = sides_of(self._reach - STEP)
-        self._wanted: _WantedLight | None = None
-        self._found: dict[int, ColorHull] = {}
-        self._before: dict[int, ColorHull] = {}
+        own = chromaticity(self._own) @ DIRECTIONS.T + 2 * REACH_STEP
+        self._reach = np.maximum(own, reach_of(white_range(*LAMP_KELVINS).colors) + WHITE_MARGIN)
+        self._sides = sides_of(self._reach - REACH_STEP)
+        self._needed: _NeededLight | None = None
+        self._gamuts: dict[int, ColorHull] = {}
+        self._former_gamuts: dict[int, ColorHull] = {}
 
     def __getitem__(self, light: int) -> ColorHull:
-        if light not in self._found:
-            if self._wanted is None:
-                self._wanted = _WantedLight.of(self._light(), self._power, self._present)
-            own, wanted = self._reach[light], self._wanted.reach(light)
-            beside = np.clip(2 * (wanted - own + MARGIN), MARGIN, PAINTED_MARGIN)
+        if light not in self._gamuts:
+            if self._needed is None:
+                self._needed = _NeededLight.of(self._light(), self._power, self._present)
+            own, wanted = self._reach[light], self._needed.reach(light)
+            beside = np.clip(2 * (wanted - own + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
             reach = np.maximum(own, wanted + beside)
-            reach = np.round(reach / STEP) * STEP
-            found, before = ColorHull(reach, self._own[light]), self._before.get(light)
+            reach = np.round(reach / REACH_STEP) * REACH_STEP
+            found, before = ColorHull(reach, self._own[light]), self._former_gamuts.get(light)
             is_same = before is not None and np.array_equal(before.reach, reach)
-            self._found[light] = before if before is not None and is_same else found
-        return self._found[light]
+            self._gamuts[light] = before if before is not None and is_same else found
+        return self._gamuts[light]
 
-    def repainted(self) -> None:
-        """Find anew what the painting asks for. What comes out the same is the same object."""
-        self._before |= self._found
-        self._found, self._wanted = {}, None
+    def refresh(self) -> None:
+        """Forget what the painting needed before, and keep the objects of gamuts that stay the
+        same. What comes out the same is the same object.
+        """
+        self._former_gamuts |= self._gamuts
+        self._gamuts, self._needed = {}, None
 
-    def beyond(self, weights: Doubles, lights: Indices) -> list[int]:
-        """Return which of some lights, (m,), have colours in weights (n, 3) beyond theirs."""
+    def lights_outside(self, weights: Doubles, lights: Indices) -> list[int]:
+        """Return those of some lights, (m,), whose colours in weights (n, 3) are outside their
+        gamuts.
+        """
         its = weights[lights]
         room = np.einsum("mkc,mc->mk", self._sides[lights], its)
         known = (room >= -ROUND_OFF * its.sum(axis=1, keepdims=True)).all(axis=1)
@@ -153,35 +157,37 @@ class Gamuts:
 
 
 @dataclass(frozen=True)
-class _WantedLight:
-    """The light that some painted pixels ask for.
+class _NeededLight:
+    """The light that the sampled pixels need.
 
-    along: (p, k), how far its colours reach in each direction, in CIE 1976 (u', v'). share: (n, p),
-    how much each pixel says of a lamp's light.
+    reach_by_pixel: (p, k), the reach of its colours in each direction, in CIE 1976 (u', v'). share:
+    (n, p), the weight of each pixel for a lamp.
     """
 
-    along: Doubles
+    reach_by_pixel: Doubles
     share: Doubles
 
     @classmethod
-    def of(cls, light: PaintedLight, power: Doubles, present: Doubles) -> "_WantedLight":
-        """Find it for lamps of such ‖Φᵢ‖² and weights now, (n, 3); one that is off is faint."""
+    def of(cls, light: PaintedLight, power: Doubles, present: Doubles) -> "_NeededLight":
+        """Compute it for lamps with these ‖Φᵢ‖² and present weights, (n, 3); one that is off is
+        faint.
+        """
         size, now = np.sqrt(power.sum(axis=1)), np.asarray(luminance(present))
-        faint = FAINT * (now * size).mean() / np.where(size > 0, size, np.inf)
+        faint = FAINT_BRIGHTNESS * (now * size).mean() / np.where(size > 0, size, np.inf)
         lamps = np.where(now[:, None] > 0, present / np.where(now > 0, now, 1)[:, None], 1.0)
         lit = (np.maximum(now, faint)[:, None] * lamps)[:, None] * light.rows
         look, painted = lit.sum(axis=0), np.asarray(luminance(light.image))
-        dark = DARK * np.percentile(luminance(look), 95) if len(look) else 0.0
+        dark = DARK_SHARE * np.percentile(luminance(look), 95) if len(look) else 0.0
         counts = (look.min(axis=1) > 0) & (light.image.min(axis=1) >= 0) & (painted > dark)
         share = np.asarray(luminance(lit[:, counts]) / luminance(look[counts]), np.float64)
         wanted = light.image[counts] / look[counts] * (share.T @ lamps)
-        # What is dim is seen the more: display values are near the root of light.
+        # Errors of dim light show more: display values are near the root of light.
         weight = light.weight[counts] * np.sqrt(painted[counts])
         along = chromaticity(wanted) @ DIRECTIONS.T
-        # What makes up for light off coloured surfaces was not painted: the paint itself is no
-        # greener than that.
+        # Light that makes up for coloured surfaces was not painted: the paint itself is no greener
+        # than that.
         albedo = light.albedo[counts]
-        known = albedo.min(axis=1) > BLACK
+        known = albedo.min(axis=1) > BLACK_ALBEDO
         itself = light.image[counts][known] / albedo[known]
         along[known] = np.minimum(along[known], chromaticity(itself) @ DIRECTIONS.T)
         return cls(along, share * weight)
@@ -189,16 +195,16 @@ class _WantedLight:
     @cached_property
     def _order(self) -> Indices:
         """(p, k), pixels by how far they reach."""
-        return np.argsort(self.along, axis=0)
+        return np.argsort(self.reach_by_pixel, axis=0)
 
     def reach(self, lamp: int) -> Doubles:
-        """Return how far it reaches where a lamp counts, (k,), but for what is outlying.
+        """Return the reach of its colours where a lamp counts, (k,), without outliers.
 
         -inf for a lamp that counts nowhere.
         """
         sums = np.cumsum(self.share[lamp][self._order], axis=0)
         if not (len(sums) and sums[-1, 0] > 0):
             return np.full(len(DIRECTIONS), -np.inf)
-        last = np.minimum((sums < (1 - OUTLYING) * sums[-1]).sum(axis=0), len(sums) - 1)
+        last = np.minimum((sums < (1 - OUTLIER_SHARE) * sums[-1]).sum(axis=0), len(sums) - 1)
         columns = np.arange(len(DIRECTIONS))
-        return np.asarray(self.along[self._order[last, columns], columns])
+        return np.asarray(self.reach_by_pixel[self._order[last, columns], columns])

@@ -1,4 +1,4 @@
-"""What turns by itself, and the unknowns that this is: made of what is asked of lights."""
+"""Knobs, the lights and dimmers that turn by themselves, with the unknowns of each."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,9 @@ from lightpaint.lighting.constraints.values import Lock
 
 @dataclass(frozen=True)
 class Unknown:
-    """One x. columns: (light, (3,) emission of it at x = 1) for each light that it moves."""
+    """An unknown x of the solve. columns: (light, its (3,) emission at x = 1) for each light that
+    it moves.
+    """
 
     columns: tuple[tuple[int, Doubles], ...]
     lower: float = 0.0
@@ -34,12 +36,12 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Knob:
-    """What turns by itself: a light, or several on one dimmer.
+    """A part of the lighting that turns by itself: a light, or several on one dimmer.
 
-    limit: coefficients, least and most of a sum over its unknowns, if one is limited.
-    whites: the range of white of a light that keeps to one. window: between which of these its two
-    unknowns mix at present (white_neighbours.py).
-    gamut: the colours that the light mixes, if it would otherwise leave them: all of them, or those
+    limit: coefficients, least and most of a limited sum over its unknowns.
+    whites: the range of white of a light that keeps to one. window: the two of these
+    that its two unknowns mix at present (white_neighbours.py).
+    gamut: the gamut that confines the light, if it would leave it otherwise: all of it, or the part
     towards one `side` (gamut_bounds.py).
     """
 
@@ -53,19 +55,19 @@ class Knob:
 
     @cached_property
     def is_free(self) -> bool:
-        """Whether it is a light of three channels, each by itself."""
+        """True for a light whose three channels turn independently."""
         return len(self.unknowns) == 3 and all(
             len(u.columns) == 1 and (u.columns[0][1] == axis).all()
             for u, axis in zip(self.unknowns, np.eye(3), strict=True)
         )
 
-    def off(self) -> "Knob":
-        """It at 0."""
+    def switched_off(self) -> "Knob":
+        """Return the knob fixed at 0."""
         return replace(
             self, unknowns=tuple(replace(u, lower=0.0, upper=0.0) for u in self.unknowns)
         )
 
-    def within(self, window: tuple[int, int]) -> "Knob":
+    def with_window(self, window: tuple[int, int]) -> "Knob":
         """Return the knob as a mix of two other whites of its range."""
         assert self.whites is not None
         return self._mixing(self.whites.colors[list(window)], window)
@@ -75,7 +77,7 @@ class Knob:
         assert self.whites is not None
         return self._mixing(self.whites.tangent(self.window, reach), self.window)
 
-    def within_gamut(self, gamut: ColorHull, side: int | None = None) -> "Knob":
+    def confined(self, gamut: ColorHull, side: int | None = None) -> "Knob":
         """Return the knob as a mix of the primaries of a gamut. side: of the part towards it."""
         [light] = self.lights
         primaries = gamut.primaries if side is None else gamut.fan(side)
@@ -95,65 +97,67 @@ class Knob:
 
     @classmethod
     def of_any_colour(cls, light: int, *, is_scalar: bool = False) -> "Knob":
-        """A light of which nothing is asked."""
+        """Make the knob of a light without constraints."""
         colours = np.ones((1, 3)) if is_scalar else np.eye(3)
         return cls((light,), tuple(Unknown(((light, rgb),)) for rgb in colours))
 
 
-def mix_of(k: int, light: BasisLight, one: LightConstraint) -> Knob:
-    """A light of several primaries, of which each is dimmed by itself."""
-    colours = np.eye(3) if one.primaries is None else np.array(one.primaries)
-    lower, upper, least, most = mix_limits(one, light, len(colours))
+def mixing_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
+    """Make the knob of a light of several primaries, each of which dims by itself."""
+    colours = np.eye(3) if constraint.primaries is None else np.array(constraint.primaries)
+    lower, upper, least, most = mix_limits(constraint, light, len(colours))
     unknowns = [
         Unknown(((k, rgb),), float(low), float(high))
         for rgb, low, high in zip(colours, lower, upper, strict=True)
     ]
     coefficients = np.asarray(luminance(colours), np.float64)
     darkest, brightest = float(coefficients @ lower), float(coefficients @ upper)
-    check_room(one, light, max(least, darkest), most)
-    check_room(one, light, least, min(most, brightest))
-    window = (0, one.whites.last) if one.whites is not None else (0, 0)
+    check_room(constraint, light, max(least, darkest), most)
+    check_room(constraint, light, least, min(most, brightest))
+    window = (0, constraint.whites.last) if constraint.whites is not None else (0, 0)
     if least == 0 and np.isinf(most):
-        return Knob((k,), tuple(unknowns), None, one.whites, window)
-    # Round-off may have parted ends that are the same.
+        return Knob((k,), tuple(unknowns), None, constraint.whites, window)
+    # Round-off may have separated equal ends.
     most = max(most, darkest)
     least = min(least, most, brightest)
     limit = tuple(map(float, coefficients)), least, most
-    return Knob((k,), tuple(unknowns), limit, one.whites, window)
+    return Knob((k,), tuple(unknowns), limit, constraint.whites, window)
 
 
-def dimmer_of(k: int, light: BasisLight, one: LightConstraint) -> Knob:
-    """A light of one colour, which is dimmed."""
-    if light.is_scalar and one.primaries is not None:
+def dimmer_knob(k: int, light: BasisLight, constraint: LightConstraint) -> Knob:
+    """Make the knob of a light of one colour, which dims."""
+    if light.is_scalar and constraint.primaries is not None:
         raise ConstraintError(
-            f"{one.where} asks for a colour, and {light.name!r} can only be dimmed as a whole: "
+            f"{constraint.where} asks for a colour, and {light.name!r} can only be dimmed as a "
+            f"whole: "
             "use lock, limits, tie or off"
         )
-    direction = np.ones(3) if one.primaries is None else np.array(one.primaries[0])
-    check_grey(one, light)
-    lower, upper = dimmer_limits(one, direction, light)
-    check_room(one, light, lower, upper)
-    # Round-off may have parted ends that are the same.
+    direction = np.ones(3) if constraint.primaries is None else np.array(constraint.primaries[0])
+    check_grey(constraint, light)
+    lower, upper = dimmer_limits(constraint, direction, light)
+    check_room(constraint, light, lower, upper)
+    # Round-off may have separated equal ends.
     return Knob((k,), (Unknown(((k, direction),), min(lower, upper), upper),))
 
 
-def tie_of(
+def tied_knob(
     tie: Tie,
     members: Sequence[int],
     names: str,
     lights: Sequence[BasisLight],
-    asked: Sequence[LightConstraint | None],
+    constraints: Sequence[LightConstraint | None],
 ) -> Knob:
-    """One unknown for all members; at 1 they have their present luminances.
+    """Make the knob of lights on one dimmer; at 1 they have their present luminances.
 
-    A member that is held holds the dimmer: the unknown's limits meet.
+    A fixed member fixes the dimmer: the unknown's limits meet.
     """
     columns, lower, upper = [], 0.0, np.inf
     for k in members:
-        light, one = lights[k], asked[k] or LightConstraint()
-        if one.primaries and len(one.primaries) > 1:
+        light, constraint = lights[k], constraints[k] or LightConstraint()
+        if constraint.primaries and len(constraint.primaries) > 1:
             raise ConstraintError(
-                f"{one.where} asks for {one.label}, and {light.name!r} is on the dimmer of {names}"
+                f"{constraint.where} asks for {constraint.label}, and {light.name!r} is on the "
+                f"dimmer of {names}"
                 ": a tied light has one color; leave it out of the tie"
             )
         present = np.array(light.emission)
@@ -162,17 +166,22 @@ def tie_of(
                 f"{tie.where}: {light.name!r} is off at present, so nothing says how bright it is "
                 f"beside the others of {names}: give it an emission, or leave it out"
             )
-        color = tie.color or (one.primaries[0] if one.primaries else None)
+        color = tie.color or (constraint.primaries[0] if constraint.primaries else None)
         if color is not None and light.is_scalar:
             raise ConstraintError(
-                f"{one.where or tie.where} asks for a colour, and {light.name!r} can only be "
+                f"{constraint.where or tie.where} asks for a colour, and {light.name!r} can only "
+                f"be "
                 "dimmed as a whole"
             )
         direction = present if color is None else np.array(color) * float(luminance(present))
-        check_grey(one, light)
-        least, most = dimmer_limits(one, direction, light)
-        if one.is_held:
-            emission = np.zeros(3) if one.lock is None else locked_at(light, one.lock, one.where)
+        check_grey(constraint, light)
+        least, most = dimmer_limits(constraint, direction, light)
+        if constraint.is_fixed:
+            emission = (
+                np.zeros(3)
+                if constraint.lock is None
+                else locked_emission(light, constraint.lock, constraint.where)
+            )
             least = most = float(luminance(emission) / luminance(present))
             direction = emission / most if most > 0 else direction
         lower, upper = max(lower, least), min(upper, most)
@@ -185,8 +194,8 @@ def tie_of(
     return Knob(tuple(members), (Unknown(tuple(columns), min(lower, upper), upper),))
 
 
-def locked_at(light: BasisLight, lock: Lock, where: str) -> Doubles:
-    """The emission that `lock` asks for."""
+def locked_emission(light: BasisLight, lock: Lock, where: str) -> Doubles:
+    """Return the emission (3,) that `lock` asks for."""
     present = np.array(light.emission)
     level = lock.level
     if light.is_scalar and lock.color is not None:

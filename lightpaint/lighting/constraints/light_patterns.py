@@ -1,4 +1,4 @@
-"""Which lights are meant: names and patterns, and what is asked of each by all of them."""
+"""Constraints of each light, resolved from names and patterns."""
 
 import difflib
 from collections.abc import Sequence
@@ -12,56 +12,56 @@ from lightpaint.lighting.constraints.constraints import (
     LightConstraint,
     Tie,
     is_pattern,
-    overlaid,
+    merge_tables,
 )
 from lightpaint.screen import some_names
 
 
-def of_each_light(
+def constraints_by_light(
     constraints: Constraints, lights: Sequence[BasisLight]
 ) -> list[LightConstraint | None]:
-    """All that is asked of each light, patterns below names."""
+    """Return the constraint on each light, None without one; names win over patterns."""
     return [
         LightConstraint.of(asked, where=where) if asked else None
-        for asked, where in asked_of_each(constraints, lights)
+        for asked, where in tables_by_light(constraints, lights)
     ]
 
 
-def asked_of_each(
+def tables_by_light(
     constraints: Constraints, lights: Sequence[BasisLight]
 ) -> list[tuple[dict[str, Any], str]]:
-    """The same as keys and values, and where the last of them stands."""
-    asked: list[tuple[dict[str, Any], str]] = [({}, "") for _ in lights]
+    """Return the merged keys and values for each light, and the source of the last of them."""
+    tables: list[tuple[dict[str, Any], str]] = [({}, "") for _ in lights]
     for name, wish, origin in constraints.lights:
-        for k in _found(name, lights, origin, only_keeps=wish == {"lock": True}):
-            asked[k] = overlaid(asked[k][0], wish), origin
-    return asked
+        for k in _match_lights(name, lights, origin, only_keeps=wish == {"lock": True}):
+            tables[k] = merge_tables(tables[k][0], wish), origin
+    return tables
 
 
 def tied_lights(
     constraints: Constraints, lights: Sequence[BasisLight]
 ) -> dict[int, tuple[Tie, list[int]]]:
-    """The tie of each light that is in one, and its members in their order."""
-    tie_of: dict[int, tuple[Tie, list[int]]] = {}
+    """Return the tie of each tied light, and the indices of its members in their order."""
+    ties: dict[int, tuple[Tie, list[int]]] = {}
     for tie in constraints.ties:
-        members = sorted({k for name in tie.lights for k in _found(name, lights, tie.where)})
+        members = sorted({k for name in tie.lights for k in _match_lights(name, lights, tie.where)})
         listed = some_names(tie.lights)
         if len(members) < 2:
             raise ConstraintError(f"{tie.where}: {listed} is one light: a tie has at least two")
         for k in members:
-            if k in tie_of:
+            if k in ties:
                 raise ConstraintError(
                     f"{tie.where}: light {lights[k].name!r} is in two ties, "
-                    f"{some_names(tie_of[k][0].lights)} and {listed}: it has one dimmer"
+                    f"{some_names(ties[k][0].lights)} and {listed}: it has one dimmer"
                 )
-            tie_of[k] = (tie, members)
-    return tie_of
+            ties[k] = (tie, members)
+    return ties
 
 
-def _found(
+def _match_lights(
     name: str, lights: Sequence[BasisLight], where: str, *, only_keeps: bool = False
 ) -> list[int]:
-    """The light of this name, else all that match it as a pattern."""
+    """Return the index of the light of this name, else of all that match it as a pattern."""
     names = [light.name for light in lights]
     for k, light in enumerate(lights):
         if name == light.name and not light.is_fixed:
@@ -70,7 +70,7 @@ def _found(
             continue
         if light.is_fixed:
             if only_keeps:
-                return []  # as it does anyway
+                return []  # which a fixed light does anyway
             raise ConstraintError(
                 f"{where}: {name!r} is not among the lights to adjust, and stays as it is: "
                 "choose it with lights=..., or ask nothing of it"

@@ -1,7 +1,7 @@
-"""M and b in the unknowns that constraints leave, and the optimum of what they make.
+"""M and b in the unknowns that constraints leave, and the optimum of this problem.
 
 With w = C x + w₀ the problem is M' = Σ_c C_cᵀ M_c C_c and b' = Σ_c C_cᵀ (b_c − M_c w₀_c), one for
-every set of channels that the unknowns couple. Where nothing is asked C is the identity: three
+every set of channels that the unknowns couple. Without constraints C is the identity: three
 problems in the lights themselves.
 """
 
@@ -12,37 +12,40 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.optimum import Method, Optimum, minimise, minimise_each
-from lightpaint.lighting.algebra.quadratic import Cap, moved_along
+from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
 from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.constraints.unknown_blocks import Block
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import side_by_side
 
-#: Pull of what reaches nothing in one channel towards its start, beside its other channels.
-FAINT = 1e-8
+#: Pull towards the start in channels where a light reaches nothing, relative to its other channels.
+DARK_PULL = 1e-8
 
-#: Determinant of the colours that a light mixes, beside their size, below which they are too alike.
-SINGULAR = 1e-6
+#: Determinant of the colours that a light mixes, relative to their size, below which they are too
+#: alike.
+SINGULAR_DETERMINANT = 1e-6
 
-#: Distance from a bound, beside the light's other values, that is round-off of a start.
-NEAR = 1e-12
+#: Distance from a bound, relative to the light's other values, that is round-off of a start.
+BOUND_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
 class ReducedProblem:
-    """½ xᵀM x − bᵀx in the unknowns `its` of a reduction, of the channels it couples."""
+    """The problem ½ xᵀM x − bᵀx in some `unknowns` of a reduction, for the channels they
+    couple."""
 
     channels: list[int]
-    its: Indices
+    unknowns: Indices
     M: Doubles
     b: Doubles
     lower: Doubles
     upper: Doubles
     caps: tuple[Cap, ...]
 
-    def of(self, here: Indices) -> "ReducedProblem":
-        """The problem of some of its unknowns, (k,) places among them, while the others are 0."""
+    def restricted(self, here: Indices) -> "ReducedProblem":
+        """Return the problem of some of its unknowns, (k,) places among them, with the others at
+        0."""
         place = {int(k): j for j, k in enumerate(here)}
         caps = tuple(
             replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
@@ -51,7 +54,7 @@ class ReducedProblem:
         )
         return ReducedProblem(
             self.channels,
-            self.its[here],
+            self.unknowns[here],
             self.M[np.ix_(here, here)],
             self.b[here],
             self.lower[here],
@@ -62,14 +65,14 @@ class ReducedProblem:
 
 @dataclass(frozen=True)
 class ReducedOptimum:
-    """The best weights under a reduction, and what shows that they are.
+    """The best weights under a reduction, with the multipliers that prove it.
 
-    x, multipliers: of its unknowns; cap_multipliers: of its caps. All as of `Optimum`, of half
-    the objective.
+    x, multipliers: of its unknowns; cap_multipliers: of its caps. All as in `Optimum`, of half the
+    objective.
     weights: (n, 3), C x + w₀. kkt_residual, tolerance: (3,), the largest violation of the
-    optimality conditions, after scaling, and what it was to come down to. sweeps: (3,).
-    reached: (n, 3), whether what moves a light in a channel reaches anything; what is held was not
-    left to.
+    optimality conditions, after scaling, and its limit. sweeps: (3,).
+    reached: (n, 3), whether the unknowns that move a light in a channel reach any pixel; true for
+    fixed lights.
     """
 
     x: Doubles
@@ -83,7 +86,7 @@ class ReducedOptimum:
 
     @property
     def converged(self) -> bool:
-        """Whether every channel met its tolerance."""
+        """True if every channel is within its tolerance."""
         return bool((self.kkt_residual <= self.tolerance).all())
 
 
@@ -97,23 +100,23 @@ def solve_reduced(
     tolerance: float = 1e-12,
     max_sweeps: int = 20_000,
 ) -> ReducedOptimum:
-    """Minimise the objective over what `reduction` leaves.
+    """Minimise the objective over the unknowns that `reduction` leaves.
 
     start: (n, 3), weights to begin with; lights that reach nothing stay as near to them as the
     constraints allow. x: the unknowns to begin with, where they are known; else those nearest to
     `start`. method, tolerance, max_sweeps: see `minimise`.
     """
     lit = equations.reached
-    reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.reached(lit)
-    x = nearest(reduction, start, np.any(reached, axis=1)) if x is None else x.copy()
-    how: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
-    left = _left(equations, reduction, lit, start)
-    optima = _optima(left, equations.across, reduction, x, how)
+    reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.determined(lit)
+    x = nearest_unknowns(reduction, start, np.any(reached, axis=1)) if x is None else x.copy()
+    options: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
+    left = _move_fixed_to_right(equations, reduction, lit, start)
+    optima = _solve_blocks(left, equations.across, reduction, x, options)
     multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
     residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
     for block, optimum in zip(reduction.blocks, optima, strict=True):
-        x[block.its], multipliers[block.its] = optimum.x, optimum.multipliers
-        cap_multipliers[block.cap_its] = optimum.cap_multipliers
+        x[block.unknowns], multipliers[block.unknowns] = optimum.x, optimum.multipliers
+        cap_multipliers[block.cap_indices] = optimum.cap_multipliers
         for c in block.channels:
             residuals[c], sweeps[c] = optimum.kkt_residual, optimum.sweeps
             tolerances[c] = optimum.tolerance
@@ -129,73 +132,79 @@ def solve_reduced(
     )
 
 
-def problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
-    """One problem for every set of channels that the unknowns couple."""
-    return _problems(_left(equations, reduction), equations.across, reduction)
+def reduced_problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
+    """Return one problem for every set of channels that the unknowns couple."""
+    return _block_problems(_move_fixed_to_right(equations, reduction), equations.across, reduction)
 
 
-def _left(
+def _move_fixed_to_right(
     equations: NormalEquations,
     reduction: Reduction,
     lit: Bools | None = None,
     start: Doubles | None = None,
 ) -> tuple[Doubles, Doubles]:
-    """M and b of what is held taken to the right-hand side.
+    """Return M and b with fixed lights moved to the right-hand side.
 
-    lit, start: (n, 3), what reaches something that counts, and weights: an unknown of several
-    channels of which a light reaches some is drawn to its start in the others, faintly.
+    lit, start: (n, 3), whether a light reaches something that counts, and weights. An unknown of
+    several channels, some of which reach nothing, is faintly drawn to its start in those.
     """
     M, b = equations.M, equations.b
     if lit is not None and start is not None and not lit.all():
         is_coupled = len(reduction.channel_groups) < 3
-        M, b = _in_the_dark(equations, lit, start, is_coupled=is_coupled)
-    if reduction.holds_any:
-        # Lights that are held have no colour to keep: nothing joins their channels.
-        b = b - np.einsum("cij,jc->ci", M, reduction.held)
+        M, b = _without_dark_channels(equations, lit, start, is_coupled=is_coupled)
+    if reduction.has_fixed_light:
+        # Fixed lights have no colour to keep: nothing joins their channels.
+        b = b - np.einsum("cij,jc->ci", M, reduction.fixed_weights)
     return M, b
 
 
-def _problems(
+def _block_problems(
     left: tuple[Doubles, Doubles], across: Doubles | None, reduction: Reduction
 ) -> list[ReducedProblem]:
     made = []
     for block in reduction.blocks:
-        lower, upper = reduction.lower[block.its], reduction.upper[block.its]
-        M, b = _of_block(*left, block)
+        lower, upper = reduction.lower[block.unknowns], reduction.upper[block.unknowns]
+        M, b = _block_equations(*left, block)
         if across is not None:
             p = block.pairs
-            np.add.at(M, (p.one, p.other), p.value * across[p.light, p.channel, p.next])
-        made.append(ReducedProblem(block.channels, block.its, M, b, lower, upper, block.caps))
+            np.add.at(
+                M, (p.column, p.other_column), p.value * across[p.light, p.channel, p.other_channel]
+            )
+        made.append(ReducedProblem(block.channels, block.unknowns, M, b, lower, upper, block.caps))
     return made
 
 
-def _of_block(M: Doubles, b: Doubles, block: Block) -> tuple[Doubles, Doubles]:
-    """M' and b' in the unknowns of a block."""
+def _block_equations(M: Doubles, b: Doubles, block: Block) -> tuple[Doubles, Doubles]:
+    """Return M' and b' in the unknowns of a block."""
     if block.is_plain:
         [c], lights = block.channels, block.entries[0].lights
         if block.is_in_order and lights.size == b.shape[1]:
             return M[c], b[c]
         return M[c][lights[:, None], lights], b[c, lights]
-    made_M, made_b = np.zeros((block.its.size, block.its.size)), np.zeros(block.its.size)
+    made_M, made_b = (
+        np.zeros((block.unknowns.size, block.unknowns.size)),
+        np.zeros(block.unknowns.size),
+    )
     for c, e in zip(block.channels, block.entries, strict=True):
         part = M[c][e.lights[:, None], e.lights] * e.values[:, None] * e.values
         right = b[c, e.lights] * e.values
-        if e.lights.size > e.here.size:
+        if e.lights.size > e.columns.size:
             # Most columns are of one light: the sum over those of several is a short one.
             part = np.add.reduceat(np.add.reduceat(part, e.first, 0), e.first, 1)
             right = np.add.reduceat(right, e.first)
-        made_M[e.here[:, None], e.here] += part
-        made_b[e.here] += right
+        made_M[e.columns[:, None], e.columns] += part
+        made_b[e.columns] += right
     return made_M, made_b
 
 
-def nearest(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
-    """The x (k,) whose emissions are nearest to `start`, (n, 3), within what each knob allows.
+def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
+    """Return the x (k,) whose emissions are nearest to `start`, (n, 3), within the limits of each
+    knob.
 
-    reached: (n,). Where a light does reach something, a luminance at its limit is good enough.
+    reached: (n,). For a light that reaches something, a luminance at its limit is good enough.
     """
     x = np.zeros(len(reduction.unknowns))
-    for kind in reduction.kinds:
+    for kind in reduction.knob_groups:
         low, high = reduction.lower[kind.places], reduction.upper[kind.places]
         present = start[kind.lights].reshape(len(low), -1)
         if kind.is_free:
@@ -206,7 +215,7 @@ def nearest(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
             its = wanted / np.square(kind.columns).sum(axis=2)
         else:
             squares = np.matmul(kind.columns, kind.columns.swapaxes(1, 2))
-            its = _mixed_of(kind.columns, present)
+            its = _solve_mixes(kind.columns, present)
             out = np.flatnonzero(~((its >= low) & (its <= high)).all(axis=1))
             if out.size:
                 low_out, high_out = low[out], high[out]
@@ -218,21 +227,25 @@ def nearest(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
                     start=np.clip(0, low_out, high_out),
                 )
                 its[out] = np.stack([optimum.x for optimum in found])
-        x[kind.places] = _within(its, low, high)
-    for stack in reduction.stacks:
-        a, its, now = stack.coefficients, stack.its, (stack.coefficients * x[stack.its]).sum(axis=1)
+        x[kind.places] = _snap_to_bounds(its, low, high)
+    for stack in reduction.limited_knobs:
+        a, its, now = (
+            stack.coefficients,
+            stack.unknowns,
+            (stack.coefficients * x[stack.unknowns]).sum(axis=1),
+        )
         wanted = np.minimum(np.maximum(now, stack.lower), stack.upper)
         out = now != wanted
         low, high = reduction.lower[its[out]], reduction.upper[its[out]]
-        x[its[out]] = moved_along(a[out], x[its[out]], low, high, wanted[out])
+        x[its[out]] = clip_to_sums(a[out], x[its[out]], low, high, wanted[out])
         for k in stack.knobs[out]:
             knob = reduction.knobs[k]
             if not (knob.is_free or reached[knob.lights[0]]):
-                x[list(reduction.places[k])] = _limited(knob, start)
+                x[list(reduction.places[k])] = _nearest_limited(knob, start)
     return x
 
 
-def _mixed_of(columns: Doubles, emission: Doubles) -> Doubles:
+def _solve_mixes(columns: Doubles, emission: Doubles) -> Doubles:
     """Return the x (k, u) with C x = emission, (k, e); nan where C is not square or singular.
 
     columns: (k, u, e), C transposed.
@@ -240,63 +253,65 @@ def _mixed_of(columns: Doubles, emission: Doubles) -> Doubles:
     x = np.full(columns.shape[:2], np.nan)
     if columns.shape[1] == columns.shape[2]:
         size = np.abs(columns).max(axis=(1, 2)) ** columns.shape[1]
-        regular = np.abs(np.linalg.det(columns)) > SINGULAR * size
+        regular = np.abs(np.linalg.det(columns)) > SINGULAR_DETERMINANT * size
         C = columns[regular].swapaxes(1, 2)
         x[regular] = np.linalg.solve(C, emission[regular, :, None])[..., 0]
     return x
 
 
-def _limited(knob: Knob, start: Doubles) -> Doubles:
-    """The x of a light with a limit of luminance whose emission is nearest to `start`."""
+def _nearest_limited(knob: Knob, start: Doubles) -> Doubles:
+    """Return the x of a light with limited luminance whose emission is nearest to `start`."""
     assert knob.limit is not None
     C = np.array([unknown.columns[0][1] for unknown in knob.unknowns])
     lower = np.array([unknown.lower for unknown in knob.unknowns])
     upper = np.array([unknown.upper for unknown in knob.unknowns])
     cap = Cap(tuple(range(len(C))), *knob.limit)
     right = C @ start[knob.lights[0]]
-    return _within(minimise(C @ C.T, right, lower=lower, upper=upper, caps=(cap,)).x, lower, upper)
+    return _snap_to_bounds(
+        minimise(C @ C.T, right, lower=lower, upper=upper, caps=(cap,)).x, lower, upper
+    )
 
 
-def _within(x: Doubles, lower: Doubles, upper: Doubles) -> Doubles:
-    """x, (k,) or one knob a row, within its bounds, and at one that only round-off parts it from.
+def _snap_to_bounds(x: Doubles, lower: Doubles, upper: Doubles) -> Doubles:
+    """Return x, (k,) or one knob a row, moved into its bounds, and onto those within round-off.
 
-    What is at a bound has a multiplier.
+    Only unknowns exactly at a bound have multipliers.
     """
-    near = NEAR * np.abs(x).max(axis=-1, keepdims=True, initial=0)
+    near = BOUND_ROUND_OFF * np.abs(x).max(axis=-1, keepdims=True, initial=0)
     x = np.where(np.abs(x - lower) <= near, lower, np.maximum(x, lower))
     return np.asarray(np.where(np.abs(x - upper) <= near, upper, np.minimum(x, upper)))
 
 
-def _optima(
+def _solve_blocks(
     left: tuple[Doubles, Doubles],
     across: Doubles | None,
     reduction: Reduction,
     x: Doubles,
-    how: dict[str, Any],
+    options: dict[str, Any],
 ) -> list[Optimum]:
-    """The optimum of each block, begun at its part of x; of three alike by the same calls."""
-    if (alike := reduction.alike) is not None:
+    """Solve each block from its part of x; three alike blocks in the same calls."""
+    if (alike := reduction.alike_blocks) is not None:
         (M, b), lights = left, alike.lights
         if lights is not None:
             M, b = M[:, lights[:, None], lights], b[:, lights]
-        begin = x[alike.its]
-        return minimise_each(M, b, lower=alike.lower, upper=alike.upper, start=begin, **how)
+        begin = x[alike.unknowns]
+        return minimise_each(M, b, lower=alike.lower, upper=alike.upper, start=begin, **options)
 
     def solve(p: ReducedProblem) -> Optimum:
-        begin = x[p.its]
-        return minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps, start=begin, **how)
+        begin = x[p.unknowns]
+        return minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps, start=begin, **options)
 
-    parts = _problems(left, across, reduction)
+    parts = _block_problems(left, across, reduction)
     return side_by_side(solve, parts) if len(parts) > 1 else [solve(p) for p in parts]
 
 
-def _in_the_dark(
+def _without_dark_channels(
     equations: NormalEquations, lit: Bools, start: Doubles, *, is_coupled: bool
 ) -> tuple[Doubles, Doubles]:
-    """M and b with nothing in them of lights that reach nothing in a channel: these stay.
+    """Return M and b without the channels in which lights reach nothing: these stay as they are.
 
-    is_coupled: whether unknowns span channels. A light that reaches something in one is then
-    drawn to its start in the others.
+    is_coupled: whether unknowns span channels. A light that reaches
+    something in one is then drawn to its start in the others.
     """
     M = equations.M * (lit.T[:, :, None] & lit.T[:, None, :])
     b = equations.b * lit.T
@@ -304,6 +319,6 @@ def _in_the_dark(
         return M, b
     power = np.einsum("cii->ic", equations.M).max(axis=1)
     for k, c in np.argwhere(lit.any(axis=1, keepdims=True) & ~lit):
-        M[c, k, k] = FAINT * power[k]
-        b[c, k] = FAINT * power[k] * start[k, c]
+        M[c, k, k] = DARK_PULL * power[k]
+        b[c, k] = DARK_PULL * power[k] * start[k, c]
     return M, b

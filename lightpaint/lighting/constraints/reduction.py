@@ -1,10 +1,10 @@
 """The unknowns that constraints leave: w = C x + w₀ with bounds on x.
 
-A light that may have any colour has three unknowns; one of fixed colour, or several on one
-dimmer, a single one; one that mixes primaries, an unknown for each. What is locked is in w₀
-and moves to the right-hand side. Limits are bounds on x, or on its luminance. So whatever is
-asked for, the problem stays one convex quadratic; with ranges of white it is one for each choice
-of neighbouring whites (white_neighbours.py).
+A light that may have any colour has three unknowns; one of fixed colour, or several on one dimmer,
+have a single one; one that mixes primaries has an unknown for each. Locked lights are in w₀, which
+moves to the right-hand side. Limits are bounds on x, or on its luminance. So the problem stays one
+convex quadratic under all constraints; with ranges of white it is one for each choice of
+neighbouring whites (white_neighbours.py).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -22,27 +22,33 @@ from lightpaint.lighting.constraints.gamuts import Gamuts
 from lightpaint.lighting.constraints.knobs import (
     Knob,
     Unknown,
-    dimmer_of,
-    locked_at,
-    mix_of,
-    tie_of,
+    dimmer_knob,
+    locked_emission,
+    mixing_knob,
+    tied_knob,
 )
-from lightpaint.lighting.constraints.light_patterns import of_each_light, tied_lights
-from lightpaint.lighting.constraints.unknown_blocks import Alike, Block, Entries, Kind, Stack
+from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
+from lightpaint.lighting.constraints.unknown_blocks import (
+    AlikeBlocks,
+    Block,
+    Entries,
+    KnobGroup,
+    LimitedKnobs,
+)
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """What is left to solve for.
+    """The unknowns that constraints leave, and the fixed lights.
 
-    held: (n, 3), w₀: the emission of lights without a knob; 0 for the others.
-    labels: for each light what is asked of it in few words; "" for nothing.
-    knobs: their unknowns one after the other are the x.
-    is_joined: whether something beside these couples the channels, a pull to colours.
-    gamuts: colours that lights keep to of which nothing else is asked.
+    fixed_weights: (n, 3), w₀: the emission of lights without a knob; 0 for the others.
+    labels: the constraint on each light in few words; "" for none.
+    knobs: their unknowns, one after the other, are the x.
+    is_joined: whether something else couples the channels: a pull to colours.
+    gamuts: colours that lights without other constraints keep to.
     """
 
-    held: Doubles
+    fixed_weights: Doubles
     labels: tuple[str, ...]
     knobs: tuple[Knob, ...]
     is_joined: bool = False
@@ -55,7 +61,7 @@ class Reduction:
 
     @cached_property
     def places(self) -> tuple[tuple[int, ...], ...]:
-        """Which of the x are a knob's, for each."""
+        """The indices of the x of each knob."""
         ends = np.cumsum([0, *(len(knob.unknowns) for knob in self.knobs)]).tolist()
         return tuple(tuple(range(first, last)) for first, last in pairwise(ends))
 
@@ -69,41 +75,42 @@ class Reduction:
         )
 
     @cached_property
-    def kept_knobs(self) -> tuple[int, ...]:
+    def confined_knobs(self) -> tuple[int, ...]:
         """Places of the knobs that are kept within their gamuts."""
         return tuple(k for k, knob in enumerate(self.knobs) if knob.gamut is not None)
 
     @cached_property
     def gamut_knobs(self) -> tuple[int, ...]:
-        """Places of the knobs that keep to a gamut, and as yet have any colour."""
+        """Places of the knobs that have a gamut, and still take any colour."""
         if self.gamuts is None:
             return ()
         return tuple(k for k, knob in enumerate(self.knobs) if _has_any_colour(knob))
 
     def with_gamuts(self, gamuts: Gamuts) -> "Reduction":
-        """Return the same with lights of any colour keeping to `gamuts`."""
+        """Return the reduction with lights of any colour keeping to `gamuts`."""
         return replace(self, gamuts=gamuts)
 
-    def kept_within(self, places: Collection[int]) -> "Reduction":
-        """Return the same with these knobs, by their places, within their gamuts."""
-        return self.kept_near(dict.fromkeys(places))
+    def confined(self, places: Collection[int]) -> "Reduction":
+        """Return the reduction with these knobs, by their places, confined to their gamuts."""
+        return self.confined_to_sides(dict.fromkeys(places))
 
-    def kept_near(self, sides: Mapping[int, int | None]) -> "Reduction":
-        """Return the same with knobs, by their places, within their gamuts towards some side."""
+    def confined_to_sides(self, sides: Mapping[int, int | None]) -> "Reduction":
+        """Return the reduction with knobs, by their places, confined to a side of their gamuts."""
         if not sides:
             return self
         knobs = [*self.knobs]
         for k, side in sides.items():
             assert self.gamuts is not None
-            knobs[k] = knobs[k].within_gamut(self.gamuts[knobs[k].lights[0]], side)
+            knobs[k] = knobs[k].confined(self.gamuts[knobs[k].lights[0]], side)
         return replace(self, knobs=tuple(knobs))
 
     def with_windows(self, windows: Mapping[int, tuple[int, int]]) -> "Reduction":
-        """Return the same with knobs, by their places, between other whites of their ranges."""
+        """Return the reduction with knobs, by their places, between other whites of their
+        ranges."""
         knobs = [*self.knobs]
         for k, window in windows.items():
             if knobs[k].window != window:
-                knobs[k] = knobs[k].within(window)
+                knobs[k] = knobs[k].with_window(window)
         return replace(self, knobs=tuple(knobs))
 
     @cached_property
@@ -129,12 +136,14 @@ class Reduction:
 
     @cached_property
     def upper(self) -> Doubles:
-        """(k,), the most."""
+        """(k,), the most that each x may be."""
         return np.array([x.upper for x in self.unknowns])
 
     @cached_property
     def columns(self) -> tuple[Indices, Indices, Doubles]:
-        """C by what is in it: unknown, light and (3,) emission of each entry, unknowns in order."""
+        """The matrix C by its entries: unknown, light and (3,) emission of each, in the order of
+        unknowns.
+        """
         entries = [(k, i, rgb) for k, x in enumerate(self.unknowns) for i, rgb in x.columns]
         return (
             np.array([k for k, _, _ in entries], dtype=np.intp),
@@ -143,19 +152,19 @@ class Reduction:
         )
 
     @cached_property
-    def stacks(self) -> tuple[Stack, ...]:
-        """The limited knobs by how many unknowns they have."""
+    def limited_knobs(self) -> tuple[LimitedKnobs, ...]:
+        """The limited knobs, grouped by their number of unknowns."""
         sizes = {len(knob.unknowns) for knob in self.knobs if knob.limit is not None}
-        return tuple(Stack.of(self.knobs, self.places, size) for size in sorted(sizes))
+        return tuple(LimitedKnobs.of(self.knobs, self.places, size) for size in sorted(sizes))
 
     @cached_property
-    def kinds(self) -> tuple[Kind, ...]:
-        """The knobs by how many unknowns and lights they have."""
+    def knob_groups(self) -> tuple[KnobGroup, ...]:
+        """The knobs, grouped by their numbers of unknowns and lights."""
         found: dict[tuple[int, int], list[int]] = {}
         for k, knob in enumerate(self.knobs):
             found.setdefault((len(knob.unknowns), len(knob.lights)), []).append(k)
         return tuple(
-            Kind.of([self.knobs[k] for k in its], [self.places[k] for k in its])
+            KnobGroup.of([self.knobs[k] for k in its], [self.places[k] for k in its])
             for its in found.values()
         )
 
@@ -174,43 +183,44 @@ class Reduction:
                 here, first = np.unique(place[unknown[there]], return_index=True)
                 entries.append(Entries(here, light[there], rgb[there, c], first))
             within = set(its.tolist())
-            cap_its = [k for k, cap in enumerate(self.caps) if cap.unknowns[0] in within]
+            cap_indices = [k for k, cap in enumerate(self.caps) if cap.unknowns[0] in within]
             caps = tuple(
                 replace(cap, unknowns=tuple(int(place[i]) for i in cap.unknowns))
-                for cap in (self.caps[k] for k in cap_its)
+                for cap in (self.caps[k] for k in cap_indices)
             )
-            made.append(Block(channels, its, tuple(entries), caps, cap_its))
+            made.append(Block(channels, its, tuple(entries), caps, cap_indices))
         return tuple(made)
 
     @cached_property
-    def alike(self) -> Alike | None:
-        """The three blocks together, where they are of the same lights and nothing joins them."""
+    def alike_blocks(self) -> AlikeBlocks | None:
+        """The three blocks together, if they have the same lights and nothing joins them."""
         if len(self.blocks) < 3 or self.caps or not all(block.is_plain for block in self.blocks):
             return None
         first, *others = (block.entries[0].lights for block in self.blocks)
         if not all(np.array_equal(first, lights) for lights in others):
             return None
-        its = np.stack([block.its for block in self.blocks])
-        every = np.array_equal(first, np.arange(len(self.held)))
-        return Alike(None if every else first, its, self.lower[its], self.upper[its])
+        its = np.stack([block.unknowns for block in self.blocks])
+        every = np.array_equal(first, np.arange(len(self.fixed_weights)))
+        return AlikeBlocks(None if every else first, its, self.lower[its], self.upper[its])
 
     @cached_property
-    def holds_any(self) -> bool:
-        """Whether some light shines that has no knob."""
-        return bool(self.held.any())
+    def has_fixed_light(self) -> bool:
+        """True if a light without a knob shines."""
+        return bool(self.fixed_weights.any())
 
     def weights(self, x: Doubles) -> Doubles:
-        """w = C x + w₀, (n, 3)."""
+        """Return the weights w = C x + w₀, (n, 3)."""
         unknown, light, rgb = self.columns
-        w = self.held.copy()
+        w = self.fixed_weights.copy()
         np.add.at(w, light, x[unknown, None] * rgb)
         return w
 
-    def reached(self, lit: Bools) -> Bools:
-        """(n, 3), whether what moves a light in a channel reaches something that counts.
+    def determined(self, lit: Bools) -> Bools:
+        """Return, (n, 3), whether the unknowns that move a light in a channel reach something that
+        counts.
 
         lit: (n, 3), whether the light itself does. A dimmer that does so in one channel or with
-        one of its lights tells all of them; what is held is told already.
+        one of its lights determines all of them; fixed lights are determined already.
         """
         unknown, light, rgb = self.columns
         moves, felt = rgb != 0, np.zeros(len(self.unknowns), dtype=bool)
@@ -218,15 +228,15 @@ class Reduction:
         moved, told = np.zeros_like(lit), np.zeros_like(lit)
         np.logical_or.at(moved, light, moves)
         np.logical_or.at(told, light, moves & felt[unknown, None])
-        # A colour without blue says how much blue there is, if it is known how bright it is.
+        # The brightness of a colour without blue determines its blue, too.
         either = told.any(axis=1, keepdims=True) | ~moved.any(axis=1, keepdims=True)
         return np.asarray(told | (~moved & either))
 
     @cached_property
-    def ends(self) -> tuple[Doubles, Doubles]:
+    def weight_ranges(self) -> tuple[Doubles, Doubles]:
         """The least and the most that bounds leave of each weight, (n, 3) each."""
         unknown, light, rgb = self.columns
-        low, high = self.held.copy(), self.held.copy()
+        low, high = self.fixed_weights.copy(), self.fixed_weights.copy()
         for end, bounds in ((low, self.lower), (high, self.upper)):
             most = np.broadcast_to(bounds[unknown, None], rgb.shape)
             its = np.multiply(most, rgb, out=np.zeros(rgb.shape), where=rgb != 0)
@@ -253,51 +263,51 @@ class Reduction:
 
 
 def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reduction:
-    """What `constraints` leave to solve for among `lights`.
+    """Return the unknowns that `constraints` leave among `lights`.
 
-    Raises ConstraintError for a light that is not there, and for what cannot be had: a
-    colour of a light that has only a dimmer, a light on two dimmers, limits without room.
+    Raises ConstraintError for a light that is not there, and for the impossible: a colour for a
+    light that has only a dimmer, a light on two dimmers, limits that leave nothing.
     """
-    asked = of_each_light(constraints, lights)
-    labels = ["" if one is None else one.label for one in asked]
-    tied, held, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
-    for k, (light, one) in enumerate(zip(lights, asked, strict=True)):
+    by_light = constraints_by_light(constraints, lights)
+    labels = ["" if constraint is None else constraint.label for constraint in by_light]
+    tied, fixed, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
+    for k, (light, one) in enumerate(zip(lights, by_light, strict=True)):
         if light.is_fixed:
-            held[k] = 1
+            fixed[k] = 1
         elif k in tied:
             tie, members = tied[k]
             names = ", ".join(lights[i].name for i in members)
             labels[k] = ", ".join(filter(None, [f"tied ({names})", labels[k]]))
             if k == members[0]:
-                knob = tie_of(tie, members, names, lights, asked)
-                if any(its.is_held for its in (asked[i] for i in members) if its is not None):
+                knob = tied_knob(tie, members, names, lights, by_light)
+                if any(its.is_fixed for its in (by_light[i] for i in members) if its is not None):
                     [level] = knob.unknowns
                     for i, rgb in level.columns:
-                        held[i] = level.lower * rgb
+                        fixed[i] = level.lower * rgb
                 else:
                     knobs.append(knob)
-        elif one is not None and one.is_held:
-            held[k] = 0 if one.lock is None else locked_at(light, one.lock, one.where)
+        elif one is not None and one.is_fixed:
+            fixed[k] = 0 if one.lock is None else locked_emission(light, one.lock, one.where)
         elif one is None:
             knobs.append(Knob.of_any_colour(k, is_scalar=light.is_scalar))
         elif light.is_scalar or (one.primaries is not None and len(one.primaries) == 1):
-            knobs.append(dimmer_of(k, light, one))
+            knobs.append(dimmer_knob(k, light, one))
         else:
-            knobs.append(mix_of(k, light, one))
-    return Reduction(held, tuple(labels), tuple(knobs))
+            knobs.append(mixing_knob(k, light, one))
+    return Reduction(fixed, tuple(labels), tuple(knobs))
 
 
 def _has_any_colour(knob: Knob) -> bool:
-    """Return whether nothing is asked of the channels of a light."""
+    """Return whether the channels of a light have no constraint."""
     return knob.is_free and all(x.lower == 0 and np.isinf(x.upper) for x in knob.unknowns)
 
 
-def only(reduction: Reduction, chosen: Collection[int]) -> Reduction:
-    """`reduction` with the knobs that are not chosen at 0."""
+def only_knobs(reduction: Reduction, chosen: Collection[int]) -> Reduction:
+    """Return `reduction` with the knobs that are not chosen fixed at 0."""
     labels, knobs = [*reduction.labels], [*reduction.knobs]
     for k, knob in enumerate(knobs):
         if k not in chosen:
-            knobs[k] = knob.off()
+            knobs[k] = knob.switched_off()
             for light in knob.lights:
                 labels[light] = ", ".join(filter(None, [labels[light], "left out"]))
     return replace(reduction, labels=tuple(labels), knobs=tuple(knobs))

@@ -1,8 +1,8 @@
-"""The K lights that serve best, and what more or fewer would miss.
+"""The K lights that serve best, and the error with more or fewer.
 
-Which lights to use is no convex question. They are added one at a time, each time the one
-that helps most, and at K exchanged for others as long as that helps. Each trial is the full
-solve of its lights, so the answer is optimal for the lights it uses.
+The choice of lights is no convex problem. A greedy search adds one light at a time, always the one
+that helps most, and at K exchanges lights as long as that helps. Each trial solves for its lights
+in full, so the answer is optimal for the lights it uses.
 """
 
 from collections.abc import Collection, Sequence
@@ -15,11 +15,11 @@ from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduced_problem import ReducedProblem
 from lightpaint.lighting.constraints.reduction import Reduction
 
-#: Sizes beyond K that are tried, so that people see what a few more lights would bring.
-BEYOND = 2
+#: Sizes beyond K that are tried, so that people see the gain of a few more lights.
+EXTRA_SIZES = 2
 
 #: Share of the objective that an exchange has to gain.
-GAIN = 1e-9
+MIN_GAIN = 1e-9
 
 
 class _Trials:
@@ -27,22 +27,23 @@ class _Trials:
 
     def __init__(self, problems: Sequence[ReducedProblem], reduction: Reduction) -> None:
         self.problems, self.places = problems, reduction.places
-        self.known: dict[frozenset[int], float] = {}
+        self.values: dict[frozenset[int], float] = {}
 
     def value(self, chosen: Collection[int]) -> float:
+        """Return the least objective with only the chosen knobs on."""
         key = frozenset(chosen)
-        if key not in self.known:
+        if key not in self.values:
             on = {k for knob in key for k in self.places[knob]}
-            self.known[key] = sum(_value(problem, on) for problem in self.problems)
-        return self.known[key]
+            self.values[key] = sum(_least_objective(problem, on) for problem in self.problems)
+        return self.values[key]
 
-    def added(self, chosen: frozenset[int]) -> frozenset[int]:
-        """`chosen` and the knob that helps most."""
+    def with_best(self, chosen: frozenset[int]) -> frozenset[int]:
+        """Return `chosen` with the knob that helps most."""
         rest = [k for k in range(len(self.places)) if k not in chosen]
         return chosen | {min(rest, key=lambda k: self.value(chosen | {k}))}
 
-    def exchanged(self, chosen: frozenset[int], kept: Collection[int]) -> frozenset[int]:
-        """`chosen` after all exchanges of one for one that help."""
+    def after_exchanges(self, chosen: frozenset[int], kept: Collection[int]) -> frozenset[int]:
+        """Return `chosen` after all one-for-one exchanges that help."""
         while True:
             now = self.value(chosen)
             trials = [
@@ -52,15 +53,15 @@ class _Trials:
                 if new not in chosen
             ]
             best = min(trials, key=self.value, default=chosen)
-            if self.value(best) >= now - GAIN * abs(now):
+            if self.value(best) >= now - MIN_GAIN * abs(now):
                 return chosen
             chosen = best
 
 
-def best_knobs(
+def choose_knobs(
     problems: Sequence[ReducedProblem], reduction: Reduction, count: int
 ) -> list[frozenset[int]]:
-    """The knobs to use, one more each time, to `count` of them and a little beyond.
+    """Return the knobs to use, one more each time, up to a few more than `count`.
 
     Several lights on one dimmer count as one. Knobs with a lower limit above 0 are always on.
     Raises ConstraintError if these are more.
@@ -71,22 +72,22 @@ def best_knobs(
             f"sparse is {count}, but {len(kept)} lights have a lower limit above 0: allow as many"
         )
     trials, chosen, path = _Trials(problems, reduction), kept, [kept] if kept else []
-    while len(chosen) < len(reduction.knobs) and len(chosen) < count + BEYOND:
-        chosen = trials.added(chosen)
+    while len(chosen) < len(reduction.knobs) and len(chosen) < count + EXTRA_SIZES:
+        chosen = trials.with_best(chosen)
         if len(chosen) == count:
-            chosen = trials.exchanged(chosen, kept)
+            chosen = trials.after_exchanges(chosen, kept)
         path.append(chosen)
     return path
 
 
 def _is_on(knob: Knob) -> bool:
-    """Whether a lower limit keeps it from being off."""
+    """Return whether a lower limit keeps the knob from being off."""
     return any(x.lower > 0 for x in knob.unknowns) or (knob.limit is not None and knob.limit[1] > 0)
 
 
-def _value(problem: ReducedProblem, on: Collection[int]) -> float:
-    """min xᵀM x − 2 bᵀx over the unknowns that are on."""
-    here = np.array([k for k, i in enumerate(problem.its.tolist()) if i in on], dtype=np.intp)
-    p = problem.of(here)
+def _least_objective(problem: ReducedProblem, on: Collection[int]) -> float:
+    """Return min xᵀM x − 2 bᵀx over the unknowns that are on."""
+    here = np.array([k for k, i in enumerate(problem.unknowns.tolist()) if i in on], dtype=np.intp)
+    p = problem.restricted(here)
     x = minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps).x
     return float(x @ p.M @ x - 2 * p.b @ x)

@@ -13,66 +13,69 @@ from lightpaint.lighting.constraints.knobs import Knob
 
 @dataclass(frozen=True)
 class Entries:
-    """What is not 0 in C_c, the part of C in one channel, column by column.
+    """The entries of C_c, the part of C in one channel, that are not 0, column by column.
 
-    here: (j,), the columns that there are. lights, values: (e,), of each entry. first: (j,), where
-    among these each column begins.
+    columns: (j,), those with entries. lights, values: (e,), of each entry. first: (j,), the
+    index among these at which each column begins.
     """
 
-    here: Indices
+    columns: Indices
     lights: Indices
     values: Doubles
     first: Indices
 
     @property
     def counts(self) -> Indices:
-        """(j,), how many entries each column has."""
+        """(j,), the number of entries of each column."""
         return np.diff(self.first, append=self.lights.size)
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Entries of two channels that are of one light: where what joins its channels goes.
+    """Pairs of entries in two channels that belong to one light: the places where a coupling goes.
 
-    one, other: which columns. value: the product of both entries. light, channel, next: of what
-    joins them.
+    column, other_column: of the two entries. value: their product. light, channel, other_channel:
+    of the coupling.
     """
 
-    one: Indices
-    other: Indices
+    column: Indices
+    other_column: Indices
     value: Doubles
     light: Indices
     channel: Indices
-    next: Indices
+    other_channel: Indices
 
 
 @dataclass(frozen=True)
 class Block:
-    """Channels that unknowns couple, which x these are, their entries by channel, and their caps.
+    """Channels that unknowns couple, with these unknowns, their entries by channel, and their caps.
 
-    The unknowns of the caps are numbered within the block; cap_its are their own numbers.
+    The caps number their unknowns within the block; cap_indices are the numbers of the caps
+    themselves.
     """
 
     channels: list[int]
-    its: Indices
+    unknowns: Indices
     entries: tuple[Entries, ...]
     caps: tuple[Cap, ...]
-    cap_its: list[int]
+    cap_indices: list[int]
 
     @cached_property
     def is_plain(self) -> bool:
-        """Whether its unknowns are weights of lights in one channel, as they are."""
+        """True if its unknowns are the weights of lights in one channel."""
         [first, *more] = self.entries
-        return not more and bool((first.values == 1).all()) and first.lights.size == self.its.size
+        return (
+            not more and bool((first.values == 1).all()) and first.lights.size == self.unknowns.size
+        )
 
     @cached_property
     def pairs(self) -> Pairs:
-        """All of them, in either order."""
+        """All pairs, in either order."""
         column, light, value, channel = (
             np.concatenate(parts)
             for parts in zip(
                 *(
-                    (np.repeat(e.here, e.counts), e.lights, e.values, np.full(e.lights.size, c))
+                    (np.repeat(e.columns, e.counts), e.lights, e.values, np.full(e.lights.size, c))
                     for c, e in zip(self.channels, self.entries, strict=True)
                 ),
                 strict=True,
@@ -89,29 +92,30 @@ class Block:
 
     @cached_property
     def is_in_order(self) -> bool:
-        """Whether these are the first lights, one after the other."""
+        """True if its lights are the first ones, in their order."""
         lights = self.entries[0].lights
         return bool((lights == np.arange(lights.size)).all())
 
 
 @dataclass(frozen=True)
-class Alike:
-    """Three blocks of weights of the same lights: by one call what would take three.
+class AlikeBlocks:
+    """Three blocks of weights of the same lights, solved together by one call.
 
-    lights: (k,), None for all of them in order. its, lower, upper: (3, k).
+    lights: (k,), None for all of them in order. unknowns, lower, upper: (3, k).
     """
 
     lights: Indices | None
-    its: Indices
+    unknowns: Indices
     lower: Doubles
     upper: Doubles
 
 
 @dataclass(frozen=True)
-class Kind:
-    """K knobs of as many unknowns, u, and lights, l, each.
+class KnobGroup:
+    """K knobs, each of u unknowns and l lights.
 
-    places: (k, u), which x they are. lights: (k, l). columns: (k, u, 3 l), their emissions.
+    places: (k, u), their indices among the x. lights: (k, l). columns: (k, u, 3 l), their
+    emissions.
     """
 
     places: Indices
@@ -120,54 +124,56 @@ class Kind:
 
     @cached_property
     def is_free(self) -> bool:
-        """Whether these are lights of any colour: an unknown is the emission in a channel."""
+        """True if these are lights of any colour: each unknown is the emission in a channel."""
         return self.columns.shape[1:] == (3, 3) and bool((self.columns == np.eye(3)).all())
 
     @cached_property
     def is_orthogonal(self) -> bool:
-        """Whether the unknowns of a knob do not share channels: each is nearest by itself."""
+        """True if the unknowns of a knob share no channel, so that each is nearest by itself."""
         return bool((((self.columns != 0).sum(axis=1)) <= 1).all())
 
     @classmethod
-    def of(cls, some: Sequence[Knob], places: Sequence[tuple[int, ...]]) -> "Kind":
-        """Of some knobs, and which x are theirs."""
-        columns = np.zeros((len(some), len(some[0].unknowns), len(some[0].lights), 3))
-        for k, knob in enumerate(some):
+    def of(cls, knobs: Sequence[Knob], places: Sequence[tuple[int, ...]]) -> "KnobGroup":
+        """Make a group of knobs and their indices among the x."""
+        columns = np.zeros((len(knobs), len(knobs[0].unknowns), len(knobs[0].lights), 3))
+        for k, knob in enumerate(knobs):
             for j, unknown in enumerate(knob.unknowns):
                 for light, rgb in unknown.columns:
                     columns[k, j, knob.lights.index(light)] = rgb
         return cls(
             np.array(places, dtype=np.intp),
-            np.array([knob.lights for knob in some], dtype=np.intp),
+            np.array([knob.lights for knob in knobs], dtype=np.intp),
             columns.reshape(*columns.shape[:2], -1),
         )
 
 
 @dataclass(frozen=True)
-class Stack:
-    """K knobs of as many unknowns, u, each with a sum that is limited.
+class LimitedKnobs:
+    """K knobs of u unknowns each, with a limited sum.
 
-    knobs, lower, upper: (k,). its, coefficients: (k, u).
+    knobs, lower, upper: (k,). unknowns, coefficients: (k, u).
     """
 
     knobs: Indices
-    its: Indices
+    unknowns: Indices
     coefficients: Doubles
     lower: Doubles
     upper: Doubles
 
     @classmethod
-    def of(cls, knobs: Sequence[Knob], places: Sequence[tuple[int, ...]], size: int) -> "Stack":
-        """Of the knobs those of this size. places: which x are theirs, for each."""
-        some = [
+    def of(
+        cls, knobs: Sequence[Knob], places: Sequence[tuple[int, ...]], size: int
+    ) -> "LimitedKnobs":
+        """Group the limited knobs of this size. places: the indices of each knob's x."""
+        limited = [
             (k, knob.limit)
             for k, knob in enumerate(knobs)
             if knob.limit is not None and len(knob.unknowns) == size
         ]
         return cls(
-            np.array([k for k, _ in some], dtype=np.intp),
-            np.array([places[k] for k, _ in some], dtype=np.intp),
-            np.array([limit[0] for _, limit in some]),
-            np.array([limit[1] for _, limit in some]),
-            np.array([limit[2] for _, limit in some]),
+            np.array([k for k, _ in limited], dtype=np.intp),
+            np.array([places[k] for k, _ in limited], dtype=np.intp),
+            np.array([limit[0] for _, limit in limited]),
+            np.array([limit[1] for _, limit in limited]),
+            np.array([limit[2] for _, limit in limited]),
         )

@@ -1,4 +1,4 @@
-"""Values of what is asked of a light, as people write them: levels, colours, temperatures."""
+"""Values of constraints, as people write them: levels, colours, temperatures."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from lightpaint.validation import BRIGHTEST, MAX_NAME, MAX_PRIMARIES, is_amount
 
 @dataclass(frozen=True)
 class Level:
-    """How bright: a luminance, an RGB emission, or a share of the present luminance."""
+    """A brightness: a luminance, an RGB emission, or a share of the present luminance."""
 
     amount: float | RGB
     is_share: bool = False
@@ -29,27 +29,27 @@ class Level:
 
 @dataclass(frozen=True)
 class Lock:
-    """Not to be solved for. color: of luminance 1; what is None is as it is at present."""
+    """An emission that is not solved for. color: of luminance 1. None keeps the present value."""
 
     level: Level | None = None
     color: RGB | None = None
 
 
-def check_keys(asked: Any, known: Iterable[str], where: str) -> None:
+def check_keys(table: Any, known: Iterable[str], where: str) -> None:
     """Raise ConstraintError unless it is a table of keys that are `known`."""
-    if not isinstance(asked, Mapping):
-        raise ConstraintError(f"{where} is {asked!r}: expected keys like lock = true")
-    if unknown := [key for key in asked if key not in known]:
+    if not isinstance(table, Mapping):
+        raise ConstraintError(f"{where} is {table!r}: expected keys like lock = true")
+    if unknown := [key for key in table if key not in known]:
         raise ConstraintError(
             f"{where} has the key {one_line(repr(unknown[0]))}: known are {', '.join(known)}"
         )
 
 
-def check_lengths(asked: Mapping[str, Any], where: str) -> None:
-    """Raise ConstraintError for a value that is longer than any that means something."""
-    for key, value in asked.items():
+def check_lengths(table: Mapping[str, Any], where: str) -> None:
+    """Raise ConstraintError for a value that is longer than any valid one."""
+    for key, value in table.items():
         texts = [*value] if isinstance(value, list | tuple) else [value]
-        if key != "primaries":  # of which fewer can be had, as is said where they are read
+        if key != "primaries":  # which has a limit of its own
             texts.append(value)
         if isinstance(value, Mapping):
             texts = [x for pair in value.items() for x in pair]
@@ -61,8 +61,8 @@ def check_lengths(asked: Mapping[str, Any], where: str) -> None:
                 )
 
 
-def lock_of(value: Any, where: str) -> Lock:
-    """What to stay at, from `true`, a level, or a colour and a level."""
+def parse_lock(value: Any, where: str) -> Lock:
+    """Return the lock that `true`, a level, or a colour and a level ask for."""
     if value is True:
         return Lock()
     expected = "expected true, a level like 2.5 or 40%, three numbers, or a colour and a level"
@@ -74,13 +74,13 @@ def lock_of(value: Any, where: str) -> Lock:
         levels = [word for word in words if word not in colors]
         if len(colors) > 1 or len(levels) > 1:
             raise ConstraintError(f"{where} is {value!r}: {expected}, like '3200K 40%'")
-        level = level_of(levels[0], where, expected) if levels else None
-        return Lock(level, color_of(colors[0], where) if colors else None)
-    return Lock(level_of(value, where, expected))
+        level = parse_level(levels[0], where, expected) if levels else None
+        return Lock(level, parse_color(colors[0], where) if colors else None)
+    return Lock(parse_level(value, where, expected))
 
 
-def level_of(value: Any, where: str, expected: str = "") -> Level:
-    """A level from `2.5`, `"40%"` or `[r, g, b]`."""
+def parse_level(value: Any, where: str, expected: str = "") -> Level:
+    """Parse a level: `2.5`, `"40%"` or `[r, g, b]`."""
     expected = expected or "expected a luminance like 2.5, a share like 40%, or three numbers >= 0"
     if isinstance(value, str):
         text = value.strip()
@@ -98,13 +98,14 @@ def level_of(value: Any, where: str, expected: str = "") -> Level:
     raise ConstraintError(f"{where} is {value!r}: {expected}, of at most {BRIGHTEST:g}")
 
 
-def limits_of(value: Any, where: str) -> tuple[Level | None, Level | None]:
-    """Least and most, from a table of `min`, `max` or both."""
+def parse_limits(value: Any, where: str) -> tuple[Level | None, Level | None]:
+    """Parse least and most from a table of `min`, `max` or both."""
     check_keys(value, ("min", "max"), where)
     if not value:
         raise ConstraintError(f"{where} is empty: expected min, max or both")
     least, most = (
-        level_of(value[key], f"{where}.{key}") if key in value else None for key in ("min", "max")
+        parse_level(value[key], f"{where}.{key}") if key in value else None
+        for key in ("min", "max")
     )
     if least and most and least.is_share == most.is_share:
         low, high = np.array(least.amount), np.array(most.amount)
@@ -113,36 +114,36 @@ def limits_of(value: Any, where: str) -> tuple[Level | None, Level | None]:
     return least, most
 
 
-def primaries_of(asked: Mapping[str, Any], where: str) -> tuple[RGB, ...] | None:
-    """The colours that a light can mix, each of luminance 1; None where it is not asked."""
-    if "color" in asked:
-        return (color_of(asked["color"], f"{where}.color", duv=_duv(asked, where)),)
-    if "kelvin" in asked:
-        ends = _kelvins(asked["kelvin"], f"{where}.kelvin")
-        return tuple(_kelvin(x, _duv(asked, where), f"{where}.kelvin") for x in ends)
-    if "primaries" not in asked:
+def parse_primaries(table: Mapping[str, Any], where: str) -> tuple[RGB, ...] | None:
+    """Return the colours that a light can mix, each of luminance 1; None if any colour will do."""
+    if "color" in table:
+        return (parse_color(table["color"], f"{where}.color", duv=_parse_duv(table, where)),)
+    if "kelvin" in table:
+        ends = _parse_kelvins(table["kelvin"], f"{where}.kelvin")
+        return tuple(_parse_kelvin(x, _parse_duv(table, where), f"{where}.kelvin") for x in ends)
+    if "primaries" not in table:
         return None
-    given = asked["primaries"]
-    if not isinstance(given, Sequence) or isinstance(given, str) or not given:
+    listed = table["primaries"]
+    if not isinstance(listed, Sequence) or isinstance(listed, str) or not listed:
         raise ConstraintError(
-            f"{where}.primaries is {one_line(repr(given))}: expected a list of colours, "
+            f"{where}.primaries is {one_line(repr(listed))}: expected a list of colours, "
             '["#ff0000", "3000K"]'
         )
-    if len(given) > MAX_PRIMARIES:
+    if len(listed) > MAX_PRIMARIES:
         raise ConstraintError(
-            f"{where}.primaries lists {len(given)} colours: at most {MAX_PRIMARIES} can be mixed"
+            f"{where}.primaries lists {len(listed)} colours: at most {MAX_PRIMARIES} can be mixed"
         )
-    return tuple(color_of(color, f"{where}.primaries") for color in given)
+    return tuple(parse_color(color, f"{where}.primaries") for color in listed)
 
 
-def whites_of(asked: Mapping[str, Any], where: str) -> WhiteRange | None:
-    """The range of white that a light keeps to; None where it is not asked for one."""
-    ends = _kelvins(asked["kelvin"], f"{where}.kelvin") if "kelvin" in asked else []
-    return white_range(*ends, _duv(asked, where)) if len(ends) == 2 else None
+def parse_whites(table: Mapping[str, Any], where: str) -> WhiteRange | None:
+    """Return the range of white that a light keeps to; None without one."""
+    ends = _parse_kelvins(table["kelvin"], f"{where}.kelvin") if "kelvin" in table else []
+    return white_range(*ends, _parse_duv(table, where)) if len(ends) == 2 else None
 
 
-def _kelvins(value: Any, where: str) -> list[float]:
-    """One temperature, or both ends of a range."""
+def _parse_kelvins(value: Any, where: str) -> list[float]:
+    """Return one temperature, or both ends of a range."""
     ends = [value] if _is_number(value) else value
     is_range = isinstance(ends, Sequence) and not isinstance(ends, str) and len(ends) in (1, 2)
     if not is_range or not all(map(_is_number, ends)) or sorted(ends) != list(ends):
@@ -153,13 +154,13 @@ def _kelvins(value: Any, where: str) -> list[float]:
     return [float(kelvin) for kelvin in dict.fromkeys(ends)]
 
 
-def color_of(value: Any, where: str, *, duv: float = 0.0) -> RGB:
-    """A colour of luminance 1 from `"#ffaa66"`, `"3200K"` or `[r, g, b]`."""
+def parse_color(value: Any, where: str, *, duv: float = 0.0) -> RGB:
+    """Parse a colour: `"#ffaa66"`, `"3200K"` or `[r, g, b]`; return it at luminance 1."""
     try:
         if isinstance(value, str) and value.strip().startswith("#"):
             rgb = hex_to_rgb(value)
         elif isinstance(value, str) and value.strip().upper().endswith("K"):
-            return _kelvin(float(value.strip()[:-1]), duv, where)
+            return _parse_kelvin(float(value.strip()[:-1]), duv, where)
         elif _is_rgb(value):
             rgb = np.array(value, dtype=np.float64)
         else:
@@ -173,36 +174,36 @@ def color_of(value: Any, where: str, *, duv: float = 0.0) -> RGB:
     return as_rgb(rgb / luminance(rgb))
 
 
-def _kelvin(kelvin: float, duv: float, where: str) -> RGB:
+def _parse_kelvin(kelvin: float, duv: float, where: str) -> RGB:
     try:
         return as_rgb(kelvin_to_rgb(kelvin, duv))
     except ColorError as error:
         raise ConstraintError(f"{where}: {error}") from None
 
 
-def _duv(asked: Mapping[str, Any], where: str) -> float:
-    duv = asked.get("duv", 0.0)
+def _parse_duv(table: Mapping[str, Any], where: str) -> float:
+    duv = table.get("duv", 0.0)
     if not (_is_number(duv) and is_amount(abs(duv))):
         raise ConstraintError(f"{where}.duv is {duv!r}: expected a number like 0.003")
     return float(duv)
 
 
-def strength_of(value: Any, where: str) -> float:
-    """That of a pull."""
+def parse_strength(value: Any, where: str) -> float:
+    """Return the strength of a pull."""
     if not (_is_number(value) and is_amount(value)):
         raise ConstraintError(f"{where} is {value!r}: expected a strength >= 0, like 0.1")
     return float(value)
 
 
-def count_of(value: Any, where: str) -> int | None:
-    """How many lights at most; None for any number."""
+def parse_count(value: Any, where: str) -> int | None:
+    """Return the largest number of lights; None for any number."""
     if value is not None and not (type(value) is int and value > 0):
         raise ConstraintError(f"{where} is {value!r}: expected a whole number of lights > 0")
     return value
 
 
-def described(key: str, value: Any) -> str:
-    """A key and its value in few words, for tables."""
+def describe_constraint(key: str, value: Any) -> str:
+    """Return a key and its value in few words, for tables."""
     if value is True:
         return key
     if key == "limits":

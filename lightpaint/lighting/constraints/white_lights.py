@@ -1,22 +1,26 @@
-"""Lamps that may only be white, as if that had been asked of each."""
+"""Whites for all lamps whose colour is open."""
 
 from collections.abc import Sequence
 
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.light_patterns import of_each_light, tied_lights
+from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 
-#: What lamps are made for, in kelvin.
-WHITES = (2200, 9000)
+#: The range of usual lamps, in kelvin.
+LAMP_KELVINS = (2200, 9000)
 
 
-def white_where_free(asked: Constraints, lights: Sequence[BasisLight]) -> Constraints:
-    """`asked`, and of every light whose colour is left open that it be between WHITES."""
-    tied = tied_lights(asked, lights)
+def whiten_open_lights(constraints: Constraints, lights: Sequence[BasisLight]) -> Constraints:
+    """Return constraints in which every light of open colour also stays between LAMP_KELVINS."""
+    tied = tied_lights(constraints, lights)
     free = [
         light.name
-        for k, (light, one) in enumerate(zip(lights, of_each_light(asked, lights), strict=True))
+        for k, (light, constraint) in enumerate(
+            zip(lights, constraints_by_light(constraints, lights), strict=True)
+        )
         if not (light.is_fixed or light.is_scalar or k in tied)
-        and (one is None or not (one.is_held or one.primaries is not None))
+        and (constraint is None or not (constraint.is_fixed or constraint.primaries is not None))
     ]
-    return asked.and_then(Constraints.of({name: {"kelvin": list(WHITES)} for name in free}))
+    return constraints.and_then(
+        Constraints.of({name: {"kelvin": list(LAMP_KELVINS)} for name in free})
+    )

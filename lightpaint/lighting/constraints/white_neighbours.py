@@ -1,12 +1,12 @@
-"""Lights that keep to a range of white: which two neighbouring whites each of them mixes.
+"""Lights that keep to a range of white, and the two neighbouring whites that each of them mixes.
 
 The whites of a range lie on a curve, so that the mixes of all of them are no convex set. Those of
-two neighbours are. Each step solves such a convex problem, certified as any other, and says which
-lights would gain by other neighbours: those that come to the end of theirs and go on from there,
+two neighbours are. Each step solves such a convex problem, certified as any other, and finds the
+lights that would gain by other neighbours: those at the end of theirs that would go on from there,
 those that are off and would be on with another white, and at last single lights that would be
-better with a white elsewhere in their range. Windows over many whites, which get narrower, lead
-near the end at once. No step between neighbours raises the objective, and in the end none lowers
-it.
+better with a white elsewhere in their range. Wide windows over many whites, which get narrower,
+lead near the end quickly. No step between neighbours raises the objective, and in the end none
+lowers it.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -22,13 +22,13 @@ from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solv
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Pieces of the range that windows go over, before they go over one.
-WIDTHS = (8, 2)
+#: Widths of windows, in pieces of the range, before they are of one piece.
+WINDOW_WIDTHS = (8, 2)
 
 #: Steps between neighbours, at most.
-STEPS = 200
+MAX_STEPS = 200
 
-#: Part of the largest slope, and of the objective, that is round-off.
+#: Share of the largest slope, and of the objective, that is round-off.
 ROUND_OFF = 1e-9
 
 #: Ends of windows, by the places of their knobs.
@@ -36,8 +36,8 @@ Windows = Mapping[int, tuple[int, int]]
 
 
 @dataclass(frozen=True)
-class _Lights:
-    """Lights of one range of white. knobs: (k,), places in the reduction; lights: (k,).
+class _WhiteLights:
+    """Lights that share a range of white. knobs: (k,), places in the reduction; lights: (k,).
 
     least, most: (k,), limits of their luminances.
     """
@@ -54,26 +54,28 @@ def solve_on_locus(
     reduction: Reduction,
     start: Doubles,
     *,
-    steps: int = STEPS,
-    **how: Any,
+    steps: int = MAX_STEPS,
+    **options: Any,
 ) -> tuple[Reduction, ReducedOptimum]:
     """Solve as `solve_reduced` does, and choose the two whites of each light.
 
     Return the reduction with the whites that lights came to, and its optimum.
 
-    start: (n, 3). A reduction whose lights may still mix the ends of their ranges is solved so
-    first; one that has come to some whites goes on from those nearest to the start. steps: between
-    neighbours, at most. how: as of `solve_reduced`.
+    start: (n, 3). A reduction whose lights still mix the ends of their ranges is solved like that
+    first; another one goes on from the whites nearest to the start. steps: the most steps between
+    neighbours. how: options of `solve_reduced`.
     """
     if not reduction.white_knobs:
-        return next_whites(equations, reduction, start, steps=steps, **how)
-    groups, at = _groups(reduction), start
+        return next_whites(equations, reduction, start, steps=steps, **options)
+    groups, weights = _groups(reduction), start
     if all(_is_whole(reduction, k) for k in reduction.white_knobs):
-        at = solve_reduced(equations, reduction, _snap(groups, start), **how).weights
-    for width in WIDTHS:
-        reduction = reduction.with_windows(_windows_about(groups, at, width))
-        at = solve_reduced(equations, reduction, _snap(groups, at), **how).weights
-    return next_whites(equations, center_windows(reduction, at, 1), at, steps=steps, **how)
+        weights = solve_reduced(equations, reduction, _snap(groups, start), **options).weights
+    for width in WINDOW_WIDTHS:
+        reduction = reduction.with_windows(_windows_about(groups, weights, width))
+        weights = solve_reduced(equations, reduction, _snap(groups, weights), **options).weights
+    return next_whites(
+        equations, center_windows(reduction, weights, 1), weights, steps=steps, **options
+    )
 
 
 def next_whites(
@@ -81,24 +83,24 @@ def next_whites(
     reduction: Reduction,
     start: Doubles,
     *,
-    steps: int = STEPS,
+    steps: int = MAX_STEPS,
     only: Collection[int] | None = None,
-    **how: Any,
+    **options: Any,
 ) -> tuple[Reduction, ReducedOptimum]:
     """Solve for two whites of each light, and go on from there to their neighbours.
 
-    only: the knobs that go on, if not all do. Other arguments and what is returned as of
+    only: the knobs that move, if not all do. For the other arguments and the result see
     `solve_on_locus`.
     """
     groups = _groups(reduction, only)
-    found = solve_reduced(equations, reduction, _snap(groups, start), **how)
+    found = solve_reduced(equations, reduction, _snap(groups, start), **options)
     for _ in range(steps):
-        beyond = beyond_gamuts(reduction, found.weights)
-        windows = {} if beyond else _better(equations, reduction, groups, found)
+        beyond = knobs_outside_gamuts(reduction, found.weights)
+        windows = {} if beyond else _better_windows(equations, reduction, groups, found)
         if not (windows or beyond):
             break
-        reduction = reduction.with_windows(windows).kept_within(beyond)
-        found = solve_reduced(equations, reduction, _snap(groups, found.weights), **how)
+        reduction = reduction.with_windows(windows).confined(beyond)
+        found = solve_reduced(equations, reduction, _snap(groups, found.weights), **options)
     return reduction, found
 
 
@@ -118,33 +120,33 @@ def snap_to_whites(reduction: Reduction, weights: Doubles) -> Doubles:
     return _snap(_groups(reduction), weights) if reduction.white_knobs else weights
 
 
-def beyond_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
-    """Return places of knobs whose lights have colours, in weights (n, 3), beyond their gamuts.
+def knobs_outside_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
+    """Return places of knobs whose lights have colours, in weights (n, 3), outside their gamuts.
 
-    Lights first have any colour: where all of these are of their gamuts, the answer is the best
-    of these, too, and has fewer unknowns.
+    Lights first may have any colour: if all colours then lie in their gamuts, the answer is the
+    best under gamuts, too, and has fewer unknowns.
     """
     if not (its := reduction.gamut_knobs):
         return []
     assert reduction.gamuts is not None
     lights = [reduction.knobs[k].lights[0] for k in its]
-    beyond = reduction.gamuts.beyond(weights, np.array(lights))
+    beyond = reduction.gamuts.lights_outside(weights, np.array(lights))
     return [k for k, light in zip(its, lights, strict=True) if light in beyond]
 
 
 def clip_to_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
     """Return weights (n, 3) with the nearest colour of its gamut for lights that keep to one."""
-    its, gamuts = reduction.gamut_knobs + reduction.kept_knobs, reduction.gamuts
+    its, gamuts = reduction.gamut_knobs + reduction.confined_knobs, reduction.gamuts
     if gamuts is None or not its:
         return weights
     moved = weights.copy()
     lights = np.array([reduction.knobs[k].lights[0] for k in its])
-    for light in gamuts.beyond(weights, lights):
+    for light in gamuts.lights_outside(weights, lights):
         moved[light] = gamuts[light].nearest(weights[light])
     return moved
 
 
-def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_Lights]:
+def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_WhiteLights]:
     """Group lights by their ranges. only: the knobs, by their places, if not all count."""
     by_range: dict[WhiteRange, list[int]] = {}
     for k in reduction.white_knobs if only is None else only:
@@ -155,7 +157,7 @@ def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_
     for whites, places in by_range.items():
         limits = [reduction.knobs[k].limit for k in places]
         made.append(
-            _Lights(
+            _WhiteLights(
                 whites,
                 np.array(places, dtype=np.intp),
                 np.array([reduction.knobs[k].lights[0] for k in places], dtype=np.intp),
@@ -172,7 +174,7 @@ def _is_whole(reduction: Reduction, k: int) -> bool:
     return knob.whites.last > 1 and knob.window == (0, knob.whites.last)
 
 
-def _windows_about(groups: Sequence[_Lights], weights: Doubles, width: int) -> Windows:
+def _windows_about(groups: Sequence[_WhiteLights], weights: Doubles, width: int) -> Windows:
     windows = {}
     for its in groups:
         places = its.whites.places(weights[its.lights])
@@ -181,27 +183,27 @@ def _windows_about(groups: Sequence[_Lights], weights: Doubles, width: int) -> W
     return windows
 
 
-def _snap(groups: Sequence[_Lights], weights: Doubles) -> Doubles:
+def _snap(groups: Sequence[_WhiteLights], weights: Doubles) -> Doubles:
     moved = weights.copy()
     for its in groups:
         moved[its.lights] = its.whites.nearest(weights[its.lights])
     return moved
 
 
-def _better(
+def _better_windows(
     equations: NormalEquations,
     reduction: Reduction,
-    groups: Sequence[_Lights],
+    groups: Sequence[_WhiteLights],
     found: ReducedOptimum,
 ) -> Windows:
     """Return windows of the lights that would gain by other whites; none where no light would.
 
-    First all that go on from where they are, none of which has to give up what it has; only then
-    the one light that gains most by leaving it.
+    First all that move to the next white, none of which has to give up its present mix; only
+    then the one light that gains most by a jump.
     """
     gradient = equations.gradient(found.weights)
     power = np.einsum("cii->ic", equations.M)
-    # By how much a light's slope may differ from 0, in units of its own picture.
+    # The slope of a light that is round-off, in units of its own picture.
     root = np.sqrt(power.sum(axis=1))
     size = np.abs(equations.b.T / np.sqrt(np.where(power > 0, power, 1))).max(initial=0)
     little = ROUND_OFF * root * size
@@ -211,13 +213,15 @@ def _better(
         for j, k in enumerate(its.knobs.tolist()):
             window = reduction.knobs[k].window
             x = found.x[list(reduction.places[k])]
-            to = _onward(slopes[j], window, x, float(little[its.lights[j]]))
+            to = _next_window(slopes[j], window, x, float(little[its.lights[j]]))
             if to != window:
                 windows[k] = to
-    return windows or _elsewhere(equations, reduction, groups, found, gradient)
+    return windows or _distant_window(equations, reduction, groups, found, gradient)
 
 
-def _onward(slopes: Doubles, window: tuple[int, int], x: Doubles, little: float) -> tuple[int, int]:
+def _next_window(
+    slopes: Doubles, window: tuple[int, int], x: Doubles, little: float
+) -> tuple[int, int]:
     """Return the window that a light of mix x, (2,), goes on to. slopes: (k,), of all whites."""
     first, last = window
     if not x.any():
@@ -232,10 +236,10 @@ def _onward(slopes: Doubles, window: tuple[int, int], x: Doubles, little: float)
     return window
 
 
-def _elsewhere(
+def _distant_window(
     equations: NormalEquations,
     reduction: Reduction,
-    groups: Sequence[_Lights],
+    groups: Sequence[_WhiteLights],
     found: ReducedOptimum,
     gradient: Doubles,
 ) -> Windows:
@@ -263,11 +267,11 @@ def _elsewhere(
     return windows
 
 
-def tangent(reduction: Reduction, reach: float) -> Reduction:
-    """Return the reduction with each light that keeps to a range on the line of its two whites.
+def tangent_reduction(reduction: Reduction, reach: float) -> Reduction:
+    """Return the reduction with each light of a range on the line through its two whites.
 
-    reach: mireds by which it may go on along that. What is asked about an answer, how firmly it is
-    known and what it is held by, is asked about the curve where it is, not about a piece of it.
+    reach: mireds by which it may leave them along that line. Analyses of an answer, how firmly it
+    is determined and which bounds hold it, refer to the curve at this place, not to a piece of it.
     """
     if not reduction.white_knobs:
         return reduction
@@ -277,9 +281,9 @@ def tangent(reduction: Reduction, reach: float) -> Reduction:
     return replace(reduction, knobs=tuple(knobs))
 
 
-def at_best_white(knob: Knob, gradient: Doubles) -> Knob:
+def move_to_best_white(knob: Knob, gradient: Doubles) -> Knob:
     """Return a knob that is off at the white of its range that helps most. gradient: (n, 3)."""
     if knob.whites is None:
         return knob
     best = int(np.argmin(knob.whites.colors @ gradient[knob.lights[0]]))
-    return knob.within(knob.whites.window(float(best), 1))
+    return knob.with_window(knob.whites.window(float(best), 1))

@@ -142,11 +142,11 @@ class Live:
             return self._reduction
         within = self._within
         if within.gamuts is None or self._gamuts_of != views:
-            painted = partial(PaintedLight.of, [x.painting for x in views], most=GAMUT_PIXELS)
+            painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
             gamuts = Gamuts(painted, _power(views), self._basis.present_weights)
             within, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
-            within.gamuts.repainted()
+            within.gamuts.refresh()
         self._within = within
         return within
 

@@ -7,7 +7,7 @@ from typing import Any
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.light_patterns import asked_of_each, tied_lights
+from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
 from lightpaint.pipeline.settings import Settings
 
 #: What may be asked of the answer: of its fit, and of all lights together.
@@ -84,7 +84,7 @@ class Wishes:
         Raises ConstraintError for lights that there are none of, PaintError for what a session has
         no place for.
         """
-        each = zip(lights, asked_of_each(constraints, lights), strict=True)
+        each = zip(lights, tables_by_light(constraints, lights), strict=True)
         asked = {light.name: its for light, (its, _) in each if its}
         ties = {id(tie): (tie, its) for tie, its in tied_lights(constraints, lights).values()}
         for tie, _ in ties.values():

@@ -8,7 +8,7 @@ from least_squares import solve_free
 
 from lightpaint.lighting.algebra import clipped_newton as module
 from lightpaint.lighting.algebra.clipped_newton import MAX_STEPS, clipped_newton
-from lightpaint.lighting.algebra.optimum import FEW, minimise
+from lightpaint.lighting.algebra.optimum import MAX_BATCHED_UNKNOWNS, minimise
 from lightpaint.lighting.algebra.quadratic import kkt_residual, scaled
 from lightpaint.lighting.normal_equations import NormalEquations
 
@@ -85,7 +85,7 @@ def _equations(n: int, seed: int) -> NormalEquations:
     return NormalEquations(M, b, np.full(3, 10.0))
 
 
-@pytest.mark.parametrize("n", [6, 30, FEW + 6])
+@pytest.mark.parametrize("n", [6, 30, MAX_BATCHED_UNKNOWNS + 6])
 def test_without_them_the_answer_is_the_same(n: int, monkeypatch: pytest.MonkeyPatch):
     for seed in range(3):
         equations = _equations(n, seed)
@@ -101,7 +101,7 @@ def test_without_them_the_answer_is_the_same(n: int, monkeypatch: pytest.MonkeyP
 
 
 def test_channels_in_threads_have_the_bits_of_one_after_another():
-    n = FEW + 6
+    n = MAX_BATCHED_UNKNOWNS + 6
     equations, start = _equations(n, 5), np.ones((n, 3))
     found = solve_free(equations, start)
     for c in range(3):

@@ -9,7 +9,7 @@ from lightpaint.lighting.algebra import optimum
 from lightpaint.lighting.algebra.capped_newton import capped_newton
 from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
 from lightpaint.lighting.algebra.optimum import Cap, minimise, minimise_each
-from lightpaint.lighting.algebra.quadratic import moved_along, scaled
+from lightpaint.lighting.algebra.quadratic import clip_to_sums, scaled
 
 
 @pytest.mark.parametrize("copies", [2, 3, 5])
@@ -97,7 +97,7 @@ def test_moved_along_is_the_projection(seed: int) -> None:
     high = np.where(rng.random((k, m)) < 0.3, np.inf, rng.random((k, m)))
     inside = np.clip(rng.normal(size=(k, m)), low, high)
     x, wanted = np.clip(x, low, high), (a * inside).sum(axis=1)
-    found = moved_along(a, x, low, high, wanted)
+    found = clip_to_sums(a, x, low, high, wanted)
     # float64 sums of three.
     np.testing.assert_allclose((a * found).sum(axis=1), wanted, atol=1e-12)
     assert ((found >= low) & (found <= high)).all()

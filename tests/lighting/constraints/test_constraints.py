@@ -16,7 +16,7 @@ from lightpaint.colour.white_range import white_range
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduced_problem import problems
+from lightpaint.lighting.constraints.reduced_problem import reduced_problems
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 
@@ -545,7 +545,7 @@ def test_no_constraints_are_the_plain_problem(make_basis: Any) -> None:
     solution = solve(basis, target)
     assert solve(basis, target, constraints=Constraints()).lighting == solution.lighting
     e = solution.equations
-    for c, problem in enumerate(problems(e, solution.problem.reduction)):
+    for c, problem in enumerate(reduced_problems(e, solution.problem.reduction)):
         assert problem.channels == [c]
         np.testing.assert_array_equal(problem.M, e.M[c])
         np.testing.assert_array_equal(problem.b, e.b[c])

@@ -11,7 +11,7 @@ from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.constraints import gamut_bounds as near_sides
 from lightpaint.lighting.constraints.gamut_bounds import solve_near_sides
 from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.constraints.reduced_problem import nearest, solve_reduced
+from lightpaint.lighting.constraints.reduced_problem import nearest_unknowns, solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.constraints.white_neighbours import next_whites
 from lightpaint.lighting.linear_problem import reduced_by
@@ -43,13 +43,13 @@ def test_sides_lead_to_the_optimum_over_whole_gamuts(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
     """That of mixes of all corners, which is certified."""
-    monkeypatch.setattr(near_sides, "TURNS", 60)
+    monkeypatch.setattr(near_sides, "MAX_TURNS", 60)
     equations, reduction, present = _problem(make_basis, seed)
     whole, best = next_whites(equations, reduction, present)
     assert best.converged
-    assert whole.kept_knobs  # else there is nothing to keep within anything
+    assert whole.confined_knobs  # else there is nothing to keep within anything
     kept, weights = solve_near_sides(equations, reduction, present, method="polished")
-    assert not (reduction.gamuts or Gamuts).beyond(weights, np.arange(len(present)))  # type: ignore[arg-type]
+    assert not (reduction.gamuts or Gamuts).lights_outside(weights, np.arange(len(present)))  # type: ignore[arg-type]
     value, least = (equations.objective(w).sum() for w in (weights, best.weights))
     round_off = 1e-9 * equations.target_norm2.sum()
     assert value == pytest.approx(least, abs=round_off)
@@ -64,14 +64,14 @@ def test_gamuts_of_another_painting_are_heeded(make_basis: Any) -> None:
     gamuts = reduction.gamuts
     assert gamuts is not None
     kept, before = solve_near_sides(equations, reduction, present, method="polished")
-    k = kept.kept_knobs[0]
-    gamuts.repainted()
+    k = kept.confined_knobs[0]
+    gamuts.refresh()
     same, _ = solve_near_sides(equations, kept, before, method="polished")
     assert same.knobs[k].gamut is kept.knobs[k].gamut  # nothing else was painted
     # Now whites alone, without its own colour and the margin.
     narrow = reach_of(white_range(3000, 6500).colors)
-    gamuts.repainted()
-    gamuts._found[kept.knobs[k].lights[0]] = ColorHull(narrow, np.ones(3))
+    gamuts.refresh()
+    gamuts._gamuts[kept.knobs[k].lights[0]] = ColorHull(narrow, np.ones(3))
     after, weights = solve_near_sides(equations, kept, before, method="polished")
     light = after.knobs[k].lights[0]
     assert gamuts[light].has(weights[light])
@@ -84,5 +84,5 @@ def test_mixes_of_three_colours_are_found_again(make_basis: Any, seed: int) -> N
     equations, reduction, present = _problem(make_basis, seed)
     kept, weights = solve_near_sides(equations, reduction, present, method="polished")
     found = solve_reduced(equations, kept, weights)
-    x = nearest(kept, kept.weights(found.x), np.ones(len(present), bool))
+    x = nearest_unknowns(kept, kept.weights(found.x), np.ones(len(present), bool))
     np.testing.assert_allclose(kept.weights(x), kept.weights(found.x), rtol=1e-9, atol=1e-12)

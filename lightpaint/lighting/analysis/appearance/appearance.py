@@ -32,7 +32,7 @@ from lightpaint.lighting.analysis.diagnosis import (
     parts_of_miss,
 )
 from lightpaint.lighting.answer.lighting import combine
-from lightpaint.lighting.constraints.light_patterns import of_each_light, tied_lights
+from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
 
@@ -219,7 +219,7 @@ def what_is_seen(
     if (objects := solution.basis.objects) is not None:
         seen = replace(seen, place=replace(place, object=_object(look, objects, missed, light)))
     # Not those that are only to be white, as all are.
-    asked = of_each_light(problem.constraints, solution.basis.lights)
+    asked = constraints_by_light(problem.constraints, solution.basis.lights)
     tied = tied_lights(problem.constraints, solution.basis.lights)
     kept = {
         light.name

@@ -17,7 +17,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.appearance.display_difference import Looking
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.reduction import only
+from lightpaint.lighting.constraints.reduction import only_knobs
 from lightpaint.lighting.constraints.white_neighbours import next_whites, solve_on_locus
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.linear_problem import reduced_by
@@ -173,7 +173,7 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     reduction = full
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)
-        reduction = only(full, [k for k, x in knobs if any(u.upper > 0 for u in x.unknowns)])
+        reduction = only_knobs(full, [k for k, x in knobs if any(u.upper > 0 for u in x.unknowns)])
     return replace(problem, fit=fit, full=full, reduction=reduction)
 
 

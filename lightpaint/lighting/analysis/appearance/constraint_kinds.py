@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from lightpaint.basis.lights import BasisLight
-from lightpaint.lighting.constraints.constraints import COLOURS, Constraints
-from lightpaint.lighting.constraints.light_patterns import asked_of_each, tied_lights
+from lightpaint.lighting.constraints.constraints import COLOR_KEYS, Constraints
+from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
 
 #: Kinds of constraints: of single lights, of those on one dimmer, and of all together.
 ConstraintKind = Literal["off", "lock", "limits", "colour", "tie", "sparse", "prefer_current"]
@@ -19,7 +19,7 @@ KEYS: Mapping[str, tuple[str, ...]] = {
     "off": ("off",),
     "lock": ("lock",),
     "limits": ("limits",),
-    "colour": (*COLOURS, "duv"),
+    "colour": (*COLOR_KEYS, "duv"),
 }
 
 
@@ -39,7 +39,7 @@ class ConstraintsByLight:
         """Resolve `constraints` on these lights."""
         asked = [
             {key: value for key, value in its.items() if value is not False}
-            for its, _ in asked_of_each(constraints, lights)
+            for its, _ in tables_by_light(constraints, lights)
         ]
         return ConstraintsByLight(lights, asked, constraints)
 

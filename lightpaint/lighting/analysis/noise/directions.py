@@ -72,7 +72,7 @@ def rooms(solution: Solution, equations: NormalEquations) -> Iterator[Room]:
     x = solve_reduced(equations, reduction, solution.weights).x
     rows, left = _at_caps(reduction, x)
     for block in reduction.blocks:
-        its = block.its
+        its = block.unknowns
         columns = _columns(reduction, its, lit)
         lower, upper = reduction.lower[its], reduction.upper[its]
         may = (lower < upper) & columns.any(axis=0)

@@ -200,7 +200,7 @@ def _scatter(
 def _interval(solution: Solution, bias: Doubles, sides: list[Doubles]) -> tuple[Doubles, Doubles]:
     """Lower and upper ends, (n, 3) each, within what is allowed. sides: below and above."""
     weights = solution.weights
-    low, high = solution.problem.about_answer.ends
+    low, high = solution.problem.about_answer.weight_ranges
     below, above = (SIDES * np.hypot(side, bias) for side in sides)
     return (
         np.minimum(np.maximum(weights - below, low), weights),
