@@ -18,7 +18,7 @@ from lightpaint.errors import BasisError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
-from lightpaint.scene.lights.lights_file import Asked
+from lightpaint.scene.lights.lights_file import LightRequests
 from lightpaint.screen import Shown, some_names, some_of
 from lightpaint.version import __version__
 
@@ -204,14 +204,18 @@ class Basis(Shown):
         """The noise of all planes as one array, (n, h, w, 3) float32."""
         return self.noise.array()
 
-    def asking(self, asked: Asked) -> "Basis":
+    def with_requests(self, requests: LightRequests) -> "Basis":
         """This basis, of whose lights that is asked."""
-        return self if self.asked == asked else replace(self, lights=self.lights.asking(asked))
+        return (
+            self
+            if self.requests == requests
+            else replace(self, lights=self.lights.with_requests(requests))
+        )
 
     @property
-    def asked(self) -> Asked:
+    def requests(self) -> LightRequests:
         """The wishes of its scene's lights file, by light."""
-        return self.lights.asked
+        return self.lights.requests
 
     @property
     def size(self) -> tuple[int, int]:

@@ -28,7 +28,7 @@ from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
 from lightpaint.scene.checks.tokens import attributes, markup
-from lightpaint.scene.lights.lights_file import Asked
+from lightpaint.scene.lights.lights_file import LightRequests
 from lightpaint.scene.scene import Scene
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.version import __version__
@@ -87,7 +87,7 @@ def recall(key: str) -> Known | None:
                 its = said["known"]
                 its |= {name: tuple(its[name]) for name in ("size", "remarks")}
                 lights = tuple(read_record(BasisLight, light) for light in its["lights"]["each"])
-                asked = Asked(**its["lights"]["asked"])
+                asked = LightRequests(**its["lights"]["asked"])
                 return Known(**{**its, "lights": Lights(lights, asked)})
     return None
 
@@ -112,7 +112,7 @@ def remember(
         scene.size,
         scene.spp,
         str(scene.path),
-        basis.lights.asking(scene.asked),
+        basis.lights.with_requests(scene.requests),
         tuple(remarks),
     )
     try:
@@ -129,7 +129,7 @@ def remember(
             "known": asdict(known),
         }
         text = json.dumps(said, allow_nan=False)
-        if strict_json(text)["known"]["lights"]["asked"] != asdict(scene.asked):
+        if strict_json(text)["known"]["lights"]["asked"] != asdict(scene.requests):
             return False  # TOML knows values that JSON does not
         write_text(bases.place_beside(basis, f".{key}{KNOWN}"), text)
     except (OSError, LightpaintError, TypeError, ValueError):

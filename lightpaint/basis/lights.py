@@ -1,4 +1,5 @@
-"""The lights of a basis without a pixel: what they are, what they emit, what is asked of them."""
+"""The lights of a basis without a pixel: what they are, what they emit, what their lights file asks
+for."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,7 +10,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, read_only
 from lightpaint.errors import BasisError
-from lightpaint.scene.lights.lights_file import Asked
+from lightpaint.scene.lights.lights_file import LightRequests
 from lightpaint.screen import Listed, some_names
 from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
@@ -67,12 +68,12 @@ class BasisLight:
 class Lights(Sequence[BasisLight]):
     """The ordered table of lights: their order is the order of weights, planes and sums.
 
-    each: the lights. asked: What the lights file of their scene asks of them, for whoever solves;
+    each: the lights. requests: The constraints that the lights file of their scene asks for;
     of memory only, since that file may change.
     """
 
     each: tuple[BasisLight, ...]
-    asked: Asked = field(default_factory=Asked)
+    requests: LightRequests = field(default_factory=LightRequests)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "each", Listed(self.each))
@@ -100,9 +101,9 @@ class Lights(Sequence[BasisLight]):
     def __getitem__(self, k: int | slice) -> BasisLight | tuple[BasisLight, ...]:
         return self.each[k]
 
-    def asking(self, asked: Asked) -> "Lights":
-        """Return these lights, of which that is asked."""
-        return self if self.asked == asked else replace(self, asked=asked)
+    def with_requests(self, requests: LightRequests) -> "Lights":
+        """Return these lights with these requests."""
+        return self if self.requests == requests else replace(self, requests=requests)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

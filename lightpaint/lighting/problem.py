@@ -131,7 +131,7 @@ class Problem(LinearProblem):
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
         whole, parts = joint_basis(bases)
-        asked = constraints_of(whole.asked).and_then(constraints or Constraints())
+        asked = constraints_of(whole.requests).and_then(constraints or Constraints())
         fit = fit or Fit()
         fitted = [
             what_counts(its.fitted_to(one.size, resize=resize), one.emitters_seen, fit.emitters)

@@ -86,7 +86,7 @@ def problem_of_sums(
             f"target {name}: no light reaches a painted pixel that counts; paint others, too, or "
             'pass emitters="count"'
         )
-    asked, fit = constraints_of(lights.asked).and_then(constraints), resolve_fit(fit)
+    asked, fit = constraints_of(lights.requests).and_then(constraints), resolve_fit(fit)
     reduction = reduced_by(asked, lights, fit)
     return SummedProblem(
         name=name,

@@ -70,18 +70,18 @@ def subject_of(
         found = source.content
         groups = found if isinstance(found, LightGroups) else None
         basis = found.basis if isinstance(found, LightGroups) else found
-        reduce_to(constraints_of(basis.asked).and_then(constraints), basis.lights)
+        reduce_to(constraints_of(basis.requests).and_then(constraints), basis.lights)
         return Subject(basis=basis, groups=groups, **about)
     # What can be seen without the renderer is said before anything is opened.
     file_length(Path(source.path), "scene file", SceneError)
     opening = Opening(source, settings)
     if (known := opening.known) is not None:
-        reduce_to(constraints_of(known.lights.asked).and_then(constraints), known.lights)
+        reduce_to(constraints_of(known.lights.requests).and_then(constraints), known.lights)
 
     def check(scene: Scene) -> None:
         from lightpaint.basis.render.render import basis_lights
 
-        reduce_to(constraints_of(scene.asked).and_then(constraints), basis_lights(scene))
+        reduce_to(constraints_of(scene.requests).and_then(constraints), basis_lights(scene))
 
     opening.checks.append(check)
     return Subject(scene=opening, **about)

@@ -110,7 +110,7 @@ class Subject:
         basis = obtain(scene, settings, progress, views=self.among)
         if isinstance(self.scene, Opening):
             self.scene.remember(basis)
-        yield basis.asking(scene.asked)
+        yield basis.with_requests(scene.requests)
 
     def _kept(self) -> Basis | None:
         """The basis of a scene that is known, if all of it is kept."""
@@ -130,7 +130,7 @@ class Subject:
 
         scene = self.loaded
         basis = obtain_basis(scene, spp=spp, seed=self.settings.seed, progress=progress)
-        return basis.asking(scene.asked)
+        return basis.with_requests(scene.requests)
 
 
 def in_samples(progress: Progress, has: int, spp: int, wanted: int, *, lights: int) -> Progress:

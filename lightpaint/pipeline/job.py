@@ -130,7 +130,7 @@ class Job:
         told = scenes[0] if scenes else basis
         asked = self.constraints
         if isinstance(told, Scene | Basis):
-            asked = constraints_of(told.asked).and_then(asked)
+            asked = constraints_of(told.requests).and_then(asked)
         if scenes and basis is not None:
             check_same_view(scenes[0], basis)
         # Names what cannot be had before it renders.

@@ -149,7 +149,7 @@ def _obtained(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Bas
         bases.clear()
     # What the scene's lights file asks by now, whenever they were made.
     return [
-        basis if view.scene is None else basis.asking(view.scene.asked)
+        basis if view.scene is None else basis.with_requests(view.scene.requests)
         for basis, view in zip(made, job.views, strict=True)
     ]
 

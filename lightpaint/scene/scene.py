@@ -26,7 +26,7 @@ from lightpaint.scene.lights.emission import EmitterSetting
 from lightpaint.scene.lights.emitters import Emitter, check_emitters, find_emitters, point_emitter
 from lightpaint.scene.lights.light import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights.light_choice import REST, choose_lights
-from lightpaint.scene.lights.lights_file import Asked, lights_file_beside, lights_file_for
+from lightpaint.scene.lights.lights_file import LightRequests, lights_file_beside, lights_file_for
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_tree import ParsedScene, mitsuba_errors, render_errors
@@ -57,7 +57,7 @@ class Scene(Shown):
         content: Hash of all XML files and assets, the parameters and the sensor; the same on a
             reduced film.
         lights_file: The lights file that went into `lights`, if one did.
-        asked: What it asks of them.
+        requests: The constraints that it asks for.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -81,7 +81,7 @@ class Scene(Shown):
     files: tuple[Path, ...]
     content: str
     lights_file: Path | None
-    asked: Asked
+    requests: LightRequests
     _parsed: ParsedScene
 
     def __post_init__(self) -> None:
@@ -184,7 +184,7 @@ class Scene(Shown):
             emitters=emitters,
             lights=lights_of(emitters, members, fixed=[*members][-1:]),
             content=lit_by,
-            asked=Asked(),
+            requests=LightRequests(),
             _parsed=parsed,
         )
 
@@ -326,10 +326,10 @@ def load_scene(
             lights=said.lights,
             groups=said.groups,
             group_alike=group_alike and said.group_alike,
-            named=said.asked.names,
+            named=said.requests.names,
         ),
         lights_file=said.path,
-        asked=said.asked,
+        requests=said.requests,
         _parsed=parsed,
         **seen,
     )

@@ -14,7 +14,7 @@ from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem_sums import Sums, problem_of_sums
-from lightpaint.scene.lights.lights_file import Asked
+from lightpaint.scene.lights.lights_file import LightRequests
 
 
 def lamp(name: str, emission: float = 0.5, **about: bool) -> BasisLight:
@@ -46,7 +46,7 @@ def test_names_do_not_repeat() -> None:
 
 
 def test_a_lighting_and_a_solve_need_no_pixel() -> None:
-    asked = Asked({"light": {"b": {"lock": [0.25] * 3}}}, "hall.toml")
+    asked = LightRequests({"light": {"b": {"lock": [0.25] * 3}}}, "hall.toml")
     lights = Lights((lamp("a"), lamp("b")), asked)
     M = np.tile(np.diag([2.0, 3.0]), (3, 1, 1))
     sums = Sums(NormalEquations(M, np.tile([4.0, 9.0], (3, 1)), np.full(3, 50.0)), np.ones((2, 3)))

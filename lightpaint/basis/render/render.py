@@ -78,7 +78,7 @@ def render_basis(
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
-        return with_first_hits(start.asking(scene.asked), scene, seed)
+        return with_first_hits(start.with_requests(scene.requests), scene, seed)
     method = method_of(scene)
     if start is not None and not goes_on(start, method):
         # Nothing to go on from, but nothing to be replaced by less either.
@@ -220,7 +220,7 @@ def basis_lights(scene: Scene) -> Lights:
         )
         for x in scene.lights
     )
-    return Lights(lights, scene.asked)
+    return Lights(lights, scene.requests)
 
 
 @MITSUBA.taken()

@@ -46,7 +46,7 @@ class InParts:
             return render_basis(scene, start=start, **how)
         spp = scene.spp if spp is None else spp
         if start is not None and start.origin.spp >= spp:
-            return with_first_hits(start.asking(scene.asked), scene, seed)
+            return with_first_hits(start.with_requests(scene.requests), scene, seed)
         if start is not None and not goes_on(start, method_of(scene)):
             start = None
         check_memory(scene)

@@ -16,7 +16,7 @@ from lightpaint.pipeline.job import Job
 def answer_by_sums(job: Job, basis: Basis) -> None:
     """Solve with a basis that is at hand, of which nothing but sums is looked at."""
     [view] = job.views
-    basis = basis if view.scene is None else basis.asking(view.scene.asked)
+    basis = basis if view.scene is None else basis.with_requests(view.scene.requests)
     if not basis.knows_noise:
         # Only pixels tell what rounding alone has made (see lighting/round_off.py).
         problem = Problem.of(basis, view.target, constraints=job.asked, fit=job.fit)

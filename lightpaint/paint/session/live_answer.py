@@ -114,5 +114,5 @@ class Answering:
         )
 
     def _constraints(self, wishes: Wishes) -> Constraints:
-        asked = constraints_of(self._basis.asked).and_then(self._given)
+        asked = constraints_of(self._basis.requests).and_then(self._given)
         return asked.and_then(wishes.constraints())

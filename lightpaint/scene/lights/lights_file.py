@@ -26,7 +26,7 @@ MAX_BYTES = 2**20
 
 
 @dataclass(frozen=True)
-class Asked:
+class LightRequests:
     """What a lights file asks of the lights in the solve: CONSTRAINTS, as they stand there.
 
     source: the file, for errors; "" where there is none, and nothing is asked.
@@ -36,7 +36,7 @@ class Asked:
     source: str = ""
 
     @classmethod
-    def of(cls, path: Path, data: Mapping[str, Any]) -> "Asked":
+    def of(cls, path: Path, data: Mapping[str, Any]) -> "LightRequests":
         """Of all keys of the lights file at `path`."""
         return cls({key: data[key] for key in (*CONSTRAINTS, *OLDER) if key in data}, str(path))
 
@@ -51,13 +51,13 @@ class Asked:
 class LightsFile:
     """What a lights file says. path: None if there is none.
 
-    lights, groups, group_alike: as `choose_lights` takes them. asked: what is for the solve.
+    lights, groups, group_alike: as `choose_lights` takes them. requests: the constraints on lights.
     """
 
     path: Path | None = None
     lights: Iterable[str] | None = None
     groups: Mapping[str, Iterable[str]] = field(default_factory=dict)
-    asked: Asked = field(default_factory=Asked)
+    requests: LightRequests = field(default_factory=LightRequests)
     group_alike: bool = True
 
     def with_more(
@@ -100,7 +100,7 @@ def read_lights_file(path: Path) -> LightsFile:
         path,
         _names(path, "lights", data["lights"]) if "lights" in data else None,
         {name: _names(path, f"groups.{one_line(name)}", its) for name, its in groups.items()},
-        Asked.of(path, data),
+        LightRequests.of(path, data),
         group_alike,
     )
 

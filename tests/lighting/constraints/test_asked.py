@@ -12,7 +12,7 @@ from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.lighting.problem import Problem
-from lightpaint.scene.lights.lights_file import Asked, read_lights_file
+from lightpaint.scene.lights.lights_file import LightRequests, read_lights_file
 
 FILE = '[light.bulb]\nlock = "40%"\n[light.panel]\nkelvin = 3200\n'
 
@@ -39,7 +39,7 @@ def test_a_solve_from_python_is_that_of_paint_with_light(room: Path, tmp_path: P
     look = lp.paint_with_light(scene, tmp_path / "t.exr", tmp_path / "out", **how)
     # Threads that learn where lights matter may leave one sample in a million to another light.
     solution = lp.solve(look.basis, lp.read_target(tmp_path / "t.exr"))
-    assert look.basis.asked == basis.asked == scene.asked
+    assert look.basis.requests == basis.requests == scene.requests
     assert {x.constraint for x in solution.lighting.lights} == {"lock 40%", "3200 K"}
     for light in look.lighting.lights:
         assert light.emission == _emission(solution, light.name)
@@ -52,7 +52,7 @@ def test_a_solve_from_python_is_that_of_paint_with_light(room: Path, tmp_path: P
     assert [x.constraint for x in off.lights] == ["3200 K", "off"]
     # A basis read from a file knows only what it was rendered of.
     lp.write_basis(tmp_path / "b.exr", basis)
-    assert not lp.read_basis(tmp_path / "b.exr").asked.keys
+    assert not lp.read_basis(tmp_path / "b.exr").requests.keys
 
 
 def test_the_file_of_now_counts_and_not_that_of_the_cached_basis(room: Path, tmp_path: Path):
@@ -75,7 +75,7 @@ def test_the_file_of_now_counts_and_not_that_of_the_cached_basis(room: Path, tmp
     alone = lp.paint_with_light(None, target, tmp_path / "four", basis=earlier)
     assert [x.constraint for x in alone.lighting.lights] == ["3200 K", "lock 40%"]
     free = lp.load_scene(room, use_lights_file=False)
-    assert not lp.render_basis(free, spp=8).asked.keys
+    assert not lp.render_basis(free, spp=8).requests.keys
 
 
 def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
@@ -94,7 +94,7 @@ def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
         ({"prefer": 1, "prefer_current": 1}, r"hall\.toml: both prefer_current and prefer"),
     ]:
         with pytest.raises(ConstraintError, match=wrong) as caught:
-            lp.solve(basis.asking(Asked(keys, "hall.toml")), _target(basis))
+            lp.solve(basis.asking(LightRequests(keys, "hall.toml")), _target(basis))
         assert "\n" not in str(caught.value)
 
 
@@ -123,11 +123,11 @@ def test_the_pull_has_the_name_it_has_in_python_and_the_one_of_older_files(
     path = tmp_path / "a.lights.toml"
     path.write_text(said, encoding="utf-8")
     assert read_constraints(path) == lp.Constraints.of(prefer_current=0.01)
-    assert read_lights_file(path).asked.keys
+    assert read_lights_file(path).requests.keys
 
 
 def test_all_views_heed_it(make_basis: Any):
-    asked = Asked({"light": {"light 0": {"off": True}}}, "hall.toml")
+    asked = LightRequests({"light": {"light 0": {"off": True}}}, "hall.toml")
     bases = [make_basis(2, seed=1).asking(asked), make_basis(2, seed=1).asking(asked)]
     problem = Problem.of(bases, [_target(basis) for basis in bases])
     assert list(problem.reduction.labels) == ["off", ""]

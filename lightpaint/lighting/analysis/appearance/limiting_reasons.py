@@ -444,7 +444,7 @@ def _in_a_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tup
         return image.reshape(1, -1, *image.shape[2:])[:, chosen]
 
     row = replace(
-        basis.asking(type(basis.asked)()),
+        basis.with_requests(type(basis.requests)()),
         planes=basis.planes.picked(chosen),
         noise=basis.noise.picked(chosen),
         emitters_seen=cut(basis.emitters_seen),
