@@ -94,7 +94,7 @@ def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
         ({"prefer": 1, "prefer_current": 1}, r"hall\.toml: both prefer_current and prefer"),
     ]:
         with pytest.raises(ConstraintError, match=wrong) as caught:
-            lp.solve(basis.asking(LightRequests(keys, "hall.toml")), _target(basis))
+            lp.solve(basis.with_requests(LightRequests(keys, "hall.toml")), _target(basis))
         assert "\n" not in str(caught.value)
 
 
@@ -128,7 +128,7 @@ def test_the_pull_has_the_name_it_has_in_python_and_the_one_of_older_files(
 
 def test_all_views_heed_it(make_basis: Any):
     asked = LightRequests({"light": {"light 0": {"off": True}}}, "hall.toml")
-    bases = [make_basis(2, seed=1).asking(asked), make_basis(2, seed=1).asking(asked)]
+    bases = [make_basis(2, seed=1).with_requests(asked), make_basis(2, seed=1).with_requests(asked)]
     problem = Problem.of(bases, [_target(basis) for basis in bases])
     assert list(problem.reduction.labels) == ["off", ""]
     with pytest.raises(lp.LightpaintError, match="the basis is a str: give what"):
