@@ -87,8 +87,8 @@ def recall(key: str) -> Known | None:
                 its = said["known"]
                 its |= {name: tuple(its[name]) for name in ("size", "remarks")}
                 lights = tuple(read_record(BasisLight, light) for light in its["lights"]["each"])
-                asked = LightRequests(**its["lights"]["asked"])
-                return Known(**{**its, "lights": Lights(lights, asked)})
+                requests = LightRequests(**its["lights"]["requests"])
+                return Known(**{**its, "lights": Lights(lights, requests)})
     return None
 
 
@@ -129,7 +129,7 @@ def remember(
             "known": asdict(known),
         }
         text = json.dumps(said, allow_nan=False)
-        if strict_json(text)["known"]["lights"]["asked"] != asdict(scene.requests):
+        if strict_json(text)["known"]["lights"]["requests"] != asdict(scene.requests):
             return False  # TOML knows values that JSON does not
         write_text(bases.place_beside(basis, f".{key}{KNOWN}"), text)
     except (OSError, LightpaintError, TypeError, ValueError):
