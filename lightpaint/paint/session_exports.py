@@ -22,7 +22,7 @@ from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
-from lightpaint.relit.verification_render import verify
+from lightpaint.relit.sequential_verification import verify_in_stages
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.scene import load_scene
@@ -119,8 +119,10 @@ def verified(
         if relit.sensor != scene.sensor:
             relit = load_scene(relit.path, sensor=scene.sensor, use_lights_file=False)
         predicted = combine(basis, lighting)
-        result = verify(predicted, relit, spp=basis.origin.spp, progress=progress)
+        result = verify_in_stages(
+            predicted, relit, basis, lighting, spp=basis.origin.spp, progress=progress
+        )
     picture = denoised(result.verified.image, basis.features)
     says = "confirms it" if result.agrees else "does NOT confirm it"
-    said = f"A render of {basis.origin.spp} samples per pixel {says}: {agreement(result)}."
+    said = f"A render of {result.spp} samples per pixel {says}: {agreement(result)}."
     return picture, said, result.agrees

@@ -10,7 +10,7 @@ from lightpaint.basis.cache_folder import folder
 from lightpaint.basis.clean import MOST, clean_planes
 from lightpaint.basis.render.obtain import Render, obtain_basis
 from lightpaint.basis.render.render import render_basis, samples_for
-from lightpaint.images.estimate import write_estimate
+from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
@@ -24,9 +24,11 @@ from lightpaint.pipeline.results import Look, write_predicted, write_report
 from lightpaint.pipeline.settings import Settings
 from lightpaint.placement.light_search import suggest_lights
 from lightpaint.progress import Listener, Progress, labelled, listener, silent
-from lightpaint.relit.detection_power import with_power
+from lightpaint.relit.detection_power import LightShares, with_power
 from lightpaint.relit.render_rounds import refine_by_rendering
 from lightpaint.relit.sample_budget import VerificationBudget, verification_budget
+from lightpaint.relit.sequential_verification import verify_in_stages
+from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import verify
 from lightpaint.report.basis_memo import ahead
 from lightpaint.report.page.page import prepare_page
@@ -214,13 +216,10 @@ def _finished(
         place / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size, scene=relit
     )
     if budget is not None and settings.verify:
-        listen.say(_spoken(budget, basis))
-        verification = verify(
-            predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen
-        )
-        verification = with_power(verification, predicted, basis, solution.lighting)
+        listen.say(_spoken(budget, basis, is_fixed=settings.verify_spp is not None))
+        verification = _verified(settings, predicted, budget, solution, listen)
         write_estimate(place / "verified.exr", verification.verified, {})
-        listen.note(f"verified with {budget.spp} samples per pixel")
+        listen.note(f"verified with {verification.spp} samples per pixel")
     if settings.suggest and scene is not None:
         suggestions = suggest_lights(
             scene, basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
@@ -243,6 +242,29 @@ def _finished(
     return look
 
 
+def _verified(
+    settings: Settings,
+    predicted: Estimate,
+    budget: VerificationBudget,
+    solution: Solution,
+    listen: Listener,
+) -> Verification:
+    """Render the relit scene and compare: just the samples asked for, or until it can tell."""
+    basis, lighting = solution.basis, solution.lighting
+    if settings.verify_spp is None:
+        return verify_in_stages(
+            predicted,
+            budget.scene,
+            basis,
+            lighting,
+            spp=budget.spp,
+            seed=settings.seed,
+            progress=listen,
+        )
+    found = verify(predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen)
+    return with_power(found, predicted, LightShares.of(basis, lighting))
+
+
 def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudget:
     """Return what the verification of `relit`, on its whole film, may cost."""
     most = None if settings.checks_as_basis else settings.spp or relit.spp
@@ -253,10 +275,11 @@ def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudge
     return verification_budget(relit, basis.size, spp, most_spp=most, asked_spp=settings.verify_spp)
 
 
-def _spoken(budget: VerificationBudget, basis: Basis) -> str:
+def _spoken(budget: VerificationBudget, basis: Basis, *, is_fixed: bool) -> str:
     """Return how long a verification takes, said before it starts."""
     height, width = budget.scene.size
-    its = f"verification of {budget.spp} samples per pixel on {width}x{height}"
+    most = "" if is_fixed else "at most "
+    its = f"verification of {most}{budget.spp} samples per pixel on {width}x{height}"
     how = "(verify=False skips it)"
     if basis.render_s is not None:
         seconds = math.ceil(budget.share * basis.render_s)

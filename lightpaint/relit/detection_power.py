@@ -4,14 +4,15 @@ That prediction and render agree says little of a light whose part of the pictur
 noise. So it is computed how likely the render was to find it, had the light been a little off.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import numpy as np
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.lighting.answer.lighting import Lighting
@@ -29,54 +30,93 @@ ERROR = 0.05
 NORMAL = NormalDist()
 
 
+@dataclass(frozen=True)
+class LightShares:
+    """What each light that shines adds to a prediction, in sums over blocks.
+
+    names: of m lights. sums: (m, 3), over all pixels. blocks, noise: (m, rows, columns, 3), over
+    blocks, of the picture and of its half difference.
+    """
+
+    names: tuple[str, ...]
+    sums: Doubles
+    blocks: Floats
+    noise: Floats
+
+    @classmethod
+    def of(cls, basis: Basis, lighting: Lighting) -> "LightShares":
+        """Return those of the lights of `basis` that `lighting` adjusts and leaves on."""
+        lit = [x for x in lighting.lights if not x.is_fixed and any(x.weight)]
+        names = tuple(x.name for x in lit)
+        return cls.of_pictures(
+            names,
+            (
+                Estimate(basis.planes.plane(k) * weight, basis.noise.plane(k) * weight)
+                for k, weight in (
+                    (basis.names.index(x.name), np.array(x.weight, np.float32)) for x in lit
+                )
+            ),
+        )
+
+    @classmethod
+    def of_pictures(cls, names: Sequence[str], pictures: Iterable[Estimate]) -> "LightShares":
+        """Return those of what each light adds, one picture in memory at a time."""
+        sums, blocks, noise = [], [], []
+        for picture in pictures:
+            sums.append(picture.image.sum(axis=(0, 1), dtype=np.float64))
+            blocks.append(block_sums(picture.image.astype(np.float64)).astype(np.float32))
+            noise.append(block_sums(picture.half_difference.astype(np.float64)).astype(np.float32))
+        return cls(tuple(names), np.array(sums), np.array(blocks), np.array(noise))
+
+    def luminance(self) -> dict[str, float]:
+        """Each light's share of the light that all of them add to the picture."""
+        its = np.maximum(luminance(self.sums), 0) if self.names else np.zeros(0)
+        return dict(zip(self.names, (its / max(its.sum(), 1e-300)).tolist(), strict=True))
+
+
 def with_power(
-    verification: Verification, predicted: Estimate, basis: Basis, lighting: Lighting
+    verification: Verification, predicted: Estimate, lights: LightShares
 ) -> Verification:
     """Return `verification` with its power for an error of ERROR in each light that shines.
 
-    predicted: what it was held against, the sum of `basis` under `lighting`.
+    predicted: what it was held against.
     """
     factor = whole_factor(verification.verified.size, predicted.size) or 1
     verified = verification.verified.reduced(factor)
-    names = [x.name for x in lighting.lights if not x.is_fixed and any(x.weight)]
-    places = [basis.names.index(name) for name in names]
-    parts = [np.array(lighting[name].weight, np.float32) for name in names]
-    found = detection_power(
-        predicted,
-        verified,
-        [
-            Estimate(basis.planes.plane(k) * weight, basis.noise.plane(k) * weight)
-            for k, weight in zip(places, parts, strict=True)
-        ],
-    )
-    return replace(verification, power=dict(zip(names, found, strict=True)))
+    power = detection_power(predicted, verified, lights, limit=verification.limit)
+    return replace(verification, power=power)
 
 
 def detection_power(
-    predicted: Estimate, verified: Estimate, parts: Sequence[Estimate], *, error: float = ERROR
-) -> list[float]:
-    """Return the probability, for each part, that a relative error in it exceeds LIMIT.
+    predicted: Estimate,
+    verified: Estimate,
+    lights: LightShares,
+    *,
+    limit: float = LIMIT,
+    error: float = ERROR,
+) -> dict[str, float]:
+    """Return the probability, for each light, that a relative error in it exceeds `limit`.
 
     Both tests of a verification count: the sum of the picture, and the pattern of blocks. Of the
     sums the channel counts that shows most, since one path carries the noise of all. With the error
     d, a block's product of halves has the mean d² and, beside the variance 4 S² of noise alone,
-    4 S d², where S is the variance of the block's difference.
+    4 S d², where S is the variance of the block's difference. The light's own noise is taken out of
+    d².
 
-    predicted, verified: as of `compare`, of one size. parts: what each light adds to `predicted`,
-    with its noise, which is taken out of d².
+    predicted, verified: as of `compare`, of one size.
     """
     squares, magnitude = noise_of(predicted, verified)
     deviation = np.sqrt(squares.sum(axis=(0, 1)))
     blocks, weight = block_sums(squares), brightness_weights(magnitude)
     spread = float(np.square(weight * 2 * blocks.sum(axis=-1)).sum())
-    found = []
-    for part in parts:
-        image, half = (x.astype(np.float64) for x in (part.image, part.half_difference))
-        off = float(np.max(np.abs(error * image.sum(axis=(0, 1))) / deviation))
-        by_sum = NORMAL.cdf(off - LIMIT) + NORMAL.cdf(-off - LIMIT)
-        power: Doubles = error**2 * (np.square(block_sums(image)) - np.square(block_sums(half)))
+    found = {}
+    for k, name in enumerate(lights.names):
+        off = float(np.max(np.abs(error * lights.sums[k]) / deviation))
+        by_sum = NORMAL.cdf(off - limit) + NORMAL.cdf(-off - limit)
+        its = (lights.blocks[k].astype(np.float64), lights.noise[k].astype(np.float64))
+        power: Doubles = error**2 * (np.square(its[0]) - np.square(its[1]))
         mean = max(float((weight[..., None] * power).sum()), 0.0)
         more = max(float((np.square(weight)[..., None] * 4 * blocks * power).sum()), 0.0)
-        by_pattern = NORMAL.cdf((mean - LIMIT * spread**0.5) / (spread + more) ** 0.5)
-        found.append(1 - (1 - by_sum) * (1 - by_pattern))
+        by_pattern = NORMAL.cdf((mean - limit * spread**0.5) / (spread + more) ** 0.5)
+        found[name] = 1 - (1 - by_sum) * (1 - by_pattern)
     return found

@@ -52,6 +52,9 @@ class Verification(Shown):
         delta_e_95: The same, 95th percentile.
         power: By light that shines, the probability that this render would have disagreed, had the
             light been 5 % off (detection_power.py); None where nobody asked what each light does.
+        limit: Standard errors at which a difference counts as real; farther out where the render
+            was looked at several times before its end, so that sound renders pass as often.
+        spp: Samples per pixel that were rendered; None where that is not known.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -71,23 +74,25 @@ class Verification(Shown):
     delta_e_mean: float
     delta_e_95: float
     power: Mapping[str, float] | None = None
+    limit: float = LIMIT
+    spp: int | None = None
 
     def __repr__(self) -> str:
         (height, width), word = self.verified.size, "agrees" if self.agrees else "DISAGREES"
         return (
-            f"Verification({word}, {self.difference:.1f} standard errors apart, limit {LIMIT:g}; "
-            f"ΔE {self.delta_e_mean:.2f}; {width}x{height})"
+            f"Verification({word}, {self.difference:.1f} standard errors apart, "
+            f"limit {self.limit:.3g}; ΔE {self.delta_e_mean:.2f}; {width}x{height})"
         )
 
     @property
     def difference(self) -> float:
-        """The most telling difference in standard errors, to be held against LIMIT."""
+        """The most telling difference in standard errors, to be held against `limit`."""
         return max(*map(abs, self.z_mean), self.z_pattern)
 
     @property
     def agrees(self) -> bool:
         """Whether the difference can be noise alone."""
-        return self.difference <= LIMIT
+        return self.difference <= self.limit
 
     @property
     def unseen(self) -> tuple[str, ...]:

@@ -1,5 +1,7 @@
 """The independent render of the relit scene, held against the prediction."""
 
+from dataclasses import replace
+
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import whole_factor
@@ -50,4 +52,4 @@ def verify(
         label="verification",
         progress=progress,
     )
-    return compare(predicted, verified)
+    return replace(compare(predicted, verified), spp=relit.spp if spp is None else spp)

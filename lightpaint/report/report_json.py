@@ -24,7 +24,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import (
     Residual,
     brighter_than_white,
@@ -255,7 +255,8 @@ def verification_numbers(v: Verification) -> dict[str, Any]:
     return {
         "agrees": v.agrees,
         "standard_errors": v.difference,
-        "limit": LIMIT,
+        "limit": v.limit,
+        "spp": v.spp,
         "size": [width, height],
         "rmse": v.rmse,
         "noise_rmse": v.noise_rmse,

@@ -9,7 +9,7 @@ from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_see
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.relit.verification import Verification
 from lightpaint.report.sentences import (
     spoken_difference,
     spoken_elsewhere,
@@ -221,5 +221,5 @@ def agreement(verification: Verification | None) -> str:
     word = "agree within noise" if verification.agrees else "DISAGREE by more than their noise"
     return (
         f"prediction and verification {word} "
-        f"({verification.difference:.1f} standard errors apart, limit {LIMIT:g})"
+        f"({verification.difference:.1f} standard errors apart, limit {verification.limit:.3g})"
     )

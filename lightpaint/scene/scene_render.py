@@ -1,6 +1,6 @@
 """Ordinary Mitsuba renders of a scene, in passes, as an `Estimate` with its noise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from itertools import zip_longest
 from typing import Any
@@ -121,6 +121,52 @@ def render_loaded(
                 let_others_through()
             sums += its
     return estimate_of(sums, passes)
+
+
+def render_in_stages(
+    scene: Scene,
+    stages: Sequence[int],
+    is_enough: Callable[[Estimate, int], bool],
+    *,
+    seed: int = 0,
+    stream: Stream,
+    label: str = "render",
+    progress: Progress = silent,
+) -> tuple[Estimate, int]:
+    """Render `scene` stage by stage until `is_enough`, as `render` does.
+
+    stages: samples per pixel at the end of each stage, increasing. is_enough: decides after each
+    but the last, by the picture so far and its samples per pixel. Returns both.
+    """
+    height, width = scene.size
+    done, plan = (0, 0), []
+    for spp in stages:
+        passes = plan_passes(height * width, spp, done=done, step=scene.film.block_pixels)
+        plan.append(passes)
+        done = (
+            done[0] + sum(its for half, its in passes if half == 0),
+            done[1] + sum(its for half, its in passes if half == 1),
+        )
+    total = sum(map(len, plan))
+
+    def rendered(loaded: Any) -> tuple[Estimate, int]:
+        sums, spp, number = np.zeros((2, *scene.size, 3), np.float64), 0, 0
+        progress(label, 0, total)
+        with tracing() as let_others_through:
+            for k, passes in enumerate(plan):
+                for half, pass_spp in passes:
+                    sums[half] += pass_sum(
+                        loaded, scene, number, pass_spp, seed=seed, stream=stream
+                    )
+                    spp, number = spp + pass_spp, number + 1
+                    progress(label, number, total)
+                    let_others_through()
+                estimate = estimate_of(sums.copy(), [(0, spp)])
+                if k == len(plan) - 1 or is_enough(estimate, spp):
+                    break
+        return estimate, spp
+
+    return scene.while_loaded(rendered)
 
 
 def passes_of(scene: Scene, spp: int | None) -> list[tuple[int, int]]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.relit.detection_power import ERROR, detection_power
+from lightpaint.relit.detection_power import ERROR, LightShares, detection_power
 from lightpaint.relit.verification import compare
 
 SIZE, SEEDS = (48, 64), range(100)
@@ -23,6 +23,12 @@ def lamp(strength: float, spread: float) -> np.ndarray:
     return strength * np.repeat(picture[..., None], 3, axis=-1)
 
 
+def power(predicted: Estimate, verified: Estimate, light: Estimate) -> float:
+    """Return the power for an error in one light."""
+    lights = LightShares.of_pictures(["lamp"], [light])
+    return detection_power(predicted, verified, lights)["lamp"]
+
+
 @pytest.mark.parametrize(
     ("strength", "spread"),
     # Half of each sort is found by its sum, half by its pattern; the first and last hardly, always.
@@ -36,7 +42,7 @@ def test_as_many_errors_are_found_as_it_says(strength: float, spread: float):
         predicted = estimate(rest + light, 0.2, rng)
         verified = estimate(rest + (1 - ERROR) * light, 0.2, rng)
         found.append(not compare(predicted, verified).agrees)
-        said += detection_power(predicted, verified, [estimate(light, 0.1, rng)])
+        said.append(power(predicted, verified, estimate(light, 0.1, rng)))
     expected = np.mean(said)
     # Four standard errors of a share of so many, and what two tests at once have in common.
     error = 4 * np.sqrt(max(expected * (1 - expected), 0.01) / len(SEEDS))
@@ -47,12 +53,12 @@ def test_a_light_that_is_only_noise_is_not_seen():
     rng = np.random.default_rng(0)
     room = estimate(np.full((*SIZE, 3), 0.5), 0.1, rng)
     again = estimate(np.full((*SIZE, 3), 0.5), 0.1, rng)
-    assert detection_power(room, again, [estimate(np.zeros((*SIZE, 3)), 1.0, rng)])[0] < 1e-3
+    assert power(room, again, estimate(np.zeros((*SIZE, 3)), 1.0, rng)) < 1e-3
 
 
 def test_without_noise_all_is_seen():
     room = Estimate(lamp(1, 1).astype(np.float32), np.zeros((*SIZE, 3), np.float32))
-    assert detection_power(room, room, [room]) == [1]
+    assert power(room, room, room) == 1
 
 
 def test_the_least_seen_comes_first():

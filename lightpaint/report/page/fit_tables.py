@@ -13,7 +13,7 @@ from lightpaint.lighting.answer.software_versions import Software, version
 from lightpaint.lighting.loss.painting import left_out
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import LIMIT, Verification
+from lightpaint.relit.verification import Verification
 from lightpaint.report.measures import (
     brighter_as_allowed,
     codes_missed,
@@ -62,8 +62,8 @@ def verification_table(verification: Verification | None) -> str:
         [
             ("Result", "agrees within noise" if v.agrees else "DISAGREES beyond noise"),
             ("RMSE of the pixels", f"{v.rmse:.3g}; noise alone gives {v.noise_rmse:.3g}"),
-            ("z of the whole image", f"{means} (R, G, B); limit ±{LIMIT:g}"),
-            ("z of the pattern", f"{v.z_pattern:+.2f}; limit {LIMIT:g}".replace("-", "−")),
+            ("z of the whole image", f"{means} (R, G, B); limit ±{v.limit:.3g}"),
+            ("z of the pattern", f"{v.z_pattern:+.2f}; limit {v.limit:.3g}".replace("-", "−")),
             ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; about 1 is noise"),
             ("ΔE2000", f"mean {v.delta_e_mean:.2f}; 95 % of pixels below {v.delta_e_95:.2f}"),
             *_power(v),
