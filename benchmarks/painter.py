@@ -48,7 +48,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.live.live import Live
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.paint.launch import at_hand
+from lightpaint.paint.launch import low_latency
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
@@ -218,7 +218,7 @@ def serve(case: str, asked: str, space: str) -> None:
         studio.start()
         signal.signal(signal.SIGUSR1, lambda *_: trim())
         print(server.url, flush=True)
-        with at_hand():
+        with low_latency():
             server.run()
 
 
@@ -341,8 +341,8 @@ def print_answers(count: int = 50) -> None:
         key = answer_of(asking, "/key", token).decode()
         medians = []
         for at_once in (1, 0):
-            assert server._serving is not None
-            for connection in server._serving.server_state.connections:
+            assert server._uvicorn is not None
+            for connection in server._uvicorn.server_state.connections:
                 accepted = connection.transport.get_extra_info("socket")
                 accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, at_once)
             times = []

@@ -10,7 +10,14 @@ import numpy.typing as npt
 from fake_messages import fake_answer, fake_state
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.protocol import Acknowledgement, Message, Notice, Paint, Said, SessionState
+from lightpaint.paint.protocol import (
+    Acknowledgement,
+    AnyRequest,
+    Message,
+    Notice,
+    Paint,
+    SessionState,
+)
 
 
 class FakeSession:
@@ -22,14 +29,14 @@ class FakeSession:
     def __init__(self) -> None:
         self.on_message: Callable[[Message], None] | None = None
         self.before_paint: Callable[[], object] = lambda: None
-        self.heard: list[Said] = []
+        self.heard: list[AnyRequest] = []
         self.threads: set[int] = set()
         self.pictures: dict[str, npt.NDArray[Any]] = {
             "present": np.arange(2 * 3 * 3, dtype=np.float16).reshape(2, 3, 3),
             "objects": np.array([[-1, 0, 1]], np.int16),
         }
 
-    def said(self, said: Said, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
+    def handle(self, said: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
         self.threads.add(threading.get_ident())
         self.heard.append(said)
         match said:

@@ -17,7 +17,7 @@ from websockets.datastructures import Headers
 from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 
-from lightpaint.paint.frames import of_frame, to_frame
+from lightpaint.paint.frames import from_frame, to_frame
 from lightpaint.paint.server.guard import PROTOCOL
 from lightpaint.paint.server.server import Server
 
@@ -111,7 +111,7 @@ class Page:
             self.protocol.receive_data(data)
             if events := self.protocol.events_received():
                 frames = [bytes(e.data) for e in events if getattr(e, "opcode", None) == 2]
-                return [of_frame(frame)[0] for frame in frames]
+                return [from_frame(frame)[0] for frame in frames]
 
     def _sent(self) -> None:
         self.connection.sendall(b"".join(self.protocol.data_to_send()))

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.steps import Identity, KeptLook, Patch, SeenFrom, Step
+from lightpaint.paint.store.steps import Identity, Patch, Step, StoredLook, ViewIdentity
 from lightpaint.paint.store.store import Store
 
 SIZE = (12, 10)
-IDENTITY = Identity("room.xml", "0f0f", ("panel", "bulb"), (SeenFrom("camera", SIZE),))
+IDENTITY = Identity("room.xml", "0f0f", ("panel", "bulb"), (ViewIdentity("camera", SIZE),))
 
 
 def patch(rng: np.random.Generator, size: tuple[int, int] = SIZE) -> Patch:
@@ -37,14 +37,14 @@ def step(number: int) -> Step:
     return Step("stroke", f"stroke {number}", fields, patches)
 
 
-def look(number: int, of: int) -> KeptLook:
+def look(number: int, of: int) -> StoredLook:
     rng = np.random.default_rng(of)
     arrays = {
         "image": rng.random((*SIZE, 3)).astype(np.float32),
         "weights": rng.random((2, 3)),
         "thumbnail": rng.integers(0, 256, (3, 4, 3)).astype(np.uint8),
     }
-    return KeptLook(number, {"name": f"look {of}"}, arrays)
+    return StoredLook(number, {"name": f"look {of}"}, arrays)
 
 
 def told(pixels: Any) -> Any:
@@ -79,8 +79,8 @@ def big(number: int) -> Step:
 class Plain(Store):
     """Plain lists, as they are meant."""
 
-    def __init__(self, steps: list[Step], position: int, looks: dict[int, KeptLook]) -> None:
+    def __init__(self, steps: list[Step], position: int, looks: dict[int, StoredLook]) -> None:
         self.steps, self.position, self._kept = steps, position, looks
 
-    def looks(self) -> list[KeptLook]:
+    def looks(self) -> list[StoredLook]:
         return list(self._kept.values())

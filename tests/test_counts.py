@@ -19,9 +19,9 @@ from lightpaint.errors import BatchError, ConstraintError, LightingError, PaintE
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.answer.lighting_file import MAX_BYTES, read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.paint.frames import said_of
+from lightpaint.paint.frames import parse_request
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.server.session_clients import Line
+from lightpaint.paint.server.session_clients import Connections
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import wanted, while_wanted
 from lightpaint.scene.lights.light_choice import choose_lights
@@ -119,7 +119,7 @@ def test_names_of_lights_have_an_end(make_basis: Any) -> None:
 )
 def test_a_message_has_no_more_than_a_page_has_use_for(content: dict[str, Any]) -> None:
     with pytest.raises(PaintError, match=r"and at most \d+ are taken"):
-        said_of({**content, "seq": 1}, [])
+        parse_request({**content, "seq": 1}, [])
 
 
 def test_samples_and_suggestions_have_an_end(tmp_path: Path) -> None:
@@ -149,10 +149,10 @@ def test_a_server_ends_while_its_session_is_at_work() -> None:
         on_message: Callable[[Message], None] | None = None
 
     async def serve_and_end() -> None:
-        line, began = Line(Slow(), None), threading.Event()  # type: ignore[arg-type]
-        work = asyncio.ensure_future(line._done(_without_end, began))
+        line, began = Connections(Slow(), None), threading.Event()  # type: ignore[arg-type]
+        work = asyncio.ensure_future(line._run(_without_end, began))
         await asyncio.to_thread(began.wait)
-        await asyncio.wait_for(line.end(), 10)
+        await asyncio.wait_for(line.close(), 10)
         with pytest.raises(PaintError, match="the painter has ended"):
             await work
 

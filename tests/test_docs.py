@@ -21,10 +21,10 @@ from lightpaint.cli.commands.rooms import template_lines
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
 from lightpaint.lighting.fit import HOLD
-from lightpaint.paint.server.address import PORT
-from lightpaint.paint.server.client import MOST_HEARD, MOST_HEARD_BYTES
-from lightpaint.paint.server.http_connections import MOST_STRANGERS
-from lightpaint.paint.server.session_clients import MOST_PAGES
+from lightpaint.paint.server.address import DEFAULT_PORT
+from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
+from lightpaint.paint.server.http_connections import MAX_UNAUTHENTICATED
+from lightpaint.paint.server.session_clients import MAX_PAGES
 from lightpaint.scene.lights.similar_emitters import FEW
 from lightpaint.scene.presets import PRESETS
 from lightpaint.scene.scene import load_scene
@@ -36,12 +36,12 @@ DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FILES = {"/" + path.relative_to(ROOT).as_posix() for path in ROOT.glob("[a-z]*/**/*.py")}
 
 #: A file that is written, and an option of another program.
-ELSEWHERE = {"set_lights.py", "set_scene.py", "--colorconvert"}
+OTHER_FOLDER = {"set_lights.py", "set_scene.py", "--colorconvert"}
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_files_that_are_named_are_there(document: Path):
-    named = set(re.findall(r"`([\w/]+\.py)`", document.read_text())) - ELSEWHERE
+    named = set(re.findall(r"`([\w/]+\.py)`", document.read_text())) - OTHER_FOLDER
     assert [x for x in sorted(named) if not any(file.endswith("/" + x) for file in FILES)] == []
 
 
@@ -90,7 +90,7 @@ def test_public_names_and_options_that_are_named_are_there(document: Path):
     text = document.read_text()
     public = set(re.findall(r"\blp\.(\w+)", text))
     assert sorted(public - {*lp.__all__, *lp._EXTRAS}) == []
-    options = set(re.findall(r"`(--[a-z-]+)(?:[ `=])", text)) - ELSEWHERE
+    options = set(re.findall(r"`(--[a-z-]+)(?:[ `=])", text)) - OTHER_FOLDER
     assert sorted(options - _options()) == []
 
 
@@ -159,7 +159,7 @@ def _options() -> set[str]:
 #: Of options whose help has a number that is not that of the parser itself: what the code has.
 DEFAULTS = {
     "--hold": f"{HOLD:g} where it was painted over the current look, else 0",
-    "--port": f"{PORT}, or any if that is taken",
+    "--port": f"{DEFAULT_PORT}, or any if that is taken",
     "--exposure": "0",
     "--space": "8 and 16 bits",
     "--task-limit": f"{PATIENCE:g} times what it is expected to take, at least {LEAST_S:g}",
@@ -291,15 +291,15 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
     )
     *most, last = (f"`{step}`" for step in WANTED)
     assert f"by default {', '.join(most)} and {last}" in text("batch.md")
-    assert f"chooses the port ({PORT}, or any if that is taken)" in text("painter.md")
-    assert f"Of such connections {MOST_STRANGERS} may be open" in text("painter.md")
+    assert f"chooses the port ({DEFAULT_PORT}, or any if that is taken)" in text("painter.md")
+    assert f"Of such connections {MAX_UNAUTHENTICATED} may be open" in text("painter.md")
     assert f"More than {FEW} emitters that are alike" in text("lights.md")
     assert f"{LARGEST // 2**30} GiB at most" in text("solving.md")
     limits = text("limits.md")
     for said in (
-        f"at most {MOST_PAGES} tabs at a time",
-        f"{MOST_STRANGERS} connections that have not shown its key",
-        f"{MOST_HEARD} messages or {MOST_HEARD_BYTES // 2**20} MiB of a page",
+        f"at most {MAX_PAGES} tabs at a time",
+        f"{MAX_UNAUTHENTICATED} connections that have not shown its key",
+        f"{MAX_QUEUED} messages or {MAX_QUEUED_BYTES // 2**20} MiB of a page",
         f"A batch has {MOST_LOOKS:,} looks, beside {MOST_FRAMES:,} frames",
         f"a name has {MAX_NAME} characters",
     ):

@@ -25,10 +25,10 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
-from lightpaint.paint.launch import subjects_of
+from lightpaint.paint.launch import make_subjects
 from lightpaint.paint.protocol import Ask, Export, Message, Paint
-from lightpaint.paint.session_file import identity_of
-from lightpaint.paint.store.steps import SeenFrom
+from lightpaint.paint.session_file import session_identity
+from lightpaint.paint.store.steps import ViewIdentity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.pipeline.call import paint_with_light
@@ -67,15 +67,15 @@ def painting(basis: Basis, weights: np.ndarray, name: str) -> Target:
 def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path) -> None:
     sources = [SceneFile(str(room), sensor=name) for name in ("camera", "close")]
     options = ["--spp=16", "--resolution=1/2"]
-    subjects = subjects_of(
+    subjects = make_subjects(
         sources,
         tmp_path,
         settings=Settings(spp=16, resolution="1/2", verify=False),
-        command=lambda paintings, wishes: solve_command(str(room), paintings, options, wishes),
+        command=lambda paintings, requests: solve_command(str(room), paintings, options, requests),
     )
-    identity = identity_of(subjects, {k: its.loaded for k, its in enumerate(subjects)})
+    identity = session_identity(subjects, {k: its.loaded_scene for k, its in enumerate(subjects)})
     assert identity is not None
-    assert identity.views == (SeenFrom("camera", (10, 12)), SeenFrom("close", (5, 7)))
+    assert identity.views == (ViewIdentity("camera", (10, 12)), ViewIdentity("close", (5, 7)))
     exported = Event()
     told: list[Message] = []
 
@@ -86,13 +86,13 @@ def test_what_is_painted_in_two_views_is_solved_alike(room: Path, tmp_path: Path
 
     studio = Studio(subjects, MemoryStore)
     studio.on_message = hear
-    studio._obtain()
+    studio._obtain_bases()
     for k, light in enumerate((0.9, 0.1)):
         arrays = {"image": np.full((3, 4, 3), light), "importance": np.ones((3, 4))}
         floats = {key: value.astype(np.float32) for key, value in arrays.items()}
-        studio.said(Paint(k, (1, 4, 2, 6), done=True, view=k), floats)
-    studio.said(Ask(1, {"lock": True}), {})
-    studio.said(Export(("target", "lighting", "relit", "report")), {})
+        studio.handle(Paint(k, (1, 4, 2, 6), done=True, view=k), floats)
+    studio.handle(Ask(1, {"lock": True}), {})
+    studio.handle(Export(("target", "lighting", "relit", "report")), {})
     assert exported.wait(60)
     assert told[-1].kind == "exported", told[-1].fields
     files = told[-1].fields["files"]
@@ -123,20 +123,20 @@ def test_views_add(bases: list[Basis]) -> None:
     views = [(basis, painting(basis, rng.uniform(0, 2, (4, 3)), "x")) for basis in bases]
     solutions = solve(*zip(*views, strict=True)).views
     solution = solutions[0]
-    together = sum(
+    joint_progress = sum(
         (NormalEquations.of(b, t.image, t.importance) for b, t in views[1:]),
         NormalEquations.of(views[0][0], views[0][1].image, views[0][1].importance),
     )
     found = solution.lighting.weights_for(bases[0])
-    best = together.objective(found).sum()
+    best = joint_progress.objective(found).sum()
     assert best == pytest.approx(sum(sum(s.certificate.objective) for s in solutions))
     # No other lighting does better: not that of either view alone, nor any nearby.
     for basis, target in views:
         alone = solve(basis, target).lighting.weights_for(basis)
-        assert together.objective(alone).sum() >= best
+        assert joint_progress.objective(alone).sum() >= best
     for _ in range(50):
         near = np.maximum(found + rng.normal(scale=0.05, size=found.shape), 0)
-        assert together.objective(near).sum() >= best
+        assert joint_progress.objective(near).sum() >= best
 
 
 def test_one_view_is_the_ordinary_solve(bases: list[Basis]) -> None:

@@ -26,7 +26,7 @@ AT_ONCE = 60
 
 #: What a path may be: a pipe, devices, what a kernel makes up, a folder, a terabyte of nothing.
 
-KINDS = {
+REQUESTS = {
     "pipe": "is a device or a pipe",
     "/dev/zero": "is a device or a pipe",
     "/proc/kmsg": "is empty, or only made up when it is read",
@@ -96,12 +96,12 @@ def each_with_some(paths: Sequence[str]) -> list[Any]:
 
     By day each meets what never answers, what never ends, and one of the other kinds in turn.
     """
-    others = [kind for kind in KINDS if kind not in ("pipe", "sparse")]
+    others = [kind for kind in REQUESTS if kind not in ("pipe", "sparse")]
     by_day = [("pipe", "sparse", others[n % len(others)]) for n in range(len(paths))]
     return [
         pytest.param(path, kind, marks=() if kind in kinds else pytest.mark.nightly)
         for path, kinds in zip(paths, by_day, strict=True)
-        for kind in KINDS
+        for kind in REQUESTS
     ]
 
 
@@ -113,7 +113,7 @@ def test_every_path_of_a_command(folder: Path, command: str, kind: str) -> None:
     assert f"x{ending}" in said
     # A folder may hold light groups, too.
     others = ("EXR", ".exr file") if kind == "folder" else ("holds no light groups",)
-    assert any(words in said for words in (KINDS[kind], *others))
+    assert any(words in said for words in (REQUESTS[kind], *others))
 
 
 #: Elements of a scene that name a file, and how its name ends.
@@ -138,7 +138,7 @@ def test_every_file_of_a_scene(folder: Path, element: str, kind: str) -> None:
     room.write_text(text.replace("</scene>", f"{element}</scene>"), encoding="utf-8")
     said = refused(folder, "lights", room)
     assert f"x{ending}" in said
-    assert KINDS[kind] in said
+    assert REQUESTS[kind] in said
 
 
 def test_beside_the_scene_and_in_a_template(folder: Path) -> None:

@@ -1,4 +1,6 @@
-"""What somebody asks for that takes long: exports, the verifying render, why it is not closer."""
+"""Long tasks of a session, in threads of their own: exports, verification, explanations,
+previews.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -14,7 +16,7 @@ from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
-from lightpaint.paint.background_threads import StoppedError, Threads
+from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.protocol import (
     Explanation,
     ExportResult,
@@ -25,222 +27,245 @@ from lightpaint.paint.protocol import (
     VerificationResult,
 )
 from lightpaint.paint.session.picture_table import Picture
-from lightpaint.paint.session.snapshot import Moment
-from lightpaint.paint.store.light_requests import Wishes
-from lightpaint.paint.store.steps import of_view
-from lightpaint.paint.subject import Subject, painting_of
+from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.steps import name_in_view
+from lightpaint.paint.subject import Subject, painting_path
 from lightpaint.progress import Progress, while_wanted
 
-#: What takes long.
-Task = Literal["export", "verify", "explain"]
+#: Names of long tasks.
+TaskName = Literal["export", "verify", "explain"]
 
-Asked = protocol.Export | protocol.Verify | protocol.Explain
+JobRequest = protocol.Export | protocol.Verify | protocol.Explain
 
 
-class Home(Protocol):
-    """What an errand wants of the studio it goes out from."""
+class JobHost(Protocol):
+    """The studio, as its background jobs see it."""
 
     subjects: tuple[Subject, ...]
 
     @property
     def version(self) -> int:
-        """A number that grows with every change of what is painted and asked."""
+        """Number that grows with every change of the paintings and requests."""
 
-    def now(self, wishes: Wishes | None = None) -> tuple[Moment, Lighting]:
-        """What is painted and asked, and the last answer. wishes: to be asked instead."""
+    def snapshot_and_lighting(
+        self, requests: LightRequests | None = None
+    ) -> tuple[SessionSnapshot, Lighting]:
+        """Return the paintings and requests as they are now, and the last answer.
 
-    def clean(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
-        """Clean planes of these, where they have been made."""
+        requests: asked instead of those of the session.
+        """
 
-    def put(self, name: str, picture: Picture) -> None:
-        """A picture from now on, of which pages are told."""
+    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
+        """Return the denoised planes of these bases; None for each that has none yet."""
 
-    def tell(self, message: Message) -> None:
-        """Say it to pages."""
+    def publish_picture(self, name: str, picture: Picture) -> None:
+        """Store a picture and tell pages that there is a new one."""
 
-    def hears(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """How far something is. Raises StoppedError once nobody wants it any more."""
+    def publish(self, message: Message) -> None:
+        """Send a message to pages."""
+
+    def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """Report how far a task is. Raises StoppedError once nobody wants the result any more."""
 
 
-def _named(files: Iterable[Path]) -> tuple[str, ...]:
-    """Files as a page is told of them."""
+def _absolute_names(files: Iterable[Path]) -> tuple[str, ...]:
+    """Return the paths as a page shows them."""
     return tuple(str(x.absolute()) for x in files)
 
 
-class Errands:
-    """Those of one studio; one of them writes at a time, and one verifies.
+class BackgroundJobs:
+    """Exports, verifications, explanations and previews of one studio.
 
-    Of two that verify the later one counts: the answer may be another by then.
+    One job writes at a time, and one verifies. Of two verifications the later one counts, since the
+    answer may have changed by then.
     """
 
-    def __init__(self, place: Home, threads: Threads) -> None:
-        self._place, self._threads = place, threads
-        self._writes, self._renders = Lock(), Lock()
-        self._seen: dict[
+    def __init__(self, host: JobHost, threads: BackgroundThreads) -> None:
+        self._host, self._threads = host, threads
+        self._write_lock, self._render_lock = Lock(), Lock()
+        self._verifications: dict[
             int, tuple[int, VerificationResult]
         ] = {}  # renders, by view: of which version
-        self._foreseen = 0  # number of the last preview that was asked for
-        self._wanted: protocol.Verify | None = None  # that was asked for last; None if stopped
-        self._stops = 0  # how often somebody has stopped what is written
+        self._preview_number = 0  # number of the last preview that was asked for
+        self._verify_request: protocol.Verify | None = (
+            None  # that was asked for last; None if stopped
+        )
+        self._stop_count = 0  # how often somebody has stopped what is written
 
-    def said(self, message: Asked) -> list[Message]:
-        """Begin with it. Raises PaintError for what there is not."""
-        works: dict[type, tuple[Task, Callable[[Any], None]]] = {
-            protocol.Export: ("export", partial(self._export, stops=self._stops)),
-            protocol.Verify: ("verify", self._verified),
-            protocol.Explain: ("explain", self._explain),
+    def handle(self, message: JobRequest) -> list[Message]:
+        """Start a job, or stop one. Raises PaintError for what this session cannot do."""
+        works: dict[type, tuple[TaskName, Callable[[Any], None]]] = {
+            protocol.Export: ("export", partial(self._run_export, stop_count=self._stop_count)),
+            protocol.Verify: ("verify", self._run_verify),
+            protocol.Explain: ("explain", self._run_explain),
         }
         if isinstance(message, protocol.Verify):
             if not message.run:
-                self._wanted = None
+                self._verify_request = None
                 return [TaskStarted(what="stop")]
             if self._subject(message.view).scene is None:
                 raise PaintError("there is no scene to render: it was opened from a saved basis")
             # Here, and not in its thread: what is said next may be that it is to stop.
-            self._wanted = message
+            self._verify_request = message
         elif isinstance(message, protocol.Explain):
             self._subject(message.view)
         elif not message.run:
-            self._stops += 1
+            self._stop_count += 1
             return [TaskStarted(what="stop")]
         what, work = works[type(message)]
-        self._threads.later(lambda: work(message), what)
+        self._threads.start_low_priority(lambda: work(message), what)
         return [TaskStarted(what=what)]
 
-    def foresee(self, message: protocol.Preview, wishes: Wishes) -> list[Message]:
-        """Begin to find what a change would do. Raises PaintError for a view that there is none of.
+    def start_preview(self, message: protocol.Preview, requests: LightRequests) -> list[Message]:
+        """Start to compute what a change would do. Raises PaintError for a view that does not
+        exist.
 
-        wishes: what would be asked then. Of two such messages the later one counts.
+        requests: those after the change. Of two previews the later one counts.
         """
         self._subject(message.view)
-        self._foreseen = message.number
-        self._threads.later(lambda: self._foresee(message, wishes), "preview")
+        self._preview_number = message.number
+        self._threads.start_low_priority(lambda: self._run_preview(message, requests), "preview")
         return [TaskStarted(what="preview")]
 
-    def command(self, sensors: Sequence[str], wishes: Wishes) -> str:
-        """The command that answers exported paintings alike, where there are commands."""
-        subject = self._place.subjects[0]
-        paths = {sensor: str(painting_of(subject.folder, sensor)) for sensor in sensors}
-        return subject.command(paths, wishes) if paths else ""
+    def solve_command(self, sensors: Sequence[str], requests: LightRequests) -> str:
+        """Return the command that finds the same answer from exported paintings; "" where there is
+        none.
+        """
+        subject = self._host.subjects[0]
+        paths = {sensor: str(painting_path(subject.folder, sensor)) for sensor in sensors}
+        return subject.command(paths, requests) if paths else ""
 
-    def verified(self, version: int) -> tuple[VerificationResult, ...]:
-        """What the last render of each view has shown, and whether it is of an earlier version."""
-        seen = list(self._seen.values())
-        return tuple(replace(about, is_old=its != version) for its, about in seen)
+    def verifications(self, version: int) -> tuple[VerificationResult, ...]:
+        """Return the last verification of each view, marked where the session has changed since."""
+        results = list(self._verifications.values())
+        return tuple(
+            replace(result, is_old=of_version != version) for of_version, result in results
+        )
 
     def _subject(self, view: int) -> Subject:
-        subjects = self._place.subjects
+        subjects = self._host.subjects
         if view >= len(subjects):
             raise PaintError(f"no view {view}: there are {len(subjects)}")
         return subjects[view]
 
-    def _answer(self) -> tuple[Moment, Lighting]:
-        """What is painted now, and the exact answer to it."""
-        moment, now = self._place.now()
-        solution = moment.solution()
+    def _exact_answer(self) -> tuple[SessionSnapshot, Lighting]:
+        """Return the paintings as they are now, and the exact answer to them."""
+        snapshot, now = self._host.snapshot_and_lighting()
+        solution = snapshot.solution()
         if solution is None:
-            return moment, now
-        return moment, with_findings(solution, analyse(solution)).lighting
+            return snapshot, now
+        return snapshot, with_findings(solution, analyse(solution)).lighting
 
-    def _export(self, message: protocol.Export, stops: int) -> None:
-        """Write what is asked for. stops: how often that had been stopped when it was asked."""
+    def _run_export(self, message: protocol.Export, stop_count: int) -> None:
+        """Write the requested files.
+
+        stop_count: how often exports had been stopped when this one was requested.
+        """
         # It brings all rooms, of which painting needs a few.
-        from lightpaint.paint.session_exports import OF_PAINTING, export
+        from lightpaint.paint.session_exports import NEEDS_PAINTING, export
 
         def check() -> None:
-            if self._stops != stops:
+            if self._stop_count != stop_count:
                 raise StoppedError
 
-        def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
+        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             del label  # what it is at within an export is no news to a page
             check()
-            self._place.hears("export", done, total, unit)
+            self._host.report_progress("export", done, total, unit)
 
         files: list[Path] = []
         try:
             # Also the exact answer, which may take longer than somebody waits, is given up.
             with while_wanted(check):
-                moment, lighting = self._answer()
-                with self._writes:
+                snapshot, lighting = self._exact_answer()
+                with self._write_lock:
                     check()
-                    subjects = self._place.subjects
-                    for file in export(subjects, moment, lighting, message.what, hears):
+                    subjects = self._host.subjects
+                    for file in export(subjects, snapshot, lighting, message.what, report):
                         files.append(file)  # one by one: those before a stop are there
         except StoppedError:
-            if self._stops != stops:
-                told = ExportResult(files=_named(files), command="", is_stopped=True)
-                self._place.tell(told)
+            if self._stop_count != stop_count:
+                result = ExportResult(files=_absolute_names(files), command="", is_stopped=True)
+                self._host.publish(result)
             return
         # It is of the paintings that were written now: those of before may be others.
-        is_asked, is_painted = bool(OF_PAINTING & set(message.what)), bool(moment.painted)
-        sensors = moment.painted_sensors if is_asked and is_painted else ()
-        made = ExportResult(
-            files=_named(files),
-            command=self.command(sensors, moment.wishes),
+        is_asked, is_painted = (
+            bool(NEEDS_PAINTING & set(message.what)),
+            bool(snapshot.painted_views),
+        )
+        sensors = snapshot.painted_sensors if is_asked and is_painted else ()
+        result = ExportResult(
+            files=_absolute_names(files),
+            command=self.solve_command(sensors, snapshot.requests),
             is_unpainted=is_asked and not is_painted,
         )
-        self._place.tell(made)
+        self._host.publish(result)
 
-    def _verified(self, asked: protocol.Verify) -> None:
+    def _run_verify(self, request: protocol.Verify) -> None:
         def check() -> None:
-            if self._wanted is not asked:
+            if self._verify_request is not request:
                 raise StoppedError
 
         try:
             # Also the exact answer, which may take longer than somebody waits, is given up.
-            with self._renders, while_wanted(check):
+            with self._render_lock, while_wanted(check):
                 check()
-                self._verify(asked.view, check)
+                self._render_and_compare(request.view, check)
         except StoppedError:
-            if self._wanted is None:  # else a page waits for the next one
-                self._place.tell(TaskStopped(what="verify"))
+            if self._verify_request is None:  # else a page waits for the next one
+                self._host.publish(TaskStopped(what="verify"))
 
-    def _verify(self, view: int, check: Callable[[], None]) -> None:
-        """Render the answer in a view. check: raises StoppedError once nobody wants that."""
-        from lightpaint.paint.session_exports import verified
+    def _render_and_compare(self, view: int, check: Callable[[], None]) -> None:
+        """Render the answer in a view and compare. check: raises StoppedError once nobody wants
+        that.
+        """
+        from lightpaint.paint.session_exports import render_verification
 
-        def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
+        def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             check()
-            self._place.hears(label, done, total, unit)
+            self._host.report_progress(label, done, total, unit)
 
-        moment, lighting = self._answer()
-        progress: Progress = hears
-        picture, said, agrees = verified(
-            self._subject(view), moment.bases[view], lighting, progress
+        snapshot, lighting = self._exact_answer()
+        progress: Progress = report
+        picture, text, agrees = render_verification(
+            self._subject(view), snapshot.bases[view], lighting, progress
         )
         check()
-        self._place.put(of_view("verified", view), as_halves(picture))
-        is_old = self._place.version != moment.version
-        made = VerificationResult(agrees=agrees, text=said, view=view, is_old=is_old)
-        self._seen[view] = moment.version, made
-        self._place.tell(made)
+        self._host.publish_picture(name_in_view("verified", view), as_halves(picture))
+        is_old = self._host.version != snapshot.version
+        result = VerificationResult(agrees=agrees, text=text, view=view, is_old=is_old)
+        self._verifications[view] = snapshot.version, result
+        self._host.publish(result)
 
-    def _foresee(self, asked: protocol.Preview, wishes: Wishes) -> None:
+    def _run_preview(self, request: protocol.Preview, requests: LightRequests) -> None:
         def check() -> None:
-            if self._foreseen != asked.number:
+            if self._preview_number != request.number:
                 raise StoppedError
 
         with suppress(StoppedError), while_wanted(check):
-            proposed, now = self._place.now(wishes)
+            proposed, now = self._host.snapshot_and_lighting(requests)
             weights = now.weights_for(proposed.bases[0])
-            clean = self._place.clean(proposed.bases)[asked.view]
-            found = proposed.foresight(weights, asked.view, clean=clean)
+            clean = self._host.clean_planes(proposed.bases)[request.view]
+            preview = proposed.preview(weights, request.view, clean=clean)
             check()
-            is_old = self._place.version != proposed.version
-            made = PreviewResult(
-                number=asked.number,
-                view=asked.view,
-                text=found.text,
-                is_at_cost=found.is_at_cost,
+            is_old = self._host.version != proposed.version
+            result = PreviewResult(
+                number=request.number,
+                view=request.view,
+                text=preview.text,
+                is_at_cost=preview.is_at_cost,
                 is_old=is_old,
-                before=found.before,
-                after=found.after,
+                before=preview.before,
+                after=preview.after,
             )
-            self._place.tell(made)
+            self._host.publish(result)
 
-    def _explain(self, asked: protocol.Explain) -> None:
-        moment, _ = self._place.now()
-        said, beyond = moment.beyond(asked.view)
-        self._place.put(of_view("beyond", asked.view), beyond)
-        is_old = self._place.version != moment.version
-        self._place.tell(Explanation(sentences=tuple(said), view=asked.view, is_old=is_old))
+    def _run_explain(self, request: protocol.Explain) -> None:
+        snapshot, _ = self._host.snapshot_and_lighting()
+        sentences, picture = snapshot.explain(request.view)
+        self._host.publish_picture(name_in_view("beyond", request.view), picture)
+        is_old = self._host.version != snapshot.version
+        self._host.publish(
+            Explanation(sentences=tuple(sentences), view=request.view, is_old=is_old)
+        )

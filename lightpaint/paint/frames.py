@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.files import one_line
-from lightpaint.paint.protocol import KINDS, Said
+from lightpaint.paint.protocol import REQUESTS, AnyRequest
 from lightpaint.paint.protocol.base import DTYPES
 from lightpaint.storage.json_records import read_record, strict_json
 
@@ -31,7 +31,7 @@ MAX_CHARACTERS, MAX_VALUES = 1000, 4096
 
 
 def to_frame(content: Mapping[str, Any], buffers: Sequence[bytes]) -> bytes:
-    """One binary frame."""
+    """Return JSON and buffers as one binary frame."""
     # Names of files that are not UTF-8 stand in Python's text as halves of pairs.
     text = json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace")
     parts = [struct.pack("<I", len(text)), text, b"\0" * (-(4 + len(text)) % 8)]
@@ -40,8 +40,8 @@ def to_frame(content: Mapping[str, Any], buffers: Sequence[bytes]) -> bytes:
     return b"".join(parts)
 
 
-def of_frame(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
-    """JSON and buffers of a binary frame. Raises PaintError for what is none."""
+def from_frame(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
+    """Return the JSON and buffers of a binary frame. Raises PaintError for anything else."""
     if len(frame) > MAX_FRAME:
         raise PaintError(f"a frame of {len(frame)} bytes: at most {MAX_FRAME} are taken")
     if len(frame) < 4:
@@ -49,9 +49,9 @@ def of_frame(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
     (length,) = struct.unpack_from("<I", frame)
     if length > min(MAX_TEXT, len(frame) - 4):
         raise PaintError(f"a frame that speaks of {length} bytes of JSON and has fewer")
-    content = _json(bytes(frame[4 : 4 + length]))
+    content = _parse_json(bytes(frame[4 : 4 + length]))
     rest, at, buffers = memoryview(frame), 4 + length + -(4 + length) % 8, []
-    for shape, kind in _described(content):
+    for shape, kind in _buffer_types(content):
         size = math.prod(shape) * np.dtype(kind).itemsize
         if at + size > len(frame):
             raise PaintError("a frame that is shorter than its buffers")
@@ -60,30 +60,31 @@ def of_frame(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
     return content, buffers
 
 
-def said_of(
+def parse_request(
     content: Mapping[str, Any], buffers: Sequence[bytes | memoryview]
-) -> tuple[int, Said, dict[str, npt.NDArray[Any]]]:
-    """What a page says: its number, the message, its arrays. Raises PaintError for anything else.
+) -> tuple[int, AnyRequest, dict[str, npt.NDArray[Any]]]:
+    """Return the number, the message and the arrays of a request. Raises PaintError for anything
+    else.
 
-    The arrays are finite, and cannot be written to.
+    The arrays are finite and read-only.
     """
     kind, seq = content.get("kind"), content.get("seq")
-    if not (isinstance(kind, str) and kind in KINDS):
+    if not (isinstance(kind, str) and kind in REQUESTS):
         raise PaintError(f"no message is called {str(kind)[:40]!r}")
     if not (type(seq) is int and 0 <= seq < 2**53):
         raise PaintError("a message without its number")
     plain = {k: v for k, v in content.items() if k not in ("kind", "seq", "buffers")}
     _check_lengths(kind, plain)
     try:
-        said = read_record(KINDS[kind], plain)
+        request = read_record(REQUESTS[kind], plain)
     except ValueError as error:
         raise PaintError(one_line(f"{kind}: {error}")) from None
-    described = _described(content)
-    if len(described) != len(buffers):
-        raise PaintError(f"{kind}: {len(buffers)} buffers, not {len(described)} as it says")
+    buffer_types = _buffer_types(content)
+    if len(buffer_types) != len(buffers):
+        raise PaintError(f"{kind}: {len(buffers)} buffers, not {len(buffer_types)} as it says")
     arrays = {}
     for about, (shape, dtype), buffer in zip(
-        content.get("buffers", ()), described, buffers, strict=True
+        content.get("buffers", ()), buffer_types, buffers, strict=True
     ):
         if len(buffer) != math.prod(shape) * np.dtype(dtype).itemsize:
             raise PaintError(f"{kind}: {len(buffer)} bytes are no array of shape {list(shape)}")
@@ -92,7 +93,7 @@ def said_of(
             raise PaintError(f"{kind}: {about['name']} holds NaN or Inf")
         array.flags.writeable = False
         arrays[about["name"]] = array
-    return seq, said, arrays
+    return seq, request, arrays
 
 
 def _check_lengths(kind: str, value: Any) -> None:
@@ -110,7 +111,7 @@ def _check_lengths(kind: str, value: Any) -> None:
             _check_lengths(kind, one)
 
 
-def _json(text: bytes) -> dict[str, Any]:
+def _parse_json(text: bytes) -> dict[str, Any]:
     try:
         content = strict_json(text.decode())
     except (ValueError, UnicodeDecodeError) as error:
@@ -120,8 +121,8 @@ def _json(text: bytes) -> dict[str, Any]:
     return content
 
 
-def _described(content: Mapping[str, Any]) -> list[tuple[tuple[int, ...], str]]:
-    """Shape and dtype of each buffer that a message speaks of."""
+def _buffer_types(content: Mapping[str, Any]) -> list[tuple[tuple[int, ...], str]]:
+    """Return shape and dtype of each buffer that a message lists."""
     listed, found, names = content.get("buffers", []), [], set[str]()
     if not (isinstance(listed, list) and len(listed) <= 16):
         raise PaintError("buffers are a list of at most 16")

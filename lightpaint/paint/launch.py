@@ -1,4 +1,4 @@
-"""From what was named to a page that paints it: session file, studio and server, until the end."""
+"""The painter in a browser: opens session file, studio and server, and closes them at the end."""
 
 import gc
 import sys
@@ -17,13 +17,13 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.views import check_same_lights
-from lightpaint.paint.lazy_scene import Opening
-from lightpaint.paint.server.address import Listening, listen
+from lightpaint.paint.lazy_scene import LazyScene
+from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.connection_file import ConnectionFile
 from lightpaint.paint.server.server import Server, check_installed
-from lightpaint.paint.session_file import Keeping, check_together, identity_of
+from lightpaint.paint.session_file import SessionFile, check_view_names, session_identity
 from lightpaint.paint.store.database import set_aside
-from lightpaint.paint.store.light_requests import Wishes
+from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -37,150 +37,154 @@ from lightpaint.pipeline.sources import (
 from lightpaint.scene.scene import Scene
 from lightpaint.signals import interruptible_between_pieces
 
-#: The session in the folder of what is painted.
-SESSION = "session.db"
+#: Name of the session file, in its folder.
+SESSION_FILE = "session.db"
 
 
-def subject_of(
+def make_subject(
     source: SceneFile | BasisFile | GroupsFile,
     folder: Path,
     *,
     settings: Settings | None = None,
     constraints: Constraints | None = None,
     choice: TransformChoice | None = None,
-    command: Callable[[Mapping[str, str], Wishes], str] = lambda paintings, wishes: "",
-    among: int = 1,
+    command: Callable[[Mapping[str, str], LightRequests], str] = lambda paintings, requests: "",
+    view_count: int = 1,
 ) -> Subject:
-    """One view to be painted, as of `Subject`, read and checked before anything is rendered.
+    """Return one view to be painted, read and checked before anything is rendered.
 
-    Raises LightpaintError for what cannot be painted, or asked of its lights.
+    Parameters are those of `Subject`. Raises LightpaintError for what cannot be painted, and for
+    constraints that its lights cannot meet.
     """
     settings, constraints = settings or Settings(), constraints or Constraints()
-    about: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "source": source.path,
         "folder": folder,
         "settings": settings,
         "constraints": constraints,
         "choice": choice or TransformChoice(),
         "command": command,
-        "among": among,
+        "view_count": view_count,
     }
     if not isinstance(source, SceneFile):
         check_nothing_idle(settings, source)
-        found = source.content
-        groups = found if isinstance(found, LightGroups) else None
-        basis = found.basis if isinstance(found, LightGroups) else found
+        content = source.content
+        groups = content if isinstance(content, LightGroups) else None
+        basis = content.basis if isinstance(content, LightGroups) else content
         reduce_to(constraints_of(basis.requests).and_then(constraints), basis.lights)
-        return Subject(basis=basis, groups=groups, **about)
+        return Subject(basis=basis, groups=groups, **fields)
     # What can be seen without the renderer is said before anything is opened.
     file_length(Path(source.path), "scene file", SceneError)
-    opening = Opening(source, settings)
-    if (known := opening.known) is not None:
-        reduce_to(constraints_of(known.lights.requests).and_then(constraints), known.lights)
+    lazy_scene = LazyScene(source, settings)
+    if (record := lazy_scene.record) is not None:
+        reduce_to(constraints_of(record.lights.requests).and_then(constraints), record.lights)
 
     def check(scene: Scene) -> None:
         from lightpaint.basis.render.render import basis_lights
 
         reduce_to(constraints_of(scene.requests).and_then(constraints), basis_lights(scene))
 
-    opening.checks.append(check)
-    return Subject(scene=opening, **about)
+    lazy_scene.checks.append(check)
+    return Subject(scene=lazy_scene, **fields)
 
 
-def subjects_of(
+def make_subjects(
     sources: Sequence[SceneFile | BasisFile | GroupsFile], folder: Path, **how: Any
 ) -> tuple[Subject, ...]:
-    """Views of one lighting to be painted together. how: as of `subject_of`.
+    """Return the views of one lighting, to be painted together. how: parameters of `make_subject`.
 
-    Raises LightpaintError for what cannot be painted, alone or together, as far as it is known.
+    Raises LightpaintError for what cannot be painted, alone or together, as far as that is known.
     """
-    made = tuple(subject_of(one, folder, among=len(sources), **how) for one in sources)
-    if (identity := identity_of(made)) is not None:
-        check_together([view.sensor for view in identity.views])
-    bases = [subject.basis for subject in made if subject.basis is not None]
+    subjects = tuple(
+        make_subject(source, folder, view_count=len(sources), **how) for source in sources
+    )
+    if (identity := session_identity(subjects)) is not None:
+        check_view_names([view.sensor for view in identity.views])
+    bases = [subject.basis for subject in subjects if subject.basis is not None]
     for basis in bases[1:]:
         check_same_lights(bases[0], basis)
-    return made
+    return subjects
 
 
 def paint_in_browser(
     subjects: Sequence[Subject],
-    opened: Callable[[Server], None],
+    on_ready: Callable[[Server], None],
     *,
     new: bool = False,
     host: str | None = None,
     port: int | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> None:
-    """Serve a page that paints these views, until Ctrl-C or the like; all that was done is kept.
+    """Serve a page that paints these views until Ctrl-C or a signal; the session file keeps all
+    work.
 
-    opened: called when the page can be opened. new: whether an earlier session is put aside. host,
-    port: as of `listen`. say: hears remarks.
+    on_ready: called when the page can be opened. new: whether an earlier session is set aside.
+    host, port: as of `listen`. say: receives remarks.
 
-    Raises PaintError where the session cannot be had, OutputError where what was done last could
-    not be written.
+    Raises PaintError where the session cannot be opened, OutputError where the last steps could not
+    be written.
     """
     check_installed()
     folder = subjects[0].folder
     check_writable(folder)
-    path = folder / SESSION
+    path = folder / SESSION_FILE
     listening = listen(host, port)  # before anything is written
     with listening[0]:
-        _paint_at(listening, subjects, opened, path, new=new, say=say)
+        _serve_session(listening, subjects, on_ready, path, new=new, say=say)
 
 
-def _paint_at(
-    listening: Listening,
+def _serve_session(
+    listening: BoundSocket,
     subjects: Sequence[Subject],
-    opened: Callable[[Server], None],
+    on_ready: Callable[[Server], None],
     path: Path,
     *,
     new: bool,
     say: Callable[[str], None],
 ) -> None:
-    """Serve the session of a file, which is made where there is none."""
+    """Serve the session of a file, which is created where there is none."""
     if new and (aside := set_aside(path)) is not None:
         say(f"the earlier session is kept as {aside}")
-    keeping = Keeping(subjects, path, say)
-    studio = Studio(subjects, keeping.opened)
+    session_file = SessionFile(subjects, path, say)
+    studio = Studio(subjects, session_file.open_store)
     studio.on_unsaved = say
     try:
-        server = Server(studio, keeping.store, listening=listening, say=say)
-        keeping.server = server
-        connection = ConnectionFile(path.parent, server.connection)
+        server = Server(studio, session_file.store, listening=listening, say=say)
+        session_file.server = server
+        connection_file = ConnectionFile(path.parent, server.connection)
 
-        def offer() -> None:  # once the folder is known to be this painter's
+        def write_connection() -> None:  # once the folder is known to be this painter's
             try:
-                connection.write()
+                connection_file.write()
             except OutputError as error:
                 say(str(error))
 
         try:
-            if keeping.store is None:
-                keeping.on_opened = offer
+            if session_file.store is None:
+                session_file.on_store_opened = write_connection
             else:
-                offer()
-            studio.on_failure = partial(_failed, server)
-            opened(server)
+                write_connection()
+            studio.on_failure = partial(_stop_after_failure, server)
+            on_ready(server)
             with interruptible_between_pieces():  # who is being started cannot be waited for
                 studio.start()
-            with at_hand():
+            with low_latency():
                 server.run()
         finally:
             server.close()
-            connection.remove()
+            connection_file.remove()
         if studio.failure is not None and studio.store is None:
             raise studio.failure
     finally:
-        _end(studio, keeping.store)
+        _close(studio, session_file.store)
 
 
 @contextmanager
-def at_hand() -> Iterator[None]:
+def low_latency() -> Iterator[None]:
     """Let strokes wait for nothing but their own work, in a process that does nothing else.
 
-    What is imported by now is not looked through for garbage, again and again; and whoever holds
-    the interpreter for long lets go of it ten times as soon.
+    The garbage collector leaves alone what is imported by now, and a thread that holds the
+    interpreter for long lets go of it ten times as soon.
     """
     before = sys.getswitchinterval()
     sys.setswitchinterval(before / 10)
@@ -192,20 +196,24 @@ def at_hand() -> Iterator[None]:
         sys.setswitchinterval(before)
 
 
-#: Seconds in which a page that a browser was asked to open comes to hear why there is nothing.
-COMES_S = 5.0
+#: Seconds that a server waits, after a failure, for the page of a browser that was started.
+PAGE_WAIT_S = 5.0
 
 
-def _failed(server: Server, error: Exception) -> None:
-    """End, since there is nothing to paint; a page that is about to come is told."""
-    end_s = time.monotonic() + (COMES_S if server.is_expected else 0.0)
+def _stop_after_failure(server: Server, error: Exception) -> None:
+    """Stop the server, since there is nothing to paint; a page that is about to load is
+    told why.
+    """
+    end_s = time.monotonic() + (PAGE_WAIT_S if server.expects_page else 0.0)
     while not server.has_page and time.monotonic() < end_s:
         time.sleep(0.05)
     server.stop(str(error))
 
 
-def _end(studio: Studio, store: Store | None) -> None:
-    """Close both, and the store also where the studio fails; then let renders come to an end."""
+def _close(studio: Studio, store: Store | None) -> None:
+    """Close the studio, and the store even where the studio fails; then wait for running
+    renders.
+    """
     try:
         studio.close()
     finally:

@@ -1,4 +1,4 @@
-"""A scene that is to be painted, loaded when it is needed, and what is known of it before."""
+"""A scene that is loaded when it is needed, and the facts that the cache knows of it before."""
 
 import time
 from collections.abc import Callable
@@ -16,11 +16,11 @@ from lightpaint.scene.scene import Scene
 
 
 @dataclass
-class Opening:
+class LazyScene:
     """A scene by its file.
 
-    checks: called with the scene once it is loaded; raise for what cannot be painted of it.
-    remarks: what is worth saying of it, which is known the next time.
+    checks: called with the scene once it is loaded; they raise for what cannot be painted. remarks:
+    for people; the cache keeps them for the next session.
     """
 
     file: SceneFile
@@ -34,16 +34,16 @@ class Opening:
     _lock: Any = field(default_factory=Lock)
 
     def __post_init__(self) -> None:
-        self.known: Known | None = None
+        self.record: Known | None = None
         if self.settings.use_cache:
-            self._key = known.key_of(self._asking)
-            self.known = known.recall(self._key)
-        if self.known is not None:
-            self.remarks = self.known.remarks
+            self._key = known.key_of(self._cache_fields)
+            self.record = known.recall(self._key)
+        if self.record is not None:
+            self.remarks = self.record.remarks
 
     @property
-    def _asking(self) -> dict[str, Any]:
-        """All that decides how it is loaded, and on which film."""
+    def _cache_fields(self) -> dict[str, Any]:
+        """Values that decide how the scene is loaded, and on which film."""
         file = {name: value for name, value in vars_of(self.file).items() if value is not None}
         names = {key: list(its) for key, its in (file.get("groups") or {}).items()}
         lights = {"lights": list(file["lights"])} if "lights" in file else {}
@@ -53,22 +53,23 @@ class Opening:
 
     @property
     def scene(self) -> Scene:
-        """On the film of the basis; loaded when it is first asked for, by whichever thread.
+        """Scene on the film of the basis, loaded when it is first needed, by whichever thread.
 
-        Raises LightpaintError for one that cannot be painted, or that is not what was known.
+        Raises LightpaintError for a scene that cannot be painted, or that differs from the cached
+        facts.
         """
         with self._lock:
             if self._scene is None:
-                self._scene = self._loaded()
+                self._scene = self._load()
             return self._scene
 
-    def _loaded(self) -> Scene:
+    def _load(self) -> Scene:
         # The renderer, and what goes with it, comes with the first scene.
         from lightpaint.scene.presets import on_film
 
         self._began_s, self._clock_s = time.time(), _clock_s()
         scene = on_film(self.file.content, self.settings.quality, self.settings.resolution)
-        if self.known is not None and self.known.identity != scene.identity:
+        if self.record is not None and self.record.identity != scene.identity:
             raise PaintError(
                 f"{self.file.path} is not what it was when this session was opened: its files have "
                 "changed since; start the painter again"
@@ -78,15 +79,17 @@ class Opening:
         return scene
 
     def remember(self, basis: Basis) -> None:
-        """Let the next session of this scene begin without loading it. basis: its kept one."""
+        """Cache what the next session needs to begin without loading. basis: the one that is
+        cached.
+        """
         if abs(_clock_s() - self._clock_s) > known.COARSE_S / 2:
             return  # the clock was set: what a file's times say of its last change is not known
-        if self.known is None and self._scene is not None and self.settings.use_cache:
+        if self.record is None and self._scene is not None and self.settings.use_cache:
             known.remember(
                 self._key, self._scene, basis, remarks=self.remarks, began_s=self._began_s
             )
 
 
 def _clock_s() -> float:
-    """By how much the clock is ahead of one that nobody sets."""
+    """Return by how many seconds the clock is ahead of one that nobody sets."""
     return time.time() - time.monotonic()

@@ -1,4 +1,4 @@
-"""Planes without their grain, made one after the other while somebody paints."""
+"""Denoised planes, made one after the other while somebody paints."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -11,69 +11,71 @@ from lightpaint.basis.clean import CleanPlanes, clean_plane, keep_planes, kept_p
 from lightpaint.images.denoiser import denoised
 from lightpaint.paint.session.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture
-from lightpaint.paint.store.steps import of_view
+from lightpaint.paint.store.steps import name_in_view
 
 
 @dataclass(frozen=True)
-class _Clean:
-    """Those of a view. basis: that they were made of. is_kept: whether a file has them."""
+class _ViewPlanes:
+    """Denoised planes of one view. basis: that they were made of. is_cached: whether a file has
+    them.
+    """
 
     basis: Basis
     planes: CleanPlanes
-    is_kept: bool = False
+    is_cached: bool = False
 
-    def is_of(self, basis: Basis) -> bool:
+    def matches(self, basis: Basis) -> bool:
         return self.basis.planes is basis.planes
 
-    def shown_of(self, basis: Basis) -> CleanPlanes:
-        """What does for the eye until there are those of `basis`."""
-        return self.planes if self.is_of(basis) else self.planes.scaled_as(basis)
+    def scaled_to(self, basis: Basis) -> CleanPlanes:
+        """Return planes that serve the eye until those of `basis` are made."""
+        return self.planes if self.matches(basis) else self.planes.scaled_as(basis)
 
 
-class Cleaning:
-    """Those of the views of one studio.
+class PlaneDenoiser:
+    """Denoises the planes of a studio's views.
 
-    put: receives each plane, by its name. is_wanted: whether anybody is still there to see them.
-    use_cache: whether they are kept for the next session.
+    publish: receives each plane, by its name. is_needed: whether anybody is there to see them.
+    use_cache: whether they are cached for the next session.
     """
 
     def __init__(
         self,
-        put: Callable[[str, Picture], None],
-        is_wanted: Callable[[], bool],
+        publish: Callable[[str, Picture], None],
+        is_needed: Callable[[], bool],
         *,
         use_cache: bool,
     ) -> None:
-        self._put, self._is_wanted, self._use_cache = put, is_wanted, use_cache
-        self._by_view: dict[int, _Clean] = {}
+        self._publish, self._is_needed, self._use_cache = publish, is_needed, use_cache
+        self._by_view: dict[int, _ViewPlanes] = {}
 
-    def begin(self, bases: Sequence[Basis]) -> list[Floats]:
-        """Take what an earlier session kept. Returns how each view looks now, without its grain."""
+    def load_cached(self, bases: Sequence[Basis]) -> list[Floats]:
+        """Load cached planes. Returns the present look of each view, denoised."""
         presents = []
         for k, basis in enumerate(bases):
-            kept = kept_planes(basis) if self._use_cache else None
-            if kept is None:
+            cached = kept_planes(basis) if self._use_cache else None
+            if cached is None:
                 presents.append(denoised(basis.present_look, basis.features))
             else:
-                self._by_view[k] = _Clean(basis, kept, is_kept=True)
-                presents.append(kept.present)
+                self._by_view[k] = _ViewPlanes(basis, cached, is_cached=True)
+                presents.append(cached.present)
         return presents
 
-    def shown(self, bases: Sequence[Basis]) -> list[CleanPlanes | None]:
-        """What there is by now for each view: those of fewer samples do for the eye."""
+    def planes_for(self, bases: Sequence[Basis]) -> list[CleanPlanes | None]:
+        """Return the planes that there are for each view; those of fewer samples serve the eye."""
         return [
-            self._by_view[k].shown_of(basis) if k in self._by_view else None
+            self._by_view[k].scaled_to(basis) if k in self._by_view else None
             for k, basis in enumerate(bases)
         ]
 
-    def make(self, views: Iterable[Canvas]) -> None:
-        """Those that are missing, of one view after the other."""
+    def denoise(self, views: Iterable[Canvas]) -> None:
+        """Denoise the planes that are missing, one view after the other."""
         for view in views:
-            its = self._by_view.get(view.view)
-            if its is None or not its.is_of(view.basis):
-                self._make_of(view)
+            planes_of_view = self._by_view.get(view.view)
+            if planes_of_view is None or not planes_of_view.matches(view.basis):
+                self._denoise_view(view)
 
-    def _make_of(self, view: Canvas) -> None:
+    def _denoise_view(self, view: Canvas) -> None:
         basis = view.basis
         halves, scales = (
             np.empty((len(basis.lights), *basis.size, 3), np.float16),
@@ -81,15 +83,15 @@ class Cleaning:
         )
         planes = CleanPlanes(halves, scales, view.present)
         for k in range(len(basis.lights)):
-            if not self._is_wanted() or view.basis is not basis:
+            if not self._is_needed() or view.basis is not basis:
                 return
             planes.halves[k], planes.scales[k] = clean_plane(basis, k)
-            self._put(of_view(f"clean/{k}", view.view), planes.halves[k])
-        self._by_view[view.view] = _Clean(basis, planes)
+            self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
+        self._by_view[view.view] = _ViewPlanes(basis, planes)
 
-    def keep(self) -> None:
-        """Keep those of the whole basis for the next session."""
+    def write_cache(self) -> None:
+        """Cache the planes of the final basis for the next session."""
         if self._use_cache:
-            for its in self._by_view.values():
-                if not its.is_kept:
-                    keep_planes(its.basis, its.planes)
+            for planes_of_view in self._by_view.values():
+                if not planes_of_view.is_cached:
+                    keep_planes(planes_of_view.basis, planes_of_view.planes)

@@ -1,4 +1,4 @@
-"""Where the session of what is painted is kept, and that it is one of just these views."""
+"""The session file: opened once it is known which views it is of."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -6,41 +6,41 @@ from pathlib import Path
 
 from lightpaint.errors import PaintError
 from lightpaint.files import is_name, one_line
-from lightpaint.paint.lazy_scene import Opening
+from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.steps import Identity, SeenFrom
+from lightpaint.paint.store.steps import Identity, ViewIdentity
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.subject import Subject, sensor_of
+from lightpaint.paint.subject import Subject, sensor_name
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
 
-def identity_of(
+def session_identity(
     subjects: Sequence[Subject], loaded: Mapping[int, Scene] | None = None
 ) -> Identity | None:
-    """What their session is of; None as long as a scene has to be loaded for that.
+    """Return what the session is of; None as long as a scene has to be loaded for that.
 
-    loaded: scenes of openings that have been, by their views. Of scenes it is that of the bases
+    loaded: scenes that have been loaded, by view. The identity of scenes is that of their bases,
     which are still to be rendered.
     """
     bases = [subject.basis for subject in subjects if subject.basis is not None]
     if bases:
         return Identity.of(bases)
-    found = []
+    records = []
     for k, subject in enumerate(subjects):
-        scene = subject.loaded if not isinstance(subject.scene, Opening) else None
-        its = subject.known or scene or (loaded or {}).get(k)
-        if its is None:
+        scene = subject.loaded_scene if not isinstance(subject.scene, LazyScene) else None
+        record = subject.record or scene or (loaded or {}).get(k)
+        if record is None:
             return None
-        found.append(its)
-    first = found[0]
+        records.append(record)
+    first = records[0]
     names = tuple(light.name for light in first.lights)
-    views = tuple(SeenFrom(sensor_of(its), its.size) for its in found)
+    views = tuple(ViewIdentity(sensor_name(record), record.size) for record in records)
     return Identity(Path(first.path).name, first.identity, names, views)
 
 
-def check_together(sensors: Sequence[str]) -> None:
-    """Raise PaintError unless several views have names, by which files can be called."""
+def check_view_names(sensors: Sequence[str]) -> None:
+    """Raise PaintError unless several views have distinct names that can name files."""
     if len(sensors) == 1:
         return
     if len(set(sensors)) < len(sensors):
@@ -52,64 +52,64 @@ def check_together(sensors: Sequence[str]) -> None:
             )
 
 
-class Keeping:
-    """The session file at `path`: opened at once, unless scenes have to be loaded for that.
+class SessionFile:
+    """The session file at `path`, opened at once unless scenes have to be loaded first.
 
-    say: hears what is worth saying of the scenes, each thing once.
+    say: receives remarks on the scenes, each one once.
 
     Attributes:
-        store: The session; None as long as there is none, and nobody knows what it is of.
-        server: Told once it is known.
-        on_opened: Called when there is a store that was not there at first.
+        store: The session; None until its identity is known.
+        server: Told once there is a store.
+        on_store_opened: Called when a store is opened later than at the start.
     """
 
     def __init__(self, subjects: Sequence[Subject], path: Path, say: Callable[[str], None]) -> None:
         self.store: Store | None = None
         self.server: Server | None = None
-        self.on_opened: Callable[[], None] = lambda: None
-        self._subjects, self._path, self._say = subjects, path, say
+        self.on_store_opened: Callable[[], None] = lambda: None
+        self._subjects, self._path, self._report = subjects, path, say
         self._loaded: dict[int, Scene] = {}
-        self._said: set[str] = set()
-        if (identity := identity_of(subjects)) is not None or path.exists():
+        self._reported: set[str] = set()
+        if (identity := session_identity(subjects)) is not None or path.exists():
             self.store = Store.open(path, identity)
         for k, subject in enumerate(subjects):
-            if subject.known is not None and isinstance(subject.scene, Opening):
-                self._tell(subject.scene.remarks)
-            elif isinstance(subject.scene, Opening):
-                subject.scene.checks.append(partial(self._take, k, subject.scene))
+            if subject.record is not None and isinstance(subject.scene, LazyScene):
+                self._report_new(subject.scene.remarks)
+            elif isinstance(subject.scene, LazyScene):
+                subject.scene.checks.append(partial(self._on_scene_loaded, k, subject.scene))
 
-    def opened(self, _: Identity) -> Store:
-        """The store, when there are bases."""
+    def open_store(self, _: Identity) -> Store:
+        """Return the store; called when there are bases."""
         assert self.store is not None
         return self.store
 
-    def _take(self, k: int, opening: Opening, scene: Scene) -> None:
-        """Once the scene of view k is there, of which nothing was known."""
+    def _on_scene_loaded(self, k: int, lazy_scene: LazyScene, scene: Scene) -> None:
+        """Complete the identity with the scene of view k, of which nothing was cached."""
         from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 
         self._loaded[k] = scene
-        if (identity := identity_of(self._subjects, self._loaded)) is not None:
-            self._begin(identity)
-        lasting = *remarks_of_scene(scene), *remarks_of_film(scene, opening.settings)
-        self._tell((*lasting, *remarks_of_memory(scene)))
+        if (identity := session_identity(self._subjects, self._loaded)) is not None:
+            self._open_with(identity)
+        lasting = *remarks_of_scene(scene), *remarks_of_film(scene, lazy_scene.settings)
+        self._report_new((*lasting, *remarks_of_memory(scene)))
         from lightpaint.scene.runtime.variant import use_variant
 
         # What is said of this machine may not be so the next time.
-        opening.remarks = tuple(x for x in lasting if x != use_variant().note)
+        lazy_scene.remarks = tuple(x for x in lasting if x != use_variant().note)
 
-    def _begin(self, identity: Identity) -> None:
-        """Once all scenes are there."""
-        check_together([view.sensor for view in identity.views])
+    def _open_with(self, identity: Identity) -> None:
+        """Open the store, or check its identity, once all scenes are loaded."""
+        check_view_names([view.sensor for view in identity.views])
         if self.store is None:
             self.store = Store.open(self._path, identity)
-            self.on_opened()
+            self.on_store_opened()
         else:
-            self.store.becomes(identity)
+            self.store.set_identity(identity)
         if self.server is not None:
-            self.server.keeps(self.store)
+            self.server.set_store(self.store)
 
-    def _tell(self, remarks: Iterable[str]) -> None:
+    def _report_new(self, remarks: Iterable[str]) -> None:
         for remark in remarks:
-            if remark not in self._said:
-                self._said.add(remark)
-                self._say(remark)
+            if remark not in self._reported:
+                self._reported.add(remark)
+                self._report(remark)

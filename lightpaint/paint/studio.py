@@ -1,8 +1,7 @@
-"""Where somebody paints: a session, and all that goes on beside it while the brush moves.
+"""The studio: one session, and all that runs beside it while the brush moves.
 
-Answers to messages come at once, from one thread at a time. The basis that is still being
-rendered, exact answers, clean planes, exports and the verifying render have threads of their own,
-which say what has come of them through `on_message`.
+Requests are answered at once, by one thread at a time. Rendering the basis, exact answers,
+denoising, exports and verification have threads of their own, which publish through `on_message`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,16 +19,16 @@ from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint import protocol
-from lightpaint.paint.background_jobs import Errands
+from lightpaint.paint.background_jobs import BackgroundJobs
 from lightpaint.paint.background_threads import (
-    Settling,
+    BackgroundThreads,
+    ExactSolveLoop,
     StoppedError,
-    Threads,
-    Writing,
-    give_way,
-    told,
+    UnsavedRetry,
+    error_text,
+    lower_priority,
 )
-from lightpaint.paint.plane_denoiser import Cleaning
+from lightpaint.paint.plane_denoiser import PlaneDenoiser
 from lightpaint.paint.protocol import (
     AnswerUpdate,
     Message,
@@ -44,43 +43,43 @@ from lightpaint.paint.protocol import (
     Tone,
     TransformInfo,
 )
-from lightpaint.paint.session import picture_table as pictures
-from lightpaint.paint.session.answer_messages import judgement, light_info
-from lightpaint.paint.session.look_library import Looks
-from lightpaint.paint.session.picture_table import Picture, Pictures
+from lightpaint.paint.session import picture_table
+from lightpaint.paint.session.answer_messages import judge, light_info
+from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.snapshot import Moment
+from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session.view_pictures import offer_transforms, offer_view, view_info
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.light_requests import Wishes
+from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.subject import Subject, bases_of, transform_of
+from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
 from lightpaint.progress import while_wanted
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
 
-class OldError(Exception):
-    """Somebody has painted on, or left."""
+class OutdatedError(Exception):
+    """Ends work whose result is no longer wanted: somebody has painted on, or left."""
 
 
-def _give_up() -> None:
-    """Have work end that nobody waits for."""
-    raise OldError
+def _raise_outdated() -> None:
+    """Raise OutdatedError, to end work that nobody waits for."""
+    raise OutdatedError
 
 
 class Studio:
-    """Views under the brush.
+    """A painting session with its renders and background jobs.
 
     Args:
-        subjects: What is painted: views of one lighting.
-        open_store: The store of a session of them, opened when their lights are known.
+        subjects: The views to be painted, under one lighting.
+        open_store: Opens the store of their session once their lights are known.
 
     Attributes:
-        on_message: Hears what is said unasked, from other threads.
-        on_unsaved: Hears, in plain text, that what is done cannot be written, and that it is.
-        on_failure: Hears why there is nothing to paint, from another thread.
-        failure: The same, afterwards.
+        on_message: Receives messages that answer no request, from other threads.
+        on_unsaved: Receives, in plain text, that work cannot be written, and later that it is.
+        on_failure: Receives why there is nothing to paint, from another thread.
+        failure: That error, afterwards.
     """
 
     def __init__(
@@ -91,72 +90,74 @@ class Studio:
         self.on_unsaved: Callable[[str], None] = lambda _: None
         self.on_failure: Callable[[Exception], None] | None = None
         self.failure: Exception | None = None
-        self.pictures = Pictures()
+        self.pictures = PictureTable()
         self._session: Session | None = None
-        self._looks: Looks | None = None
-        self._known: AnswerUpdate | None = None  # the last exact answer, as it was said
+        self._looks: LookLibrary | None = None
+        self._last_exact: AnswerUpdate | None = None  # the last exact answer, as it was said
         self._progress: ProgressReport | None = None  # of the first picture
         self._lock, self._is_open, self._failed = RLock(), True, ""
-        self._telling = RLock()  # taken before the other, by whoever tells of what it made
-        self._cleaning = Cleaning(
-            self.put, lambda: self._is_open, use_cache=self.subjects[0].settings.use_cache
+        self._publish_lock = RLock()  # taken before the other, by whoever tells of what it made
+        self._denoiser = PlaneDenoiser(
+            self.publish_picture,
+            lambda: self._is_open,
+            use_cache=self.subjects[0].settings.use_cache,
         )
-        self._settling = Settling(self._find, self.tell)
-        self._writing = Writing(lambda: self.store, self._tell_kept)
-        self._threads = Threads(self.tell)
-        self._errands = Errands(self, self._threads)
+        self._solve_loop = ExactSolveLoop(self._solve_exactly, self.publish)
+        self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
+        self._threads = BackgroundThreads(self.publish)
+        self._jobs = BackgroundJobs(self, self._threads)
 
     @property
     def session(self) -> Session:
-        """What is painted. Raises PaintError before there is a basis."""
+        """The session. Raises PaintError before there is a basis."""
         if self._session is None:
             raise PaintError(self._failed or "the first picture is still being rendered")
         return self._session
 
     @property
     def version(self) -> int:
-        """A number that grows with every change. Raises PaintError before there is a basis."""
+        """Number that grows with every change. Raises PaintError before there is a basis."""
         return self.session.version
 
     @property
     def store(self) -> Store | None:
-        """Where it is kept; None before there is a basis."""
+        """The session's store; None before there is a basis."""
         return None if self._session is None else self._session.store
 
     @property
-    def renders(self) -> bool:
-        """Whether there are scenes, and not only bases of them."""
+    def has_scenes(self) -> bool:
+        """True if there are scenes, and not only bases of them."""
         return self.subjects[0].scene is not None
 
     def start(self) -> None:
-        """Begin to obtain the bases."""
-        self._threads.begin(self._obtain, "obtain")
-        self._threads.begin(self._settling.settle, "settle")
-        self._threads.begin(self._writing.watch, "write")
+        """Start to obtain the bases."""
+        self._threads.start(self._obtain_bases, "obtain")
+        self._threads.start(self._solve_loop.run, "settle")
+        self._threads.start(self._write_retry.run, "write")
 
     def close(self) -> None:
-        """End; all that was done is kept, also of a stroke whose end was never heard."""
+        """End the session; all work is kept, even a stroke whose end never arrived."""
         self._is_open = False
-        self._settling.end()
-        self._writing.end()
+        self._solve_loop.stop()
+        self._write_retry.stop()
         with self._lock:
             if self._session is not None:
                 # All is kept before anything is solved, and nobody asks for the answer any more.
-                with suppress(OldError), while_wanted(_give_up):
-                    self._session.left(with_stroke=True)
+                with suppress(OutdatedError), while_wanted(_raise_outdated):
+                    self._session.client_left(with_stroke=True)
                 self._session.store.close()
 
     def wait(self) -> None:
-        """Until what went on beside it has come to an end, once it is closed.
+        """Wait, after `close`, until all background work has ended.
 
-        What Mitsuba is at in another thread cannot be left alone at the end of a process.
+        A render that Mitsuba runs in another thread cannot be left alone at the end of a process.
         """
-        self._threads.wait()
+        self._threads.join_all()
 
-    # What a page asks
+    # Requests of a page
 
     def state(self) -> SessionState | SessionPending:
-        """All there is, for a client that begins."""
+        """Return the whole state, for a client that connects."""
         first = self.subjects[0]
         with self._lock:
             session = self._session
@@ -164,31 +165,36 @@ class Studio:
                 "version": protocol.VERSION,
                 "scene": first.name,
                 "folder": str(first.folder.absolute()),
-                "can_render": self.renders,
-                "can_report": self.renders or len(self.subjects) == 1,
+                "can_render": self.has_scenes,
+                "can_report": self.has_scenes or len(self.subjects) == 1,
             }
             if session is None:
                 return SessionPending(**about, text=self._failed, progress=self._progress)
-            found, known = session.findings, self._known
+            found, known = session.findings, self._last_exact
             if known is not None and known.version == session.version:
                 found = known.findings
             about |= {"answer": found, "weights": session.weights}
-            return SessionState(**about, **self._of_session(session), **session.about)
+            return SessionState(**about, **self._session_fields(session), **session.edit_state)
 
     def greet(self, *, is_back: bool) -> Message:
-        """The state, for a page that begins. What another one had begun is kept as it was left.
+        """Return the state to a page that connects; what another page had begun is kept as it left
+        it.
 
-        is_back: it was there before, and nobody since: it sends what it has of a stroke again.
+        is_back: the page had the session before, and nobody since: it sends its open stroke again.
         """
         with self._lock:
             if self._session is not None and self._session.is_open:
-                self._session.left(with_stroke=not is_back)
-                self._settling.ring()
+                self._session.client_left(with_stroke=not is_back)
+                self._solve_loop.notify()
             state = self.state()
             return replace(state, is_back=is_back)
 
-    def said(self, message: protocol.Said, arrays: Mapping[str, npt.NDArray[Any]]) -> list[Message]:
-        """What comes of a message at once. Raises LightpaintError for what cannot be done."""
+    def handle(
+        self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
+    ) -> list[Message]:
+        """Return the immediate answers to a request. Raises LightpaintError for what cannot be
+        done.
+        """
         if isinstance(message, protocol.Hello | protocol.TakeOver):
             return [self.greet(is_back=True)]
         if isinstance(message, protocol.Fetch):
@@ -198,132 +204,140 @@ class Studio:
             assert looks is not None
             match message:
                 case protocol.SaveLook() | protocol.RenameLook() | protocol.CopyLook():
-                    return [looks.said(message)]
+                    return [looks.handle(message)]
                 case protocol.MixLooks() | protocol.DropLook() | protocol.Propose():
-                    return [looks.said(message)]
+                    return [looks.handle(message)]
                 case protocol.Export() | protocol.Verify() | protocol.Explain():
-                    return self._errands.said(message)
+                    return self._jobs.handle(message)
                 case protocol.Preview():
-                    return self._errands.foresee(message, session.changed_by(message))
+                    return self._jobs.start_preview(message, session.preview_requests(message))
                 case protocol.LoadLook():
                     made = looks.load(message)
                 case _:
-                    made = session.said(message, arrays)
-        self._settling.ring()
+                    made = session.handle(message, arrays)
+        self._solve_loop.notify()
         return made
 
-    def moment(self) -> Moment:
-        """What is painted and asked now. Raises PaintError before there is a basis."""
-        with self._lock:
-            return self.session.moment()
-
-    def now(self, wishes: Wishes | None = None) -> tuple[Moment, Lighting]:
-        """The same, and the last answer. wishes: to be asked instead of what is asked now."""
-        with self._lock:
-            session = self.session
-            moment = session.moment() if wishes is None else session.moment(wishes)
-            weights = session.weights
-        return moment, Lighting.of_weights(moment.bases[0], weights)
-
-    def load(self, paintings: Mapping[int, Pixels], wishes: Wishes, label: str) -> list[Message]:
-        """Go on from other paintings, by view, and what was asked with them: one step, `patch`.
-
-        Raises LightpaintError for what cannot be asked, and has changed nothing then.
+    def snapshot(self) -> SessionSnapshot:
+        """Return the paintings and requests as they are. Raises PaintError before there is
+        a basis.
         """
         with self._lock:
-            made = self.session.load(paintings, wishes, label)
-        self._settling.ring()
+            return self.session.snapshot()
+
+    def snapshot_and_lighting(
+        self, requests: LightRequests | None = None
+    ) -> tuple[SessionSnapshot, Lighting]:
+        """Return the same with the last answer. requests: taken instead of the session's."""
+        with self._lock:
+            session = self.session
+            snapshot = session.snapshot() if requests is None else session.snapshot(requests)
+            weights = session.weights
+        return snapshot, Lighting.of_weights(snapshot.bases[0], weights)
+
+    def load(
+        self, paintings: Mapping[int, Pixels], requests: LightRequests, label: str
+    ) -> list[Message]:
+        """Replace the paintings, by view, and the requests: one step. Returns the `patch` messages.
+
+        Raises LightpaintError for requests that are refused; nothing is changed then.
+        """
+        with self._lock:
+            made = self.session.load(paintings, requests, label)
+        self._solve_loop.notify()
         return made
 
     def resource(self, name: str) -> npt.NDArray[Any]:
-        """A picture by name. Raises PaintError if there is none."""
+        """Return a picture by name. Raises PaintError if there is none."""
         with self._lock:
             return self.pictures[name]
 
-    # Beside it
+    # Background
 
-    def tell(self, message: Message | None) -> None:
-        """Say it to the page, if there is one."""
+    def publish(self, message: Message | None) -> None:
+        """Send a message to the page, if there is one."""
         if message is not None and self.on_message is not None and self._is_open:
             self.on_message(message)
 
-    def _tell_of(self, make: Callable[[], Message | None]) -> None:
-        """Say what is made of what there is, in the order in which it came about."""
-        with self._telling:
+    def _publish_made(self, make: Callable[[], Message | None]) -> None:
+        """Make a message under the lock and send it, in the order in which messages were made."""
+        with self._publish_lock:
             with self._lock:
                 message = make()
-            self.tell(message)
+            self.publish(message)
 
-    def clean(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
-        """Clean planes of these, where they have been made."""
-        return self._cleaning.shown(bases)
+    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
+        """Return the denoised planes of these bases; None for each that has none yet."""
+        return self._denoiser.planes_for(bases)
 
-    def put(self, name: str, picture: Picture) -> None:
-        """A picture from now on, of which the page is told."""
+    def publish_picture(self, name: str, picture: Picture) -> None:
+        """Store a picture and tell the page that there is a new one."""
 
         def renewed() -> Message:
             self.pictures.put(name, picture)
             return PictureUpdate(resources={name: self.pictures.generations[name]})
 
-        self._tell_of(renewed)
+        self._publish_made(renewed)
 
-    def hears(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """How far something is. Raises StoppedError where it has ended."""
+    def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """Report how far a task is. Raises StoppedError once the studio is closed."""
         if not self._is_open:
             raise StoppedError
         about = ProgressReport(what=label, done=done, total=total, unit=unit)
         if self._session is None:
             self._progress = about
         with MITSUBA.aside():  # whoever hears it may wait for a render of its own
-            self.tell(about)
+            self.publish(about)
 
-    def _tell_kept(self, text: str, tone: Tone) -> None:
-        """Whether what is done can be written."""
+    def _publish_save_state(self, text: str, tone: Tone) -> None:
+        """Report whether the work can be written."""
         self.on_unsaved(text)
-        self.tell(Notice(text=text, tone=tone))
+        self.publish(Notice(text=text, tone=tone))
 
-    def _obtain(self) -> None:
-        """The bases, better and better."""
-        give_way()
+    def _obtain_bases(self) -> None:
+        """Obtain the bases, better and better, and denoise each."""
+        lower_priority()
         try:
             with MITSUBA.at_leisure():
-                for bases in bases_of(self.subjects, self.hears):
-                    self._take(bases)
-                    self._cleaning.make(self.session.views)
-            self.tell(ProgressReport(what="basis", done=1, total=1, unit=""))
-            self._cleaning.keep()
+                for bases in obtain_bases(self.subjects, self.report_progress):
+                    self._use_bases(bases)
+                    self._denoiser.denoise(self.session.views)
+            self.publish(ProgressReport(what="basis", done=1, total=1, unit=""))
+            self._denoiser.write_cache()
         except StoppedError:
             pass
         except Exception as error:
-            is_told = self._session is None and self.on_failure is not None
-            self._failed = told(error, at_length=not is_told)
-            self.tell(Notice(text=self._failed, tone="warn"))
+            is_reported = self._session is None and self.on_failure is not None
+            self._failed = error_text(error, at_length=not is_reported)
+            self.publish(Notice(text=self._failed, tone="warn"))
             if self._session is None:
                 self.failure = error
-                self._tell_of(self.state)
-            if is_told and self._is_open:
+                self._publish_made(self.state)
+            if is_reported and self._is_open:
                 self.on_failure(error)  # type: ignore[misc]
 
-    def _take(self, bases: Sequence[Basis]) -> None:
-        """Paint on with these bases."""
-        presents = self._cleaning.begin(bases)
-        shown = self._cleaning.shown(bases)
+    def _use_bases(self, bases: Sequence[Basis]) -> None:
+        """Continue the session with these bases."""
+        presents = self._denoiser.load_cached(bases)
+        shown = self._denoiser.planes_for(bases)
         with self._lock:
             if not self._is_open:
                 raise StoppedError
             if self._session is None:
-                self._session, self._looks = self._begun(bases, presents)
+                self._session, self._looks = self._make_session(bases, presents)
             else:
                 self._session.improve(bases, presents)
             session = self._session
             for view, clean in zip(session.views, shown, strict=True):
                 offer_view(self.pictures, view, session.transform, clean)
             offer_transforms(self.pictures, self._transforms(session))
-        self._tell_of(self.state)
-        self._settling.ring()
+        self._publish_made(self.state)
+        self._solve_loop.notify()
 
-    def _begun(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> tuple[Session, Looks]:
-        """What is painted of the first bases, and looks of it. Raises LightpaintError."""
+    def _make_session(
+        self, bases: Sequence[Basis], presents: Sequence[Floats]
+    ) -> tuple[Session, LookLibrary]:
+        """Return the session of the first bases, and its looks. Raises LightpaintError."""
         store = self._open_store(Identity.of(bases))
         try:
             session = Session(
@@ -331,12 +345,12 @@ class Studio:
                 presents,
                 store,
                 settings=self.subjects[0].settings,
-                transform=transform_of(self.subjects, bases),
+                transform=painting_transform(self.subjects, bases),
                 constraints=self.subjects[0].constraints,
             )
-            looks = Looks(session, self.pictures)
+            looks = LookLibrary(session, self.pictures)
             for remark in store.remarks:
-                self._tell_kept(remark, "warn")
+                self._publish_save_state(remark, "warn")
             return session, looks
         except BaseException:
             store.close()  # whoever tries again, as with other constraints, finds it free
@@ -344,11 +358,11 @@ class Studio:
 
     def _transforms(self, session: Session) -> list[Any]:
         own = session.transform.name
-        names = [*pictures.TRANSFORMS, *([own] if own not in pictures.TRANSFORMS else [])]
+        names = [*picture_table.TRANSFORMS, *([own] if own not in picture_table.TRANSFORMS else [])]
         return [type(session.transform)(name) for name in names]
 
-    def _of_session(self, session: Session) -> dict[str, Any]:
-        wanted, basis = self.subjects[0].wanted, session.basis
+    def _session_fields(self, session: Session) -> dict[str, Any]:
+        wanted, basis = self.subjects[0].target_spp, session.basis
         painted = [view.name for view in session.views if view.is_painted]
         sensors = [""] if len(session.views) == 1 else painted
         views = tuple(view_info(view) for view in session.views)
@@ -359,47 +373,47 @@ class Studio:
             "views": views,
             "transforms": tuple(x.name for x in self._transforms(session)),
             "transform": TransformInfo(session.transform.name, session.transform.stops),
-            "lut": TableInfo(pictures.SIDE, pictures.LOW, pictures.HIGH),
-            "resources": self.pictures.named(),
-            "looks": self._looks.listed() if self._looks is not None else (),
+            "lut": TableInfo(picture_table.LUT_SIDE, picture_table.LUT_LOW, picture_table.LUT_HIGH),
+            "resources": self.pictures.stable_generations(),
+            "looks": self._looks.infos() if self._looks is not None else (),
             "basis": SampleCount(
                 spp=basis.origin.spp,
                 wanted=wanted or basis.origin.spp,
                 done=wanted is None or basis.origin.spp >= wanted,
             ),
-            "verified": self._errands.verified(session.version),
+            "verified": self._jobs.verifications(session.version),
             "first": not session.store.steps,
             "stroke": session.stroke,
-            "command": self._errands.command(sensors, session.wishes),
+            "command": self._jobs.solve_command(sensors, session.requests),
         }
 
-    def _find(self) -> None:
-        """The exact answer, then what is known of it."""
+    def _solve_exactly(self) -> None:
+        """Publish the exact answer, then its analysis."""
         with self._lock:
             session = self._session
             if session is None or session.is_open:
                 return
-            moment = session.moment()
+            snapshot = session.snapshot()
 
         def check() -> None:
-            if moment.version != session.version or not self._is_open:
-                raise OldError
+            if snapshot.version != session.version or not self._is_open:
+                raise OutdatedError
 
         # The next stroke gets the processors at once, and rings when it is done.
-        with suppress(OldError), while_wanted(check):
-            solution = moment.solution()
-            self._tell_answer(lambda: session.settled(moment, solution))
+        with suppress(OutdatedError), while_wanted(check):
+            solution = snapshot.solution()
+            self._publish_answer(lambda: session.accept_solution(snapshot, solution))
             if solution is None:
                 return
             check()
             analyses = analyse(solution)
-            judged = judgement(analyses, moment.painted)
-            self._tell_answer(lambda: session.settled(moment, solution, judged))
+            judgement_ = judge(analyses, snapshot.painted_views)
+            self._publish_answer(lambda: session.accept_solution(snapshot, solution, judgement_))
 
-    def _tell_answer(self, make: Callable[[], AnswerUpdate | None]) -> None:
-        def known() -> AnswerUpdate | None:
+    def _publish_answer(self, make: Callable[[], AnswerUpdate | None]) -> None:
+        def remember() -> AnswerUpdate | None:
             message = make()
-            self._known = message or self._known
+            self._last_exact = message or self._last_exact
             return message
 
-        self._tell_of(known)
+        self._publish_made(remember)

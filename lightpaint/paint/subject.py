@@ -1,4 +1,4 @@
-"""What is painted: a scene, a saved basis, or light groups; and how its lights come to be known."""
+"""What is painted: a scene, a saved basis, or light groups, and how its basis is obtained."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,131 +13,136 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.files import called
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.paint.lazy_scene import Opening
-from lightpaint.paint.store.light_requests import Wishes
+from lightpaint.paint.lazy_scene import LazyScene
+from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.presets import samples
 from lightpaint.scene.scene import Scene
 
 #: Samples per pixel after which a basis that is still being rendered is shown, and shown again.
-FIRST = (2, 8, 32, 128)
+PREVIEW_SPP = (2, 8, 32, 128)
 
 
 @dataclass(frozen=True)
 class Subject:
     """One view to be painted, alone or among others.
 
-    source: as it was named, for people and for command lines. scene: on the film of the basis, or
-    one that is loaded when it is needed; None without a renderer. basis: where there is one
-    already, as of light groups. settings, constraints: how paintings are answered. choice: of a
-    view transform, to paint through. folder: receives what is exported. command: that answers
-    exported paintings as a session does in which this is wished; their paths by sensor, "" for that
-    of the only view; "" where there are no commands. among: how many views the time is for in which
-    bases are rendered.
+    source: the path that was given, for people and for commands. scene: on the film of the basis,
+    or a lazy one; None without a renderer. basis: given already, as for light groups. settings,
+    constraints: how paintings are answered. choice: the view transform to paint through. folder:
+    receives exports. command: returns the command that answers exported paintings, given by sensor
+    ("" for the only view), with the session's requests; "" where there is none. view_count: how
+    many views share the time in which bases are rendered.
     """
 
     source: str
     folder: Path
-    scene: Scene | Opening | None = None
+    scene: Scene | LazyScene | None = None
     basis: Basis | None = None
     groups: LightGroups | None = None
     settings: Settings = field(default_factory=Settings)
     constraints: Constraints = field(default_factory=Constraints)
     choice: TransformChoice = field(default_factory=TransformChoice)
-    command: Callable[[Mapping[str, str], Wishes], str] = lambda paintings, wishes: ""
-    among: int = 1
+    command: Callable[[Mapping[str, str], LightRequests], str] = lambda paintings, requests: ""
+    view_count: int = 1
 
     @property
     def name(self) -> str:
-        """What it is called, for people."""
+        """Name for people."""
         return called(Path(self.source))
 
     @property
-    def loaded(self) -> Scene:
-        """Its scene, which it has; loaded if it is not yet. Raises LightpaintError."""
+    def loaded_scene(self) -> Scene:
+        """The scene, loaded if it is not yet. Raises LightpaintError."""
         assert self.scene is not None
-        return self.scene.scene if isinstance(self.scene, Opening) else self.scene
+        return self.scene.scene if isinstance(self.scene, LazyScene) else self.scene
 
     @property
-    def known(self) -> Known | None:
-        """What is known of a scene that need not be loaded for it."""
-        return self.scene.known if isinstance(self.scene, Opening) else None
+    def record(self) -> Known | None:
+        """Cached facts of a scene that need not be loaded for them."""
+        return self.scene.record if isinstance(self.scene, LazyScene) else None
 
     @property
     def sensor(self) -> str:
-        """That it is seen through."""
+        """Name of the sensor."""
         if self.basis is not None:
             return self.basis.origin.sensor
-        return self.known.sensor if self.known is not None else sensor_of(self.loaded)
+        return self.record.sensor if self.record is not None else sensor_name(self.loaded_scene)
 
     @property
-    def wanted(self) -> int | None:
-        """Samples per pixel that its basis is to have; None where that is not asked here."""
+    def target_spp(self) -> int | None:
+        """Samples per pixel that its basis is to have; None where that is not decided here."""
         if self.scene is None:
             return None
         settings = self.settings
         asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
-        return asked or (self.known or self.loaded).spp
+        return asked or (self.record or self.loaded_scene).spp
 
     def prepare(self) -> None:
-        """Load a scene of which nothing is known, so that what is wrong with it is said at once."""
-        if self.scene is not None and self.known is None:
-            _ = self.loaded
+        """Load a scene without cached facts, so that its errors show at once."""
+        if self.scene is not None and self.record is None:
+            _ = self.loaded_scene
 
     def bases(self, progress: Progress = silent) -> Iterator[Basis]:
-        """Its basis; where it is still to be rendered, first ones of few samples."""
+        """Yield its basis; one that is still to be rendered follows previews of few samples."""
         if self.basis is not None:
             yield self.basis
             return
-        if (kept := self._kept()) is not None:
-            yield kept
+        if (cached := self._cached_basis()) is not None:
+            yield cached
             return
         # What renders is not needed for a basis that is there.
         from lightpaint.pipeline.pipeline import obtain
 
-        scene, settings, wanted = self.loaded, self.settings, self.wanted or 1
-        kept = cache.find(scene.identity, sensor_of(scene), settings.seed, scene.size)
-        has = 0 if kept is None or not settings.use_cache else kept.origin.spp
+        scene, settings, target_spp = self.loaded_scene, self.settings, self.target_spp or 1
+        cached = cache.find(scene.identity, sensor_name(scene), settings.seed, scene.size)
+        done_spp = 0 if cached is None or not settings.use_cache else cached.origin.spp
         if settings.use_cache and settings.time_s is None:
-            for spp in FIRST:
-                if has < spp < wanted:
-                    hears = in_samples(progress, has, spp, wanted, lights=len(scene.lights))
-                    yield self._obtained(spp, hears)
-                    has = spp
-            has = min(has, wanted)
-            progress = in_samples(progress, has, wanted, wanted, lights=len(scene.lights))
-        basis = obtain(scene, settings, progress, views=self.among)
-        if isinstance(self.scene, Opening):
+            for spp in PREVIEW_SPP:
+                if done_spp < spp < target_spp:
+                    report = progress_in_samples(
+                        progress, done_spp, spp, target_spp, lights=len(scene.lights)
+                    )
+                    yield self._obtain_at(spp, report)
+                    done_spp = spp
+            done_spp = min(done_spp, target_spp)
+            progress = progress_in_samples(
+                progress, done_spp, target_spp, target_spp, lights=len(scene.lights)
+            )
+        basis = obtain(scene, settings, progress, views=self.view_count)
+        if isinstance(self.scene, LazyScene):
             self.scene.remember(basis)
         yield basis.with_requests(scene.requests)
 
-    def _kept(self) -> Basis | None:
-        """The basis of a scene that is known, if all of it is kept."""
-        known, settings = self.known, self.settings
-        if known is None or settings.time_s is not None or settings.exact_spp:
+    def _cached_basis(self) -> Basis | None:
+        """Return the basis of a scene with cached facts, if all of it is cached."""
+        record, settings = self.record, self.settings
+        if record is None or settings.time_s is not None or settings.exact_spp:
             return None
-        kept = cache.find(known.identity, known.sensor, settings.seed, known.size)
-        names = tuple(light.name for light in known.lights)
-        if kept is None or kept.names != names or kept.origin.spp < (self.wanted or 1):
+        cached = cache.find(record.identity, record.sensor, settings.seed, record.size)
+        names = tuple(light.name for light in record.lights)
+        if cached is None or cached.names != names or cached.origin.spp < (self.target_spp or 1):
             return None
-        if kept.features is None or kept.objects is None:  # by an earlier version
+        if cached.features is None or cached.objects is None:  # by an earlier version
             return None
-        return replace(kept, lights=known.lights)
+        return replace(cached, lights=record.lights)
 
-    def _obtained(self, spp: int, progress: Progress) -> Basis:
+    def _obtain_at(self, spp: int, progress: Progress) -> Basis:
         from lightpaint.basis.render.obtain import obtain_basis
 
-        scene = self.loaded
+        scene = self.loaded_scene
         basis = obtain_basis(scene, spp=spp, seed=self.settings.seed, progress=progress)
         return basis.with_requests(scene.requests)
 
 
-def in_samples(progress: Progress, has: int, spp: int, wanted: int, *, lights: int) -> Progress:
-    """A listener to passes, of which `progress` hears as samples per pixel of all that are wanted.
+def progress_in_samples(
+    progress: Progress, done_spp: int, spp: int, target_spp: int, *, lights: int
+) -> Progress:
+    """Return a listener to passes that reports them as samples per pixel of the whole basis.
 
-    has: how many there are when the passes begin. spp: how many at their end. lights: of the scene;
-    where each is rendered alone, passes are those of one light, whose label is its own.
+    done_spp: samples when the passes begin. spp: samples at their end. lights: of the scene; where
+    each light is rendered alone, its passes carry its own label.
     """
     labels: dict[str, int] = {}
 
@@ -146,17 +151,19 @@ def in_samples(progress: Progress, has: int, spp: int, wanted: int, *, lights: i
         if unit == "passes":
             parts = lights if ":" in label else 1
             share = min((before + done / max(total, 1)) / parts, 1)
-            progress("basis", has + round((spp - has) * share), wanted, "samples per pixel")
+            progress(
+                "basis", done_spp + round((spp - done_spp) * share), target_spp, "samples per pixel"
+            )
         else:
             progress(label, done, total, unit)
 
     return hear
 
 
-def together(progress: Progress, count: int) -> list[Progress]:
-    """Listeners to parts of one work, of which `progress` hears as one.
+def joint_progress(progress: Progress, count: int) -> list[Progress]:
+    """Return listeners to the parts of one work, which report to `progress` as one.
 
-    A part that has said nothing yet is taken to be as large as those that have.
+    A part that has reported nothing yet counts as large as those that have.
     """
     heard: dict[int, tuple[int, int]] = {}
 
@@ -171,39 +178,43 @@ def together(progress: Progress, count: int) -> list[Progress]:
     return [listener(part) for part in range(count)]
 
 
-def bases_of(subjects: Sequence[Subject], progress: Progress = silent) -> Iterator[list[Basis]]:
-    """Bases of several views; where they are still to be rendered, all of few samples first."""
+def obtain_bases(subjects: Sequence[Subject], progress: Progress = silent) -> Iterator[list[Basis]]:
+    """Yield the bases of several views; where they are still to be rendered, previews of
+    all first.
+    """
     for subject in subjects:
         subject.prepare()
-    parts = together(progress, len(subjects))
-    each = [subject.bases(part) for subject, part in zip(subjects, parts, strict=True)]
-    found = [next(bases) for bases in each]
-    yield list(found)
+    parts = joint_progress(progress, len(subjects))
+    streams = [subject.bases(part) for subject, part in zip(subjects, parts, strict=True)]
+    current = [next(bases) for bases in streams]
+    yield list(current)
     while True:
-        more = [next(bases, None) for bases in each]
-        if all(basis is None for basis in more):
+        improved = [next(bases, None) for bases in streams]
+        if all(basis is None for basis in improved):
             return
-        found = [basis or before for basis, before in zip(more, found, strict=True)]
-        yield list(found)
+        current = [basis or before for basis, before in zip(improved, current, strict=True)]
+        yield list(current)
 
 
-def transform_of(subjects: Sequence[Subject], bases: Sequence[Basis]) -> ViewTransform:
-    """What is painted through: as asked, else sRGB at an exposure that shows something of all."""
+def painting_transform(subjects: Sequence[Subject], bases: Sequence[Basis]) -> ViewTransform:
+    """Return the transform to paint through: as chosen, else sRGB at an exposure that shows all
+    views.
+    """
     looks = [basis.present_look for basis in bases]
     whole = looks[0] if len(looks) == 1 else np.concatenate([x.reshape(1, -1, 3) for x in looks], 1)
     return subjects[0].choice.over(ViewTransform("srgb", meter_exposure(whole, *bases)))
 
 
-def sensor_of(scene: Scene | Known) -> str:
-    """The name of the sensor that it is seen through."""
+def sensor_name(scene: Scene | Known) -> str:
+    """Return the name of the sensor that a scene is seen through."""
     return scene.sensor if isinstance(scene, Known) else scene.sensor_names[scene.sensor]
 
 
-def painting_of(folder: Path, sensor: str) -> Path:
-    """Where the painting of a view goes among exports. sensor: "" of the only one."""
+def painting_path(folder: Path, sensor: str) -> Path:
+    """Return where the painting of a view is exported. sensor: "" for the only one."""
     return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
 
 
-def picture_of(folder: Path, sensor: str) -> Path:
-    """Where the answer in a view goes, as it is seen. sensor: "" of the only one."""
+def picture_path(folder: Path, sensor: str) -> Path:
+    """Return where the picture of the answer in a view is exported. sensor: "" for the only one."""
     return folder / (f"answer-{sensor}.png" if sensor else "answer.png")

@@ -30,11 +30,11 @@ from lightpaint.basis.file import write_basis
 from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.cli.options.job_options import painted_of, settings_of, values_of
 from lightpaint.cli.options.parser import command_parser
-from lightpaint.paint.background_threads import Threads
-from lightpaint.paint.frames import of_frame, to_frame
-from lightpaint.paint.launch import subject_of, subjects_of
+from lightpaint.paint.background_threads import BackgroundThreads
+from lightpaint.paint.frames import from_frame, to_frame
+from lightpaint.paint.launch import make_subject, make_subjects
 from lightpaint.paint.protocol import VERSION
-from lightpaint.paint.store.light_requests import Wishes
+from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.store.steps import Identity, Step
 from lightpaint.paint.store.store import Store
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
@@ -103,7 +103,7 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     ]
     assert values["options"] == ("--spp=8",)
     paintings = {"a": "x/painting-a.exr", "b c": "x/painting-b c.exr"}
-    command = solve_command("scene.xml", paintings, values["options"], Wishes())
+    command = solve_command("scene.xml", paintings, values["options"], LightRequests())
     words = shlex.split(command)[1:]
     options = command_parser().parse_args(words)
     assert options.views == list(paintings.items())
@@ -111,8 +111,10 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     write_basis("side.basis.exr", replace(basis, origin=replace(basis.origin, sensor="side")))
     values = asked("room.basis.exr side.basis.exr")
     assert values["folder"] == Path("room.paint")
-    subjects = subjects_of(values["sources"], Path("x"))
-    found = [(subject.basis.origin.sensor, subject.among) for subject in subjects if subject.basis]
+    subjects = make_subjects(values["sources"], Path("x"))
+    found = [
+        (subject.basis.origin.sensor, subject.view_count) for subject in subjects if subject.basis
+    ]
     assert found == [(basis.origin.sensor, 2), ("side", 2)]
 
 
@@ -141,7 +143,7 @@ def test_what_cannot_be_painted_is_said_in_one_line(here: Path, line: str, said:
 
 @pytest.mark.usefixtures("here")
 def test_a_subject_of_light_groups_knows_them() -> None:
-    subject = subject_of(asked("groups.exr")["sources"][0], Path("x"))
+    subject = make_subject(asked("groups.exr")["sources"][0], Path("x"))
     assert subject.groups is not None
     assert subject.basis is subject.groups.basis
     assert subject.scene is None
@@ -234,7 +236,7 @@ def test_a_program_connects_by_one_line_or_by_a_file_of_its_owner(here: Path) ->
                 ) as socket:
                     state = said(socket, 0, "observe", version=VERSION)
                     if state["kind"] == "waiting":
-                        state = of_frame(bytes(socket.recv(timeout=60)))[0]
+                        state = from_frame(bytes(socket.recv(timeout=60)))[0]
                     assert state["kind"] == "state"
                     names = [light["name"] for light in state["lights"]]
                     lights = {names[0]: [1.0, 1.0, 1.0]}
@@ -298,7 +300,7 @@ def said(socket: ClientConnection, seq: int, kind: str, **fields: Any) -> dict[s
     while True:
         frame = socket.recv(timeout=60)
         assert isinstance(frame, bytes)
-        content, _ = of_frame(frame)
+        content, _ = from_frame(frame)
         if "size" in content if kind == "hello" else content.get("reply") == seq:
             return content
 
@@ -313,11 +315,11 @@ def test_who_is_being_started_is_not_waited_for(monkeypatch: pytest.MonkeyPatch)
     def interrupted(_: threading.Thread) -> None:
         raise KeyboardInterrupt
 
-    threads = Threads(lambda _: None)
+    threads = BackgroundThreads(lambda _: None)
     monkeypatch.setattr(threading.Thread, "start", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        threads.begin(lambda: None, "x")
-    threads.wait()
+        threads.start(lambda: None, "x")
+    threads.join_all()
 
 
 def test_what_was_answered_is_there_after_a_kill(here: Path) -> None:

@@ -32,7 +32,7 @@ def test_a_taken_port_is_told_and_the_usual_one_given_up() -> None:
         with pytest.raises(PaintError, match=f"cannot listen at 127.0.0.1:{its.port}: .*port="):
             listen("127.0.0.1", its.port)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(address, "PORT", its.port)
+            patch.setattr(address, "DEFAULT_PORT", its.port)
             other, there = listen()
             other.close()
             assert there.port not in (0, its.port)
@@ -44,7 +44,7 @@ def test_by_itself_it_listens_to_the_machine_only() -> None:
     made = Server(FakeSession(), port=0)
     assert made._socket.getsockname()[0] == "127.0.0.1"
     assert made.url.startswith(f"http://127.0.0.1:{made.port}/#token=")
-    assert made.url_once() != made.url
+    assert made.one_time_url() != made.url
     made.close()
 
 
@@ -73,7 +73,7 @@ def test_who_can_reach_it_is_known_and_its_address_leads_there(
         assert its.reach is reach
         assert its.name == (name or its.name)
         assert its.name not in ("", "0.0.0.0", "[::]", "::")
-        for url in (its.url, its.url_here):
+        for url in (its.url, its.local_url):
             place = url.removeprefix("http://").rstrip("/").rpartition(":")[0].strip("[]")
             with closing(socket.create_connection((place, its.port), 5)):
                 made.accept()[0].close()
@@ -84,7 +84,7 @@ def test_an_address_of_ipv6_alone_leads_there_too(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(socket, "has_dualstack_ipv6", lambda: False)
     made, its = listen("::", 0)
     with made:
-        for url in (its.url, its.url_here):
+        for url in (its.url, its.local_url):
             place = url.removeprefix("http://").rstrip("/").rpartition(":")[0].strip("[]")
             socket.create_connection((place, its.port), 5).close()
 
@@ -126,7 +126,7 @@ def test_the_page_is_there_where_the_address_says(monkeypatch: pytest.MonkeyPatc
     serving = threading.Thread(target=made.run, daemon=True)
     serving.start()
     try:
-        for url in (made.url, made.url_once()):
+        for url in (made.url, made.one_time_url()):
             with urllib.request.urlopen(url, timeout=10) as answer:
                 assert answer.status == 200
     finally:

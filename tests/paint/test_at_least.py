@@ -15,8 +15,8 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.images.formats.exr import ExrPart, write_parts
 from lightpaint.paint import protocol
 from lightpaint.paint.notebook import widget_arguments as cells
-from lightpaint.paint.session.look_library import Looks
-from lightpaint.paint.session.picture_table import Pictures
+from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
@@ -70,7 +70,7 @@ def _session(basis: lp.Basis, store: Store | None = None) -> Session:
 
 
 def _set(session: Session, target: lp.Target) -> None:
-    session.load(*cells.of_target(session, target))
+    session.load(*cells.load_target(session, target))
 
 
 def _paint(session: Session, stroke: int, region: Any, change: Any, *, done: bool = True) -> None:
@@ -78,7 +78,7 @@ def _paint(session: Session, stroke: int, region: Any, change: Any, *, done: boo
     image, importance, _ = session.views[0].pixels(region)
     change(image, importance)
     arrays = {"image": image, "importance": importance}
-    session.said(protocol.Paint(stroke, region, done), arrays)
+    session.handle(protocol.Paint(stroke, region, done), arrays)
 
 
 def _corner(image: Any, importance: Any) -> None:
@@ -95,7 +95,7 @@ def _marks(session: Session) -> Any:
 def test_the_answer_is_that_of_the_file(basis: lp.Basis):
     target, session = _clipped(basis), _session(basis)
     _set(session, target)
-    solution = session.moment().solution()
+    solution = session.snapshot().solution()
     assert solution is not None
     expected = lp.solve(basis, target, **LINEAR).weights
     np.testing.assert_allclose(solution.weights, expected, rtol=1e-9)
@@ -114,9 +114,9 @@ def test_paint_means_what_it_says_and_what_it_leaves_means_what_it_did(basis: lp
     expected[2:4, 3:12] = False
     assert (expected != target.at_least).any()
     np.testing.assert_array_equal(_marks(session), expected)
-    session.said(protocol.Undo(), {})
+    session.handle(protocol.Undo(), {})
     np.testing.assert_array_equal(_marks(session), target.at_least)
-    session.said(protocol.Redo(), {})
+    session.handle(protocol.Redo(), {})
     np.testing.assert_array_equal(_marks(session), expected)
     # What counts more is the same light.
     _paint(session, 2, WHOLE, lambda _, importance: importance.__imul__(3))
@@ -124,7 +124,7 @@ def test_paint_means_what_it_says_and_what_it_leaves_means_what_it_did(basis: lp
     # Nothing is painted there any more.
     _paint(session, 3, WHOLE, lambda _, importance: importance.__imul__(0))
     assert session.target() is None
-    session.said(protocol.Undo(), {})
+    session.handle(protocol.Undo(), {})
     np.testing.assert_array_equal(_marks(session), expected)
 
 
@@ -147,7 +147,7 @@ def test_a_stroke_may_change_its_mind(basis: lp.Basis):
     expected[8, 3:12] = False
     np.testing.assert_array_equal(_marks(session), expected)
     _paint(session, 2, BRUSH, _corner, done=False)
-    session.said(protocol.Drop(2), {})
+    session.handle(protocol.Drop(2), {})
     np.testing.assert_array_equal(_marks(session), expected)
 
 
@@ -178,21 +178,21 @@ def test_any_sequence_is_a_rebuild_and_never_says_it_of_paint(done: Any):
                     erase = lambda _, importance: importance.__imul__(0)  # noqa: E731
                     _paint(session, stroke, region, erase, done=is_done)
                 case "undo":
-                    session.said(protocol.Undo(), {})
+                    session.handle(protocol.Undo(), {})
                 case "redo":
-                    session.said(protocol.Redo(), {})
+                    session.handle(protocol.Redo(), {})
                 case "drop":
-                    session.said(protocol.Drop(stroke), {})
+                    session.handle(protocol.Drop(stroke), {})
                 case "improve":
                     session.improve([basis], [basis.present_look])
                 case "set":
                     _set(session, target)
         except lp.LightpaintError:
             pass
-    session.said(protocol.Drop(0), {})
+    session.handle(protocol.Drop(0), {})
     canvas, again = session.views[0], _session(basis, store).views[0]
-    assert canvas.pixels(canvas.whole).same(again.pixels(again.whole))
-    _, importance, at_least = canvas.pixels(canvas.whole)
+    assert canvas.pixels(canvas.full_region).equals(again.pixels(again.full_region))
+    _, importance, at_least = canvas.pixels(canvas.full_region)
     if at_least is not None:
         assert (importance > 0)[at_least.any(axis=-1)].all()
         assert (canvas.image[at_least] == target.image[at_least]).all()
@@ -203,22 +203,22 @@ def test_it_is_in_files_and_looks(basis: lp.Basis, tmp_path: Path):
     target = _clipped(basis)
     with Store.open(tmp_path / "a.db", Identity.of([basis])) as store:
         session = _session(basis, store)
-        looks = Looks(session, Pictures())
+        looks = LookLibrary(session, PictureTable())
         _set(session, target)
-        looks.said(protocol.SaveLook("white"))
+        looks.handle(protocol.SaveLook("white"))
         _paint(session, 1, BRUSH, _corner)
         marks = _marks(session)
-        looks.said(protocol.SaveLook("a corner less"))
+        looks.handle(protocol.SaveLook("a corner less"))
         write_painting(tmp_path / "a.exr", session.target())
     with Store.open(tmp_path / "a.db", Identity.of([basis])) as store:
         session = _session(basis, store)
         np.testing.assert_array_equal(_marks(session), marks)
-        looks = Looks(session, Pictures())
-        first, second = looks.listed()
+        looks = LookLibrary(session, PictureTable())
+        first, second = looks.infos()
         looks.load(protocol.LoadLook(first.id))
         np.testing.assert_array_equal(_marks(session), target.at_least)
-        looks.said(protocol.MixLooks(first.id, second.id, 0.5, "between"))
-        looks.load(protocol.LoadLook(looks.listed()[-1].id))
+        looks.handle(protocol.MixLooks(first.id, second.id, 0.5, "between"))
+        looks.load(protocol.LoadLook(looks.infos()[-1].id))
         np.testing.assert_array_equal(_marks(session), marks)
     read = lp.read_target(tmp_path / "a.exr")
     np.testing.assert_array_equal(read.at_least, marks)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from lightpaint.errors import OutputError
-from lightpaint.paint.server.connection_file import CONNECTION, ConnectionFile
+from lightpaint.paint.server.connection_file import CONNECTION_FILE, ConnectionFile
 
 
 def about(token: str) -> dict[str, Any]:
@@ -33,7 +33,7 @@ def test_only_its_owner_reads_it_whatever_the_mask(tmp_path: Path, mask: int) ->
 
 def test_what_a_killed_painter_left_is_replaced_whoever_could_read_it(tmp_path: Path) -> None:
     ConnectionFile(tmp_path, about("killed")).write()
-    path = tmp_path / CONNECTION
+    path = tmp_path / CONNECTION_FILE
     path.chmod(0o644)
     with path.open() as reader:  # who has it open reads the old one
         file = ConnectionFile(tmp_path, about("new"))
@@ -47,7 +47,7 @@ def test_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
     elsewhere, folder = tmp_path / "elsewhere", tmp_path / "room.paint"
     elsewhere.write_text("mine")
     folder.mkdir()
-    (folder / CONNECTION).symlink_to(elsewhere)
+    (folder / CONNECTION_FILE).symlink_to(elsewhere)
     file = ConnectionFile(folder, about("a"))
     file.write()
     assert elsewhere.read_text() == "mine"

@@ -11,8 +11,8 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.paint.launch import subject_of
-from lightpaint.paint.session_exports import picture, verified
+from lightpaint.paint.launch import make_subject
+from lightpaint.paint.session_exports import answer_png, render_verification
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile
 
@@ -22,15 +22,15 @@ def test_a_verifying_render_writes_nothing_beside_the_scene(tmp_path: Path) -> N
     """A kill would leave it there."""
     (tmp_path / "scene").mkdir()
     path = write_room(tmp_path / "scene")
-    subject = subject_of(SceneFile(str(path)), tmp_path / "s", settings=Settings(spp=4))
-    basis = lp.render_basis(subject.loaded, spp=4)
+    subject = make_subject(SceneFile(str(path)), tmp_path / "s", settings=Settings(spp=4))
+    basis = lp.render_basis(subject.loaded_scene, spp=4)
     lighting = Lighting.of_weights(basis, 2 * basis.present_weights)
     there, seen = set(path.parent.iterdir()), []
 
     def hears(label: str, done: int, total: int, unit: str = "passes") -> None:
         seen.append(set(path.parent.iterdir()))
 
-    picture, said, _ = verified(subject, basis, lighting, hears)
+    picture, said, _ = render_verification(subject, basis, lighting, hears)
     assert seen
     assert all(files == there for files in seen)
     assert "A render of 4 samples per pixel" in said
@@ -47,7 +47,7 @@ def test_a_picture_of_the_answer_is_what_the_view_shows(
     basis = make_basis(images=images, emission=np.ones((2, 3)))
     lighting = Lighting.of_weights(basis, np.array([[0.5, 0.4, 0.3], [0.2, 0.2, 0.6]]))
     path = tmp_path / "answer.png"
-    path.write_bytes(picture(basis, lighting, transform))
+    path.write_bytes(answer_png(basis, lighting, transform))
     shown = np.asarray(Image.open(path)) / 255
     answered = lp.combine(basis, lighting).image
     clean = denoised(answered, basis.features)

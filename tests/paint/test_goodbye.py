@@ -17,8 +17,8 @@ def deaf(serving: Serving) -> Page:
 
 def unsent(serving: Serving) -> list[int]:
     """Bytes that wait in the server for each of its connections."""
-    assert serving.server._serving is not None
-    connections = list(serving.server._serving.server_state.connections)
+    assert serving.server._uvicorn is not None
+    connections = list(serving.server._uvicorn.server_state.connections)
     return [c.transport.get_write_buffer_size() for c in connections]
 
 
@@ -40,8 +40,8 @@ def test_a_page_that_is_at_its_own_goodbye_is_no_error(serving: Serving) -> None
     page = deaf(serving)
     until(lambda: any(unsent(serving)), "the system takes it all")
     page.says_goodbye()
-    assert serving.server._serving is not None
-    [connection] = serving.server._serving.server_state.connections
+    assert serving.server._uvicorn is not None
+    [connection] = serving.server._uvicorn.server_state.connections
     until(connection.transport.is_closing, "the goodbye is not heard")
     serving.end()
 

@@ -15,7 +15,7 @@ from starlette.websockets import WebSocketDisconnect
 
 import lightpaint as lp
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import of_frame, to_frame
+from lightpaint.paint.frames import from_frame, to_frame
 from lightpaint.paint.protocol import (
     VERSION,
     CanvasPatch,
@@ -32,9 +32,9 @@ from lightpaint.paint.server import client, session_clients
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
 from lightpaint.paint.server.server import page_app
-from lightpaint.paint.server.session_clients import Line
-from lightpaint.paint.session.look_library import MOST_PROPOSALS, Looks
-from lightpaint.paint.session.picture_table import Pictures
+from lightpaint.paint.server.session_clients import Connections
+from lightpaint.paint.session.look_library import MAX_PROPOSALS, LookLibrary
+from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
@@ -50,7 +50,7 @@ class Served:
 
     def __init__(self) -> None:
         self.session = FakeSession()
-        self.line = Line(self.session, None)
+        self.line = Connections(self.session, None)
         self.guard = Guard(_nothing, address=HERE)
         self.guard.app = page_app(self.line, files={}, is_program=self.guard.is_program)
         self.browser = TestClient(self.guard, base_url=f"http://{HOST}")
@@ -85,7 +85,7 @@ def say(socket: WebSocketTestSession, kind: str, seq: int = 1, **fields: Any) ->
 
 
 def hear(socket: WebSocketTestSession) -> dict[str, Any]:
-    return of_frame(socket.receive_bytes())[0]
+    return from_frame(socket.receive_bytes())[0]
 
 
 def paint(socket: WebSocketTestSession, seq: int, *, done: bool) -> None:
@@ -114,7 +114,7 @@ def test_a_wrong_token_is_refused(served: Served, token: str) -> None:
 def test_what_opens_pages_opens_no_program_and_the_other_way_round(served: Served) -> None:
     guard = served.guard
     key = served.browser.get("/key", headers=bearer(guard.token)).text
-    for token in (guard.token, guard.once(), key):
+    for token in (guard.token, guard.one_time_token(), key):
         with pytest.raises(REFUSED), served.program(token):
             pass
     assert len({guard.token, guard.program_token, key}) == 3
@@ -218,7 +218,7 @@ def test_who_has_the_session_does_not_become_an_observer(served: Served) -> None
 def test_observers_are_few_and_speak_this_version(
     served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(session_clients, "MOST_OBSERVERS", 1)
+    monkeypatch.setattr(session_clients, "MAX_OBSERVERS", 1)
     with served.program() as one, served.program() as other:
         say(one, "observe", version=VERSION + 1)
         assert hear(one)["reason"] == "version"
@@ -260,7 +260,7 @@ def test_a_proposal_is_heard_of_where_somebody_paints(served: Served) -> None:
     def said(said: Any, arrays: Any) -> list[Message]:
         return [LookList(looks=(), resources={})]
 
-    served.session.said = said  # type: ignore[method-assign]
+    served.session.handle = said  # type: ignore[method-assign]
     with served.page() as page, served.program() as program:
         say(page, "hello", version=VERSION)
         hear(page)
@@ -285,17 +285,17 @@ class Deaf:
 
 
 def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() -> None:
-    line = Line(FakeSession(), None)
+    line = Connections(FakeSession(), None)
     slow = client.Client(Deaf())
-    slow.observes = True
+    slow.is_observer = True
     line._clients.add(slow)
     history = HistoryInfo(("stroke",), (), 1)
-    line._tell_observers(fake_answer(version=0, history=history, asked={"lamp": {"off": True}}))
+    line._send_to_observers(fake_answer(version=0, history=history, asked={"lamp": {"off": True}}))
     for k in range(1, 2000):
-        line._tell_observers(fake_answer(version=k))
-        line._tell_observers(fake_progress("basis", k))
-        line._tell_observers(fake_state({"present": k}))
-        line._tell_observers(PictureUpdate(resources={"present": k}))
+        line._send_to_observers(fake_answer(version=k))
+        line._send_to_observers(fake_progress("basis", k))
+        line._send_to_observers(fake_state({"present": k}))
+        line._send_to_observers(PictureUpdate(resources={"present": k}))
     unsent = [message.fields for message, _ in slow._unsent]
     assert [one.get("version") for one in unsent] == [1999, None, VERSION, None]
     assert unsent[0]["history"]["count"] == 1
@@ -303,8 +303,8 @@ def test_what_waits_for_a_slow_observer_is_replaced_and_nothing_asked_is_lost() 
 
 
 def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
-    line, slow = Line(FakeSession(), None), client.Client(Deaf())
-    slow.observes = True
+    line, slow = Connections(FakeSession(), None), client.Client(Deaf())
+    slow.is_observer = True
     line._clients.add(slow)
     pixels = np.zeros((1, 1, 3), np.float32)
     patch = CanvasPatch(
@@ -319,7 +319,7 @@ def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
         importance=pixels[..., 0],
         weights=np.ones((2, 3)),
     )
-    line._tell_observers(patch)
+    line._send_to_observers(patch)
     [(told, _)] = slow._unsent
     assert told.kind == "answer"
     assert list(told.arrays) == ["weights"]
@@ -329,7 +329,7 @@ def test_of_what_a_canvas_holds_observers_get_the_lighting() -> None:
 
 
 @pytest.fixture
-def looks(make_basis: Any) -> tuple[Session, Looks]:
+def looks(make_basis: Any) -> tuple[Session, LookLibrary]:
     basis = make_basis(3)
     session = Session(
         [basis],
@@ -338,14 +338,14 @@ def looks(make_basis: Any) -> tuple[Session, Looks]:
         settings=Settings(),
         transform=lp.ViewTransform(),
     )
-    return session, Looks(session, Pictures())
+    return session, LookLibrary(session, PictureTable())
 
 
-def test_a_proposal_is_a_look_that_holds_its_lighting(looks: tuple[Session, Looks]) -> None:
+def test_a_proposal_is_a_look_that_holds_its_lighting(looks: tuple[Session, LookLibrary]) -> None:
     session, its = looks
     first, second, third = session.basis.names
     before = session.weights.copy()
-    told = its.said(Propose("evening", {first: (1.0, 2.0, 3.0), second: (0.0, 0.0, 0.0)}))
+    told = its.handle(Propose("evening", {first: (1.0, 2.0, 3.0), second: (0.0, 0.0, 0.0)}))
     assert isinstance(told, LookList)
     [look] = told.looks
     assert look.is_proposal
@@ -354,26 +354,26 @@ def test_a_proposal_is_a_look_that_holds_its_lighting(looks: tuple[Session, Look
     np.testing.assert_allclose(look.weights, wanted)
     its.load(LoadLook(look.id))
     np.testing.assert_allclose(session.weights, wanted)
-    assert third in session.wishes.lights
+    assert third in session.requests.lights
 
 
 def test_a_later_proposal_of_the_name_takes_its_place_but_never_that_of_a_look(
-    looks: tuple[Session, Looks],
+    looks: tuple[Session, LookLibrary],
 ) -> None:
     session, its = looks
     name = session.basis.names[0]
-    its.said(SaveLook("evening"))
+    its.handle(SaveLook("evening"))
     for level in (1.0, 2.0):
-        its.said(Propose("evening", {name: (level, level, level)}))
-    kept, proposed = its.listed()
+        its.handle(Propose("evening", {name: (level, level, level)}))
+    kept, proposed = its.infos()
     assert (kept.is_proposal, proposed.is_proposal) == (False, True)
     assert proposed.weights[0] == (2.0, 2.0, 2.0)
-    its.said(RenameLook(proposed.id, "evening"))
-    its.said(Propose("evening", {}))
-    assert [look.is_proposal for look in its.listed()] == [False, False, True]
+    its.handle(RenameLook(proposed.id, "evening"))
+    its.handle(Propose("evening", {}))
+    assert [look.is_proposal for look in its.infos()] == [False, False, True]
 
 
-def test_a_proposal_that_cannot_be_is_refused(looks: tuple[Session, Looks]) -> None:
+def test_a_proposal_that_cannot_be_is_refused(looks: tuple[Session, LookLibrary]) -> None:
     session, its = looks
     name = session.basis.names[0]
     for lights, words in (
@@ -382,10 +382,10 @@ def test_a_proposal_that_cannot_be_is_refused(looks: tuple[Session, Looks]) -> N
         ({name: (float("nan"), 1.0, 1.0)}, "expected numbers >= 0"),
     ):
         with pytest.raises(PaintError, match=words):
-            its.said(Propose("x", lights))
-    assert its.listed() == ()
-    for k in range(MOST_PROPOSALS):
-        its.said(Propose(f"look {k}", {}))
+            its.handle(Propose("x", lights))
+    assert its.infos() == ()
+    for k in range(MAX_PROPOSALS):
+        its.handle(Propose(f"look {k}", {}))
     with pytest.raises(PaintError, match="are there already"):
-        its.said(Propose("one more", {}))
-    its.said(Propose("look 0", {}))
+        its.handle(Propose("one more", {}))
+    its.handle(Propose("look 0", {}))

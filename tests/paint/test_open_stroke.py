@@ -32,22 +32,22 @@ def test_what_was_before_is_given_back(regions: list[Region], is_marked: bool, s
     marks = np.random.default_rng(1).random((HEIGHT, WIDTH, 3)) > 0.5 if is_marked else None
     painting = picture(0, marks)
     before = painting.copy()
-    with patch.object(open_stroke, "SIDE", side):
+    with patch.object(open_stroke, "SQUARE_SIDE", side):
         stroke = OpenStroke()
         for k, region in enumerate(regions):
-            stroke.touches(region, painting)
+            stroke.touch(region, painting)
             new = picture(k + 1).part(region)
             painting.image[slices(region)] = new.image
             painting.importance[slices(region)] = new.importance
             if marks is not None:
                 marks[slices(region)] = False
-        found = stroke.before(painting)
+        found = stroke.pixels_before(painting)
     real = [(a, b, c, d) for a, b, c, d in regions if a < b and c < d]
     assert bool(stroke) == bool(real)
     if real:
         tops, bottoms, lefts, rights = zip(*real, strict=True)
         assert stroke.region == (min(tops), max(bottoms), min(lefts), max(rights))
-    assert found.same(before.part(stroke.region))
+    assert found.equals(before.part(stroke.region))
     # However often a stroke goes over a place, it is kept once.
     kept = sum(pixels.importance.size for pixels in stroke._before.values())
     assert kept <= HEIGHT * WIDTH

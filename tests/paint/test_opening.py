@@ -18,9 +18,9 @@ from lightpaint.basis.render.render import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
-from lightpaint.paint.launch import subject_of
-from lightpaint.paint.lazy_scene import Opening
-from lightpaint.paint.session_file import identity_of
+from lightpaint.paint.launch import make_subject
+from lightpaint.paint.lazy_scene import LazyScene
+from lightpaint.paint.session_file import session_identity
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject
@@ -41,7 +41,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def opened(path: Path, **settings: Any) -> Subject:
-    return subject_of(SceneFile(str(path)), path.parent / "s", settings=Settings(**settings))
+    return make_subject(SceneFile(str(path)), path.parent / "s", settings=Settings(**settings))
 
 
 def kept(path: Path, make_basis: Any, meanwhile: Callable[[], object] = lambda: None) -> lp.Basis:
@@ -50,9 +50,9 @@ def kept(path: Path, make_basis: Any, meanwhile: Callable[[], object] = lambda: 
     meanwhile: happens between the two.
     """
     first = opened(path)
-    assert identity_of([first]) is None
-    scene, opening = first.loaded, first.scene
-    assert isinstance(opening, Opening)
+    assert session_identity([first]) is None
+    scene, opening = first.loaded_scene, first.scene
+    assert isinstance(opening, LazyScene)
     made = make_basis(len(scene.lights), scene.size)
     origin = replace(
         made.origin,
@@ -85,14 +85,14 @@ def test_nothing_is_known_of_a_scene_where_the_clock_was_set_meanwhile(
     now = time.time
     kept(path, make_basis, lambda: monkeypatch.setattr(time, "time", lambda: now() + set_by))
     monkeypatch.setattr(time, "time", now)
-    assert identity_of([opened(path)]) is None
+    assert session_identity([opened(path)]) is None
 
 
 def test_a_known_scene_is_painted_without_being_loaded(
     path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     basis = kept(path, make_basis)
-    identity = identity_of([opened(path)], {0: opened(path).loaded})
+    identity = session_identity([opened(path)], {0: opened(path).loaded_scene})
 
     def loads(**_: Any) -> None:
         raise AssertionError("the scene is loaded")
@@ -100,9 +100,9 @@ def test_a_known_scene_is_painted_without_being_loaded(
     with monkeypatch.context() as patch:
         patch.setattr("lightpaint.pipeline.sources.load_scene", loads)
         subject = opened(path)
-        assert identity_of([subject]) == identity
-        assert subject.wanted == basis.origin.spp
-        assert isinstance(subject.scene, Opening)
+        assert session_identity([subject]) == identity
+        assert subject.target_spp == basis.origin.spp
+        assert isinstance(subject.scene, LazyScene)
         assert subject.scene.remarks == ("a remark",)
         [found] = subject.bases()
         assert found.lights == basis.lights
@@ -112,13 +112,13 @@ def test_a_known_scene_is_painted_without_being_loaded(
             next(opened(path, spp=4 * basis.origin.spp).bases())
         asked = lp.Constraints.of({"nobody": {"lock": True}})
         with pytest.raises(ConstraintError, match="nobody"):
-            subject_of(SceneFile(str(path)), path.parent / "s", constraints=asked)
+            make_subject(SceneFile(str(path)), path.parent / "s", constraints=asked)
     # Whoever exports gets the scene that was painted, or is told.
-    assert subject.loaded.identity == basis.origin.scene_identity
+    assert subject.loaded_scene.identity == basis.origin.scene_identity
     other = opened(path)
     path.write_text(path.read_text().replace("</scene>", "<!-- later --></scene>"))
     with pytest.raises(PaintError, match="not what it was when this session was opened"):
-        _ = other.loaded
+        _ = other.loaded_scene
 
 
 def test_what_is_wrong_with_a_scene_ends_the_painter_in_one_line(tmp_path: Path) -> None:

@@ -16,22 +16,22 @@ from hypothesis.extra import numpy as arrays
 from raw_message import RawMessage
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import DTYPES, MAX_TEXT, of_frame, said_of, to_frame
+from lightpaint.paint.frames import DTYPES, MAX_TEXT, from_frame, parse_request, to_frame
 from lightpaint.paint.protocol import (
     EVENTS,
-    KINDS,
+    REQUESTS,
     VERSION,
     Findings,
     LightAnswer,
     Paint,
     Set,
     TakeOver,
-    Tie,
+    TieLights,
     document,
     typescript,
 )
-from lightpaint.paint.server.session_clients import MOST_OBSERVERS
-from lightpaint.paint.session.look_library import MOST_PROPOSALS
+from lightpaint.paint.server.session_clients import MAX_OBSERVERS
+from lightpaint.paint.session.look_library import MAX_PROPOSALS
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 PLAIN = st.recursive(
@@ -57,7 +57,7 @@ FINITE = arrays.arrays(
 def test_what_a_session_says_arrives(fields: Any, given_arrays: Any, reply: int | None) -> None:
     message = RawMessage("say", fields, given_arrays)
     frame = to_frame(message.content(reply), message.buffers())
-    content, buffers = of_frame(frame)
+    content, buffers = from_frame(frame)
     assert content.pop("kind") == "say"
     assert content.pop("reply", None) == reply
     described = content.pop("buffers")
@@ -83,7 +83,7 @@ def _finite(value: Any) -> Any:
 def test_paint_arrives_to_the_last_bit(seq: int, image: Any, stroke: int, done: bool) -> None:
     fields = {"seq": seq, "stroke": stroke, "region": [1, 3, 0, 3], "done": done}
     message = RawMessage("paint", fields, {"image": image, "importance": image[..., 0]})
-    number, said, got = said_of(*of_frame(to_frame(message.content(), message.buffers())))
+    number, said, got = parse_request(*from_frame(to_frame(message.content(), message.buffers())))
     assert number == seq
     assert said == Paint(stroke, (1, 3, 0, 3), done)
     assert got["image"].tobytes() == image.tobytes()
@@ -93,20 +93,21 @@ def test_paint_arrives_to_the_last_bit(seq: int, image: Any, stroke: int, done: 
 def test_what_is_said_is_read_as_it_is_meant() -> None:
     for kind, fields, meant in (
         ("take_over", {}, TakeOver()),
-        ("tie", {"ties": [["a", "b"], []]}, Tie((("a", "b"), ()))),
+        ("tie", {"ties": [["a", "b"], []]}, TieLights((("a", "b"), ()))),
         (
             "set",
             {"values": {"hold": None, "space": "display"}},
             Set({"hold": None, "space": "display"}),
         ),
     ):
-        assert said_of({"kind": kind, "seq": 0, **fields}, [])[1] == meant
-    assert all(kind.__name__.lower() == name.replace("_", "") for name, kind in KINDS.items())
+        assert parse_request({"kind": kind, "seq": 0, **fields}, [])[1] == meant
+    names = {name.replace("_", ""): kind.__name__.lower() for name, kind in REQUESTS.items()}
+    assert all(kind.startswith(name) for name, kind in names.items())
 
 
 def _refused(frame: bytes) -> None:
     with suppress(PaintError):
-        said_of(*of_frame(frame))
+        parse_request(*from_frame(frame))
 
 
 @given(st.binary(max_size=300))
@@ -122,7 +123,7 @@ def test_any_json_is_refused_or_read(content: Any) -> None:
 
 @given(
     st.fixed_dictionaries(
-        {"kind": st.sampled_from([*KINDS, "x"]), "seq": st.just(1) | PLAIN},
+        {"kind": st.sampled_from([*REQUESTS, "x"]), "seq": st.just(1) | PLAIN},
         optional={
             "buffers": st.lists(
                 st.fixed_dictionaries(
@@ -156,7 +157,7 @@ def test_a_frame_cut_short_is_refused(image: Any, data: Any) -> None:
     frame = to_frame(message.content(), message.buffers())
     end = data.draw(st.integers(0, len(frame) - 1))
     with pytest.raises(PaintError):
-        said_of(*of_frame(frame[:end]))
+        parse_request(*from_frame(frame[:end]))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
@@ -166,31 +167,31 @@ def test_what_is_no_number_is_refused(value: float, dtype: str) -> None:
     array[0, 1, 2] = value
     message = RawMessage("paint", {"seq": 1, "stroke": 1, "region": [0, 1, 0, 2]}, {"image": array})
     with pytest.raises(PaintError, match="NaN or Inf"):
-        said_of(*of_frame(to_frame(message.content(), message.buffers())))
+        parse_request(*from_frame(to_frame(message.content(), message.buffers())))
 
 
 def test_two_buffers_of_one_name_are_refused() -> None:
     about = {"name": "image", "dtype": "uint8", "shape": [1]}
     with pytest.raises(PaintError, match="image"):
-        said_of({"kind": "undo", "seq": 1, "buffers": [about, about]}, [b"a", b"b"])
+        parse_request({"kind": "undo", "seq": 1, "buffers": [about, about]}, [b"a", b"b"])
 
 
 def test_lengths_that_nobody_has_are_refused_at_once() -> None:
     for length in (MAX_TEXT + 1, 2**32 - 1):
         with pytest.raises(PaintError):
-            of_frame(struct.pack("<I", length) + bytes(16))
+            from_frame(struct.pack("<I", length) + bytes(16))
     about = {"name": "image", "dtype": "float64", "shape": [65536] * 4}
     with pytest.raises(PaintError, match="shorter"):
-        of_frame(to_frame({"kind": "paint", "seq": 1, "buffers": [about]}, []))
+        from_frame(to_frame({"kind": "paint", "seq": 1, "buffers": [about]}, []))
     deep = b"[" * 50_000
     with pytest.raises(PaintError, match="no JSON"):
-        of_frame(struct.pack("<I", len(deep)) + deep)
+        from_frame(struct.pack("<I", len(deep)) + deep)
 
 
 def test_a_refusal_is_short_whatever_is_refused() -> None:
     for content in ({"version": "x" * 10**5}, {"version": 1, "x\n" * 10**4: 1}):
         with pytest.raises(PaintError) as refusal:
-            said_of({"kind": "hello", "seq": 1, **content}, [])
+            parse_request({"kind": "hello", "seq": 1, **content}, [])
         assert len(str(refusal.value)) < 500
 
 
@@ -200,7 +201,7 @@ def test_the_types_of_the_page_are_those_of_the_messages() -> None:
 
 
 def test_every_message_says_what_it_is() -> None:
-    for message in (*KINDS.values(), *EVENTS.values()):
+    for message in (*REQUESTS.values(), *EVENTS.values()):
         assert message.__doc__
         assert not message.__doc__.startswith(f"{message.__name__}(")
         assert message.__dataclass_params__.frozen
@@ -225,11 +226,11 @@ def test_what_is_left_out_and_what_is_null() -> None:
 def test_the_document_has_every_message_as_it_is() -> None:
     """Run `python -m lightpaint.paint.protocol.document docs/protocol.md` after a change."""
     text = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
-    assert document.with_sections(text) == text
-    for kind in (*KINDS, *EVENTS):
+    assert document.replace_sections(text) == text
+    for kind in (*REQUESTS, *EVENTS):
         assert f"### `{kind}`" in text
     assert f'"protocol": {VERSION}' in text
-    for most in (MOST_OBSERVERS, MOST_PROPOSALS):
+    for most in (MAX_OBSERVERS, MAX_PROPOSALS):
         assert re.search(rf"\b{most}\b", text)
     for dtype in DTYPES:
         assert f"`{dtype}`" in text

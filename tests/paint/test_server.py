@@ -23,19 +23,19 @@ from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketT
 from starlette.websockets import WebSocketDisconnect
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import of_frame, to_frame
+from lightpaint.paint.frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION, Message, Paint, PictureData, PictureUpdate
 from lightpaint.paint.server import client, server
 from lightpaint.paint.server.address import Address, Reach
 from lightpaint.paint.server.guard import Guard
 from lightpaint.paint.server.page_files import page_files
 from lightpaint.paint.server.server import page_app
-from lightpaint.paint.server.session_clients import Line
+from lightpaint.paint.server.session_clients import Connections
 
-PORT = 8421
-HOST = f"127.0.0.1:{PORT}"
+DEFAULT_PORT = 8421
+HOST = f"127.0.0.1:{DEFAULT_PORT}"
 REFUSED = (WebSocketDisconnect, WebSocketDenialResponse)
-HERE = Address("127.0.0.1", PORT, Reach.MACHINE, frozenset({"127.0.0.1"}))
+HERE = Address("127.0.0.1", DEFAULT_PORT, Reach.MACHINE, frozenset({"127.0.0.1"}))
 
 
 class Served:
@@ -48,7 +48,7 @@ class Served:
         (folder / "secret.py").write_text("secret", "utf-8")
         (folder / ".hidden.js").write_text("secret", "utf-8")
         self.session, self.said = FakeSession(), list[str]()
-        self.line = Line(self.session, None, self.said.append)
+        self.line = Connections(self.session, None, self.said.append)
         files = page_files(folder)
         app = page_app(self.line, files=files)
         self.guard = Guard(app, address=address, public=files)
@@ -95,7 +95,7 @@ def paint(seq: int, stroke: int = 1, region: tuple[int, ...] = (0, 1, 0, 1), **h
 
 
 def heard(socket: WebSocketTestSession) -> dict[str, Any]:
-    return of_frame(socket.receive_bytes())[0]
+    return from_frame(socket.receive_bytes())[0]
 
 
 def greet(socket: WebSocketTestSession, seq: int = 0) -> dict[str, Any]:
@@ -134,12 +134,12 @@ def test_the_token_is_exchanged_for_a_key_and_for_nothing_that_a_browser_keeps(
     for given in (token, key):
         for path in (f"/key?token={given}", f"/data/present?token={given}&key={given}"):
             assert stranger.browser.get(path).status_code == 403
-        cookie = {"cookie": f"lightpaint_{PORT}={given}; key={given}"}
+        cookie = {"cookie": f"lightpaint_{DEFAULT_PORT}={given}; key={given}"}
         assert stranger.browser.get("/data/present", headers=cookie).status_code == 403
 
 
 def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
-    token = stranger.guard.once()
+    token = stranger.guard.one_time_token()
     assert stranger.browser.head("/key", headers=bearer(token)).status_code == 410
     assert stranger.exchange(token).status_code == 200
     assert stranger.exchange(token).status_code == 410
@@ -148,7 +148,7 @@ def test_the_token_of_a_command_line_is_good_once(stranger: Served) -> None:
 def test_the_token_of_a_command_line_is_good_soon_whatever_the_clock_says(
     stranger: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    early, late = stranger.guard.once(), stranger.guard.once()
+    early, late = stranger.guard.one_time_token(), stranger.guard.one_time_token()
     now = time.monotonic()
     monkeypatch.setattr(time, "time", lambda: 0.0)
     assert stranger.exchange(early).status_code == 200
@@ -198,7 +198,8 @@ def test_a_page_of_an_earlier_launch_is_told_what_to_do(served: Served, tmp_path
 
 
 @pytest.mark.parametrize(
-    "host", ["evil.example", f"evil.example:{PORT}", "", "127.0.0.1.evil.example", "192.168.1.2"]
+    "host",
+    ["evil.example", f"evil.example:{DEFAULT_PORT}", "", "127.0.0.1.evil.example", "192.168.1.2"],
 )
 def test_another_name_is_refused_even_with_the_key(served: Served, host: str) -> None:
     for path in ("/", "/data/present"):
@@ -239,7 +240,7 @@ def test_a_socket_speaks_the_protocol_that_is_no_secret(served: Served) -> None:
 def test_where_others_are_let_in_addresses_are_right_and_foreign_names_are_not(
     tmp_path: Path,
 ) -> None:
-    everywhere = Address("192.168.1.2", PORT, Reach.ALL, frozenset({"studio"}))
+    everywhere = Address("192.168.1.2", DEFAULT_PORT, Reach.ALL, frozenset({"studio"}))
     served = Served(tmp_path / "page", everywhere)
     with served.browser:
         for host in ("192.168.1.2:8421", "[fe80::1]:8421", "Studio:8421", "127.0.0.1:8421"):
@@ -356,7 +357,7 @@ def test_each_message_is_answered_by_its_number(served: Served) -> None:
         assert (told["reply"], told["kind"], told["is_back"]) == (7, "state", False)
         assert greet(socket, 7) == told | {"is_back": True}
         socket.send_bytes(paint(8))
-        content, [weights] = of_frame(socket.receive_bytes())
+        content, [weights] = from_frame(socket.receive_bytes())
         assert (content["kind"], content["reply"]) == ("answer", 8)
         np.testing.assert_array_equal(np.frombuffer(weights, "<f8"), np.full(6, 3.0))
         socket.send_bytes(frame("undo", 9))
@@ -524,7 +525,7 @@ def test_all_are_told_of_the_end(stranger: Served) -> None:
     with stranger.socket() as socket:
         greet(socket)
         assert stranger.browser.portal is not None
-        stranger.browser.portal.call(stranger.line.end)
+        stranger.browser.portal.call(stranger.line.close)
         assert heard(socket)["reason"] == "ended"
     assert stranger.session.on_message is None
 
@@ -546,7 +547,7 @@ class Scripted:
         return self.to_hear.pop(0)
 
     async def send_bytes(self, data: bytes) -> None:
-        self.sent.append(of_frame(data)[0])
+        self.sent.append(from_frame(data)[0])
 
     async def close(self, code: int = 1000) -> None:
         """There is nothing to close."""
@@ -564,8 +565,8 @@ def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
     session.before_paint = lambda: time.sleep(0.02)
 
     async def trial() -> None:
-        its = Line(session, None)
-        its.begin()
+        its = Connections(session, None)
+        its.attach()
         strokes = [paint(k, stroke=k, done=True) for k in (1, 2, 3)]
         page = asyncio.ensure_future(its.serve(client.Client(Scripted(HELLO, *strokes), "a")))
         await asyncio.sleep(0.03)  # it has left, and is not done with
@@ -576,7 +577,7 @@ def test_what_a_page_says_last_is_done_though_it_has_gone() -> None:
             await asyncio.sleep(0.01)
         other.cancel()
         assert after.sent[0]["kind"] == "state"  # and not that it is open in another tab
-        await its.end()
+        await its.close()
 
     in_a_loop(trial)
     assert strokes_of(session) == [1, 2, 3, 4]
@@ -586,10 +587,10 @@ def test_a_page_that_greets_and_goes_is_not_waited_for() -> None:
     session = FakeSession()
 
     async def trial() -> None:
-        its = Line(session, None)
-        its.begin()
+        its = Connections(session, None)
+        its.attach()
         await its.serve(client.Client(Scripted(HELLO, HELLO, paint(1), HELLO), "a"))
-        await its.end()
+        await its.close()
 
     in_a_loop(trial)
     assert strokes_of(session) == [1]
@@ -600,13 +601,13 @@ def test_what_was_said_before_the_end_is_done() -> None:
     session.before_paint = lambda: time.sleep(0.02)
 
     async def trial() -> None:
-        its = Line(session, None)
-        its.begin()
+        its = Connections(session, None)
+        its.attach()
         socket = Scripted(HELLO, *(paint(k, stroke=k, done=True) for k in (1, 2, 3)), leaves=False)
         serving = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
         while not strokes_of(session):
             await asyncio.sleep(0.001)
-        await its.end()
+        await its.close()
         serving.cancel()
         assert socket.sent[-1]["reason"] == "ended"
 
@@ -618,8 +619,8 @@ def test_a_page_can_be_given_up_at_any_step() -> None:
     """Whoever gives it up, as a test client does when it leaves, hears of its own word alone."""
 
     async def given_up_after(steps: int, *, leaves: bool) -> None:
-        its = Line(FakeSession(), None)
-        its.begin()
+        its = Connections(FakeSession(), None)
+        its.attach()
         page = client.Client(Scripted(HELLO, leaves=leaves), "a")
         serving = asyncio.ensure_future(its.serve(page))
         for _ in range(steps):
@@ -631,7 +632,7 @@ def test_a_page_can_be_given_up_at_any_step() -> None:
         except asyncio.CancelledError as heard:
             words = heard.args
         assert words == ("given up",), steps
-        await its.end()
+        await its.close()
 
     for steps in range(40):
         for leaves in (False, True):
@@ -651,7 +652,7 @@ class Deaf:
         raise AssertionError
 
     async def send_bytes(self, data: bytes) -> None:
-        self.sent.append(of_frame(data)[0])
+        self.sent.append(from_frame(data)[0])
 
     async def close(self, code: int = 1000) -> None:
         self.sent.append({"kind": "close", "code": code})
@@ -687,7 +688,7 @@ def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Else pictures without number would wait for it in memory."""
-    monkeypatch.setattr(client, "MOST_UNSENT_BYTES", 1000)
+    monkeypatch.setattr(client, "MAX_UNSENT_BYTES", 1000)
     count = 50
     session, asked = FakeSession(), list[Any]()
 
@@ -695,11 +696,11 @@ def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
         asked.append(said)
         return [PictureData(name=said.name, data=np.zeros(100, np.float64))]
 
-    session.said = said  # type: ignore[method-assign]
+    session.handle = said  # type: ignore[method-assign]
 
     async def trial() -> None:
-        its = Line(session, None)
-        its.begin()
+        its = Connections(session, None)
+        its.attach()
         socket = Slow(HELLO, *(frame("fetch", k, name="x") for k in range(1, count + 1)))
         page = asyncio.ensure_future(its.serve(client.Client(socket, "a")))
         while len(asked) < 2:
@@ -712,7 +713,7 @@ def test_a_page_that_asks_and_does_not_listen_is_answered_no_further(
             await asyncio.sleep(0.001)
         page.cancel()
         assert [one["reply"] for one in socket.sent] == list(range(count + 1))
-        await its.end()
+        await its.close()
 
     in_a_loop(trial)
 
@@ -721,19 +722,19 @@ def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     frames = [paint(k, stroke=k, done=True) for k in range(1, 20)]
-    monkeypatch.setattr(client, "MOST_HEARD_BYTES", 3 * len(frames[0]))
+    monkeypatch.setattr(client, "MAX_QUEUED_BYTES", 3 * len(frames[0]))
 
     async def trial() -> None:
         socket = Scripted(*frames, leaves=False)
         page = client.Client(socket)
-        hearing = asyncio.ensure_future(page.keep_hearing())
+        hearing = asyncio.ensure_future(page.receive_all())
         for _ in range(50):
             await asyncio.sleep(0)
         assert len(frames) - len(socket.to_hear) == 4
         for stroke in range(1, 20):  # none is lost
-            heard = await page.next_heard()
-            assert isinstance(heard.said, Paint)
-            assert heard.said.stroke == stroke
+            heard = await page.next_message()
+            assert isinstance(heard.request, Paint)
+            assert heard.request.stroke == stroke
         hearing.cancel()
 
     in_a_loop(trial)
@@ -762,9 +763,9 @@ def test_two_pages_that_fight_over_the_session_harm_nobody(served: Served) -> No
 
 def test_answers_to_what_was_asked_are_not_dropped_and_who_is_too_slow_is_sent_away() -> None:
     page = client.Client(Deaf())
-    for k in range(client.MOST_UNSENT):
+    for k in range(client.MAX_UNSENT):
         page.send(fake_answer(), k)
-    assert len(page._unsent) == client.MOST_UNSENT
+    assert len(page._unsent) == client.MAX_UNSENT
     page.send(fake_answer(), 0)
     assert page._unsent == []
     page.send(fake_answer(), 1)

@@ -21,7 +21,7 @@ from lightpaint.lighting.fit import HOLD
 from lightpaint.paint import protocol
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.light_requests import OF_ALL, OF_FIT, TITLES, Wishes
+from lightpaint.paint.store.light_requests import ALL_LIGHTS_KEYS, FIT_KEYS, TITLES, LightRequests
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.settings import Settings
@@ -104,19 +104,19 @@ def paint(
 
 def test_an_answer_is_that_of_solve(basis: lp.Basis):
     session = session_of(basis)
-    session.said(*paint(1, (2, 9, 3, 12), 0.9))
-    session.said(protocol.Ask(2, {"lock": "80%"}), {})
-    moment = session.moment()
-    solution = moment.solution()
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    session.handle(protocol.Ask(2, {"lock": "80%"}), {})
+    snapshot = session.snapshot()
+    solution = snapshot.solution()
     assert solution is not None
-    [target] = moment.targets
+    [target] = snapshot.targets
     assert target is not None
     asked = Constraints.of({basis.names[2]: {"lock": "80%"}})
     expected = lp.solve(basis, target, constraints=asked)
     np.testing.assert_array_equal(solution.weights, expected.weights)
     assert solution.space == "display"
     assert solution.problem.fit.hold == HOLD
-    message = session.settled(moment, solution)
+    message = session.accept_solution(snapshot, solution)
     assert message is not None
     assert message.fields["exact"]
     np.testing.assert_array_equal(message.arrays["weights"], expected.weights)
@@ -127,10 +127,10 @@ def test_under_the_brush_it_is_near_the_exact_answer(basis: lp.Basis, space: Any
     session = session_of(basis, space=space)
     answer = None
     for k in range(6):
-        [answer] = session.said(*paint(1, (2, 9, 3, 4 + 2 * k), 0.7, done=k == 5))
+        [answer] = session.handle(*paint(1, (2, 9, 3, 4 + 2 * k), 0.7, done=k == 5))
     assert answer is not None
     assert not answer.fields["exact"]
-    solution = session.moment().solution()
+    solution = session.snapshot().solution()
     assert solution is not None
     size = np.sqrt(basis.power) * solution.weights
     apart = np.sqrt(basis.power) * np.abs(answer.arrays["weights"] - solution.weights)
@@ -143,83 +143,83 @@ def test_under_the_brush_it_is_near_the_exact_answer(basis: lp.Basis, space: Any
 def test_what_is_asked_is_kept_to_at_once(basis: lp.Basis, space: Any):
     """Though what was before, which is not allowed any more, looks more like the painting."""
     session = session_of(basis, space=space)
-    session.said(*paint(1, (0, 18, 0, 32), 0.9))
+    session.handle(*paint(1, (0, 18, 0, 32), 0.9))
     rng = np.random.default_rng(3)
     for share in rng.uniform(0, 0.9, 8):
         # A slider that moves, and two lights that the painting wants brighter.
         before = session.weights[:, 1]
-        session.said(protocol.Ask(0, {"lock": [share] * 3}, done=False), {})
+        session.handle(protocol.Ask(0, {"lock": [share] * 3}, done=False), {})
         np.testing.assert_array_equal(session.weights[0], share)
-        session.said(protocol.Ask(1, {"limits": {"max": share * before[1]}}), {})
+        session.handle(protocol.Ask(1, {"limits": {"max": share * before[1]}}), {})
         assert session.weights[1] @ LUMINANCE <= share * before[1] * (1 + 1e-12)
-        session.said(protocol.Ask(2, {"color": "3200K"}), {})
+        session.handle(protocol.Ask(2, {"color": "3200K"}), {})
         colour = session.weights[2] / (session.weights[2] @ LUMINANCE)
         np.testing.assert_allclose(colour, kelvin_to_rgb(3200), rtol=1e-9)
-        session.said(protocol.Ask(2, {"off": True}), {})
+        session.handle(protocol.Ask(2, {"off": True}), {})
         assert not session.weights[2].any()
         for light in (1, 2):
-            session.said(protocol.Ask(light, {}), {})
+            session.handle(protocol.Ask(light, {}), {})
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
 def test_several_views_have_one_answer_that_of_solve(space: Any):
     bases = two_views()
     session = several(bases, space=space)
-    session.said(*paint(1, (2, 9, 3, 12), 0.9))
-    alone = session.moment().solution()
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    alone = session.snapshot().solution()
     assert alone is not None
     # A view counts as soon as something is painted in it.
-    first = session.moment().targets[0]
+    first = session.snapshot().targets[0]
     assert first is not None
     expected = lp.solve(bases[0], first, space=space)
     np.testing.assert_array_equal(alone.weights, expected.weights)
     answer = None
     for k in range(4):
-        [answer] = session.said(*paint(2, (1, 6, 2, 4 + 2 * k), 0.3, done=k == 3, view=1))
+        [answer] = session.handle(*paint(2, (1, 6, 2, 4 + 2 * k), 0.3, done=k == 3, view=1))
     assert answer is not None
-    moment = session.moment()
-    solution = moment.solution()
+    snapshot = session.snapshot()
+    solution = snapshot.solution()
     assert solution is not None
-    targets = [target for target in moment.targets if target is not None]
+    targets = [target for target in snapshot.targets if target is not None]
     assert [target.name for target in targets] == ["painting camera", "painting side"]
-    together = lp.solve(bases, targets, space=space)
-    np.testing.assert_array_equal(solution.weights, together.weights)
+    joint_progress = lp.solve(bases, targets, space=space)
+    np.testing.assert_array_equal(solution.weights, joint_progress.weights)
     size = np.sqrt(bases[0].power + bases[1].power)
-    apart = size * np.abs(answer.arrays["weights"] - together.weights)
+    apart = size * np.abs(answer.arrays["weights"] - joint_progress.weights)
     # As of one view: sums are exact, and a film of few pixels is as near as its averages.
     limit = 1e-6 if space == "linear" else 2e-2
-    assert apart.max() < limit * (size * together.weights).max()
-    assert np.abs(size * (together.weights - alone.weights)).max() > 4 * apart.max()
+    assert apart.max() < limit * (size * joint_progress.weights).max()
+    assert np.abs(size * (joint_progress.weights - alone.weights)).max() > 4 * apart.max()
 
 
 def test_undo_goes_through_views_in_order():
     session = several(two_views())
-    session.said(*paint(1, (2, 9, 3, 12), 0.9))
-    session.said(*paint(2, (1, 6, 2, 9), 0.3, view=1))
-    [patch] = session.said(protocol.Undo(), {})
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    session.handle(*paint(2, (1, 6, 2, 9), 0.3, view=1))
+    [patch] = session.handle(protocol.Undo(), {})
     assert (patch.fields["view"], patch.fields["views"]) == (1, [1])
     assert patch.arrays["image"].shape == (5, 7, 3)
     assert [view.is_painted for view in session.views] == [True, False]
-    [patch] = session.said(protocol.Undo(), {})
+    [patch] = session.handle(protocol.Undo(), {})
     assert (patch.fields["view"], patch.fields["region"]) == (0, [2, 9, 3, 12])
     assert not session.is_painted
     paintings = {
         view.view: Pixels(np.full((*view.size, 3), 0.5), np.ones(view.size))
         for view in session.views
     }
-    made = session.load(paintings, session.wishes, "look")
+    made = session.load(paintings, session.requests, "look")
     assert [message.fields["view"] for message in made] == [0, 1]
     assert len(session.store.steps) == 1
-    session.said(protocol.Undo(), {})
+    session.handle(protocol.Undo(), {})
     assert not session.is_painted
     with pytest.raises(lp.LightpaintError, match="no view 2: there are 2"):
-        session.said(*paint(3, (1, 6, 2, 9), 0.3, view=2))
+        session.handle(*paint(3, (1, 6, 2, 9), 0.3, view=2))
 
 
 def test_nothing_painted_leaves_lights_as_they_are(basis: lp.Basis):
     session = session_of(basis)
     np.testing.assert_allclose(session.weights, basis.present_weights)
-    [answer] = session.said(protocol.Ask(0, {"lock": 2.0}), {})
+    [answer] = session.handle(protocol.Ask(0, {"lock": 2.0}), {})
     weights = answer.arrays["weights"]
     np.testing.assert_allclose(weights[0], [2.0, 2.0, 2.0])
     np.testing.assert_allclose(weights[1:], basis.present_weights[1:])
@@ -258,40 +258,42 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
                 case "paint":
                     stroke += 1
                     message, arrays = paint(stroke, its[0], its[1], done=its[2], view=its[3])
-                    session.said(message, arrays)
+                    session.handle(message, arrays)
                 case "ask":
-                    session.said(protocol.Ask(its[0], its[1]), {})
+                    session.handle(protocol.Ask(its[0], its[1]), {})
                 case "slide":
-                    session.said(protocol.Ask(its[0], {"lock": its[1]}, done=its[2]), {})
+                    session.handle(protocol.Ask(its[0], {"lock": its[1]}, done=its[2]), {})
                 case "load":
                     pixels = Pixels(np.full((*SIZE, 3), its[0]), np.ones(SIZE))
-                    session.load({0: pixels}, Wishes({"lamp 0": its[1]} if its[1] else {}), "look")
+                    session.load(
+                        {0: pixels}, LightRequests({"lamp 0": its[1]} if its[1] else {}), "look"
+                    )
                 case "leave":
-                    session.left(with_stroke=its[0])
+                    session.client_left(with_stroke=its[0])
                 case "set":
-                    session.said(protocol.Set({"colors": its[0]}), {})
+                    session.handle(protocol.Set({"colors": its[0]}), {})
                 case "undo":
-                    session.said(protocol.Undo(), {})
+                    session.handle(protocol.Undo(), {})
                 case "redo":
-                    session.said(protocol.Redo(), {})
+                    session.handle(protocol.Redo(), {})
                 case "drop":
-                    session.said(protocol.Drop(stroke), {})
+                    session.handle(protocol.Drop(stroke), {})
         except lp.LightpaintError:
             pass
-    session.said(protocol.Drop(stroke), {})
+    session.handle(protocol.Drop(stroke), {})
     again = several(bases, store)
     for one, other, basis in zip(session.views, again.views, bases, strict=True):
         np.testing.assert_array_equal(one.image, other.image)
         np.testing.assert_array_equal(one.importance, other.importance)
         unpainted = one.importance == 0
         assert (one.image[unpainted] == basis.present_look[unpainted]).all()
-    assert session.wishes == again.wishes
-    assert session.moment().constraints == again.moment().constraints
-    assert session.moment().settings == again.moment().settings
+    assert session.requests == again.requests
+    assert session.snapshot().constraints == again.snapshot().constraints
+    assert session.snapshot().settings == again.snapshot().settings
     assert session.is_painted == again.is_painted
     # All the way back is the beginning.
     while store.position:
-        session.said(protocol.Undo(), {})
+        session.handle(protocol.Undo(), {})
     for view, basis in zip(session.views, bases, strict=True):
         np.testing.assert_array_equal(view.image, basis.present_look)
         assert not view.importance.any()
@@ -309,7 +311,7 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
         (protocol.Ask(7, {}), {}, "no light 7"),
         (protocol.Ask(0, {"lok": True}), {}, "lok"),
         (protocol.Ask(0, {"limits": {"min": 3, "max": 1}}), {}, "above its max"),
-        (protocol.Tie((("lamp 0", "nobody"),)), {}, "nobody"),
+        (protocol.TieLights((("lamp 0", "nobody"),)), {}, "nobody"),
         (protocol.Set({"hold": "much"}), {}, "hold"),
         (protocol.Set({"fast": True}), {}, "fast"),
         (protocol.Undo(), {}, "nothing to undo"),
@@ -319,22 +321,25 @@ def test_what_cannot_be_is_said_and_changes_nothing(
     basis: lp.Basis, message: Any, arrays: Any, said: str
 ):
     session = session_of(basis)
-    before = session.views[0].image.copy(), session.wishes, session.version
+    before = session.views[0].image.copy(), session.requests, session.version
     with pytest.raises(lp.LightpaintError, match=said):
-        session.said(message, arrays)
+        session.handle(message, arrays)
     np.testing.assert_array_equal(session.views[0].image, before[0])
-    assert (session.wishes, session.version) == before[1:]
-    session.said(*paint(1, (2, 9, 3, 12), 0.9))
+    assert (session.requests, session.version) == before[1:]
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
 
 
 SLIDING = protocol.Ask(0, {"lock": [2.0, 2.0, 2.0]}, done=False)
 OTHERS: list[tuple[str, Callable[[Session], object]]] = [
-    ("set", lambda session: session.said(protocol.Set({"colors": "free"}), {})),
-    ("tie", lambda session: session.said(protocol.Tie((("lamp 0", "lamp 1"),)), {})),
-    ("load", lambda session: session.load({}, Wishes({"lamp 1": {"off": True}}), "look")),
-    ("undo", lambda session: session.said(protocol.Undo(), {})),
-    ("refused", lambda session: session.said(protocol.Ask(0, {"limits": {"min": -1}}), {})),
-    ("paint", lambda session: session.said(*paint(1, (2, 9, 3, 12), 0.8))),
+    ("set", lambda session: session.handle(protocol.Set({"colors": "free"}), {})),
+    ("tie", lambda session: session.handle(protocol.TieLights((("lamp 0", "lamp 1"),)), {})),
+    ("load", lambda session: session.load({}, LightRequests({"lamp 1": {"off": True}}), "look")),
+    ("undo", lambda session: session.handle(protocol.Undo(), {})),
+    (
+        "refused",
+        lambda session: session.handle(protocol.Ask(0, {"limits": {"min": -1}}), {}),
+    ),
+    ("paint", lambda session: session.handle(*paint(1, (2, 9, 3, 12), 0.8))),
 ]
 
 
@@ -343,33 +348,33 @@ def test_a_slider_that_is_being_moved_is_in_nothing_else(
     basis: lp.Basis, other: Callable[[Session], object]
 ):
     sessions = session_of(basis), session_of(basis)
-    sessions[0].said(SLIDING, {})
+    sessions[0].handle(SLIDING, {})
     for session in sessions:
         with suppress(lp.LightpaintError):
             other(session)
     slid, still = sessions
     assert not slid.is_open
-    assert slid.wishes == still.wishes
+    assert slid.requests == still.requests
     assert [step.fields for step in slid.store.steps] == [s.fields for s in still.store.steps]
     np.testing.assert_allclose(slid.weights, still.weights, rtol=1e-9)
     # What is there is there after the next stroke, too.
     for session in sessions:
-        session.said(*paint(2, (4, 9, 3, 9), 0.5))
-    assert slid.wishes == still.wishes
+        session.handle(*paint(2, (4, 9, 3, 9), 0.5))
+    assert slid.requests == still.requests
 
 
 def test_several_lights_are_asked_in_one_step(basis: lp.Basis):
     session = session_of(basis)
     for light in (0, 1):
-        session.said(protocol.Ask(light, {"lock": True}), {})
-    held = session.wishes
-    session.said(protocol.AskAll({"lamp 0": {}, "lamp 1": {"limits": {"max": "150%"}}}), {})
-    assert session.wishes.lights == {"lamp 1": {"limits": {"max": "150%"}}}
-    session.said(protocol.Undo(), {})
-    assert session.wishes == held
+        session.handle(protocol.Ask(light, {"lock": True}), {})
+    held = session.requests
+    session.handle(protocol.AskAll({"lamp 0": {}, "lamp 1": {"limits": {"max": "150%"}}}), {})
+    assert session.requests.lights == {"lamp 1": {"limits": {"max": "150%"}}}
+    session.handle(protocol.Undo(), {})
+    assert session.requests == held
     with pytest.raises(lp.LightpaintError, match="nobody"):
-        session.said(protocol.AskAll({"nobody": {}}), {})
-    assert session.wishes == held
+        session.handle(protocol.AskAll({"nobody": {}}), {})
+    assert session.requests == held
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
@@ -377,59 +382,59 @@ def test_a_hand_on_one_of_tied_lights_moves_all_of_them(basis: lp.Basis, space: 
     """One holds them at a time, and undo gives it back to the one before."""
     session = session_of(basis, space=space)
     zero, one = (np.array(light.emission) for light in basis.lights[:2])
-    session.said(*paint(1, (2, 9, 3, 12), 0.9))
-    ask, tie = protocol.Ask, protocol.Tie((("lamp 0", "lamp 1"),))
-    session.said(ask(1, {"lock": (3 * one).tolist()}), {})
-    session.said(ask(0, {"off": True}), {})
-    session.said(tie, {})  # of both the first stands
+    session.handle(*paint(1, (2, 9, 3, 12), 0.9))
+    ask, tie = protocol.Ask, protocol.TieLights((("lamp 0", "lamp 1"),))
+    session.handle(ask(1, {"lock": (3 * one).tolist()}), {})
+    session.handle(ask(0, {"off": True}), {})
+    session.handle(tie, {})  # of both the first stands
     assert not session.weights[:2].any()
-    session.said(ask(0, {"lock": (2 * zero).tolist()}, done=False), {})
+    session.handle(ask(0, {"lock": (2 * zero).tolist()}, done=False), {})
     np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * one], rtol=1e-9)
-    session.said(ask(0, {"lock": (2 * zero).tolist()}), {})
-    session.said(ask(1, {"lock": (4 * one).tolist()}), {})
+    session.handle(ask(0, {"lock": (2 * zero).tolist()}), {})
+    session.handle(ask(1, {"lock": (4 * one).tolist()}), {})
     np.testing.assert_allclose(session.weights[:2], [4 * zero, 4 * one], rtol=1e-9)
-    assert list(session.wishes.lights) == ["lamp 1"]
-    session.said(protocol.Undo(), {})
+    assert list(session.requests.lights) == ["lamp 1"]
+    session.handle(protocol.Undo(), {})
     np.testing.assert_allclose(session.weights[:2], [2 * zero, 2 * one], rtol=1e-9)
-    session.said(ask(0, {}), {})
-    assert session.wishes.lights == {}
+    session.handle(ask(0, {}), {})
+    assert session.requests.lights == {}
     share = session.weights[:2] / [zero, one]
     np.testing.assert_allclose(share, share[0, 0], rtol=1e-9)  # they still go together
 
 
 def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
     session = session_of(basis)
-    usual = session.about["meant"].hold
+    usual = session.edit_state["meant"].hold
     assert usual > 0
-    session.said(protocol.Set({"hold": 0}), {})
-    assert session.about["meant"].hold == session.moment().settings.hold == 0
-    assert options_of(session.wishes) == ["--hold 0"]
-    assert session.about["history"].undo == ("What you did not paint",)
-    session.said(protocol.Set({"hold": None}), {})
-    assert session.about["meant"].hold == usual
-    session.said(protocol.Undo(), {})
-    assert session.about["settings"] == {"hold": 0}
+    session.handle(protocol.Set({"hold": 0}), {})
+    assert session.edit_state["meant"].hold == session.snapshot().settings.hold == 0
+    assert options_of(session.requests) == ["--hold 0"]
+    assert session.edit_state["history"].undo == ("What you did not paint",)
+    session.handle(protocol.Set({"hold": None}), {})
+    assert session.edit_state["meant"].hold == usual
+    session.handle(protocol.Undo(), {})
+    assert session.edit_state["settings"] == {"hold": 0}
 
 
 def test_a_setting_is_undone_by_the_name_that_the_page_has_for_it():
     page = REPOSITORY / "lightpaint" / "paint" / "page" / "ui" / "settings.js"
     shown = re.findall(r'<\$\{Row\} title="([^"]+)"', page.read_text("utf-8"))
     assert list(TITLES.values()) == shown
-    assert set(TITLES) == {*OF_FIT, *OF_ALL}
+    assert set(TITLES) == {*FIT_KEYS, *ALL_LIGHTS_KEYS}
 
 
 def test_who_leaves_in_the_middle_leaves_a_stroke_and_no_slider(basis: lp.Basis):
     session = session_of(basis)
-    session.said(*paint(1, (2, 9, 3, 12), 0.8, done=False))
-    session.left(with_stroke=False)  # the same page will send it again
+    session.handle(*paint(1, (2, 9, 3, 12), 0.8, done=False))
+    session.client_left(with_stroke=False)  # the same page will send it again
     assert session.is_open
-    session.said(*paint(1, (2, 9, 3, 12), 0.8))
+    session.handle(*paint(1, (2, 9, 3, 12), 0.8))
     assert len(session.store.steps) == 1
-    session.said(protocol.Ask(0, {"lock": True}, done=False), {})
-    session.said(*paint(2, (9, 12, 3, 12), 0.8, done=False))
-    session.left(with_stroke=True)
+    session.handle(protocol.Ask(0, {"lock": True}, done=False), {})
+    session.handle(*paint(2, (9, 12, 3, 12), 0.8, done=False))
+    session.client_left(with_stroke=True)
     assert not session.is_open
-    assert not session.wishes.lights
+    assert not session.requests.lights
     assert len(session.store.steps) == 2
-    session.said(*paint(2, (9, 12, 3, 12), 0.8))  # what comes again is there already
+    session.handle(*paint(2, (9, 12, 3, 12), 0.8))  # what comes again is there already
     assert len(session.store.steps) == 2

@@ -20,14 +20,14 @@ from sessions import IDENTITY, SIZE, Plain, big, content, look, patch, step, tol
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import OutputError, PaintError
-from lightpaint.paint.session.look_library import Looks
-from lightpaint.paint.session.picture_table import Pictures
+from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store import database
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.compression import packed, unpacked
+from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import set_aside
-from lightpaint.paint.store.steps import Identity, KeptLook, Patch, SeenFrom, Step, painted_by
+from lightpaint.paint.store.steps import Identity, Patch, Step, StoredLook, ViewIdentity, replay
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.pipeline.settings import Settings
 
@@ -53,7 +53,7 @@ def test_any_sequence_is_there_again(
 ) -> None:
     path = tmp_path_factory.mktemp("any") / "session.db"
     steps: list[Step] = []
-    position, looks = 0, dict[int, KeptLook]()
+    position, looks = 0, dict[int, StoredLook]()
     store, memory = Store.open(path, IDENTITY), MemoryStore(IDENTITY)
     for k, (action, value) in enumerate(actions):
         if action == "append":
@@ -109,8 +109,8 @@ def test_the_canvas_is_every_patch_put_down_in_order(seeds: list[int], view: int
                 here, after = np.s_[top:bottom, left:right], its.after
                 image[here], importance[here] = after.image, after.importance
                 at_least[here] = False if after.at_least is None else after.at_least
-    got = painted_by(steps, start, view)
-    assert got.same(Pixels(image, importance, at_least))
+    got = replay(steps, start, view)
+    assert got.equals(Pixels(image, importance, at_least))
 
 
 def test_every_bit_of_a_number_is_kept(tmp_path: Path) -> None:
@@ -128,9 +128,9 @@ def test_every_bit_of_a_number_is_kept(tmp_path: Path) -> None:
 
 
 def test_what_is_unpacked_is_no_longer_than_it_says() -> None:
-    for damaged in (packed(np.zeros(10**6)), packed(np.zeros(3)), b"", b"junk"):
+    for damaged in (pack(np.zeros(10**6)), pack(np.zeros(3)), b"", b"junk"):
         with pytest.raises(PaintError, match="a damaged picture"):
-            unpacked(damaged, "float64", (4,))
+            unpack(damaged, "float64", (4,))
 
 
 # Other processes
@@ -310,15 +310,15 @@ def test_a_limit_of_file_sizes_loses_nothing_either(tmp_path: Path) -> None:
 # What is no session of this picture
 
 
-def seen(*views: SeenFrom) -> Identity:
+def seen(*views: ViewIdentity) -> Identity:
     return replace(IDENTITY, views=views)
 
 
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        (seen(SeenFrom("camera", (12, 20))), "of 10x12 pixels, and room.xml has 20x12"),
-        (seen(SeenFrom("side", SIZE)), "through camera, and this is through side"),
+        (seen(ViewIdentity("camera", (12, 20))), "of 10x12 pixels, and room.xml has 20x12"),
+        (seen(ViewIdentity("side", SIZE)), "through camera, and this is through side"),
         (replace(IDENTITY, lights=("panel", "sun")), "lights panel, bulb, and room.xml has"),
     ],
 )
@@ -349,7 +349,7 @@ def test_a_scene_that_has_changed_keeps_its_session(tmp_path: Path) -> None:
 
 
 def test_a_view_may_come_later_and_none_may_go(tmp_path: Path) -> None:
-    path, both = tmp_path / "session.db", seen(*IDENTITY.views, SeenFrom("side", (4, 6)))
+    path, both = tmp_path / "session.db", seen(*IDENTITY.views, ViewIdentity("side", (4, 6)))
     with Store.open(path, IDENTITY) as store:
         store.append(step(1))
     with Store.open(path, both) as store:
@@ -423,7 +423,7 @@ def test_what_can_be_read_of_a_damaged_session_is_there(
     before = path.read_bytes()
     with Store.open(path, IDENTITY) as store:
         if not store.remarks:  # what nobody has looked at yet
-            store.mend()
+            store.recover()
         position, left, kept = content(store)
         [said] = store.remarks
         assert lost in said
@@ -451,7 +451,7 @@ def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path:
             store.put_look(look(number, number))
         _, steps, looks = content(store)
     data, rng = whole.read_bytes(), np.random.default_rng(0)
-    page, refused, mended, lines = 16384, 0, 0, []
+    page, refused, recover, lines = 16384, 0, 0, []
     for k in range(60):
         damaged = bytearray(data)
         at = int(rng.integers(0, len(data)))
@@ -476,7 +476,7 @@ def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path:
             try:
                 content(store)
             except (PaintError, KeyError):
-                store.mend()
+                store.recover()
             _, left, kept = content(store)
             is_whole = len(left) == len(steps) and len(kept) == len(looks)
             assert is_whole or store.remarks
@@ -484,11 +484,11 @@ def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path:
                 # Labels have no check of their own: a byte of one may be another.
                 assert any(one[3] == was[3] for was in steps)
             if store.remarks:
-                mended += 1
+                recover += 1
                 assert list(tmp_path.glob("session-*.db"))
     assert not any("\n" in line for line in lines)
     assert refused < 20
-    assert mended > 15
+    assert recover > 15
 
 
 def test_a_painting_is_reached_though_a_look_is_damaged(tmp_path: Path, make_basis: Any) -> None:
@@ -510,10 +510,10 @@ def test_a_painting_is_reached_though_a_look_is_damaged(tmp_path: Path, make_bas
     with Store.open(path, IDENTITY) as store:
         about: dict[str, Any] = {"settings": Settings(), "transform": ViewTransform("srgb")}
         session = Session([basis], [basis.present_look], store, **about)
-        importance = session.views[0].pixels(session.views[0].whole).importance
+        importance = session.views[0].pixels(session.views[0].full_region).importance
         np.testing.assert_array_equal(importance[:, 0], [1] * 4 + [0] * 4 + [1] * 4)
-        found = Looks(session, Pictures())
-        assert [one.name for one in found.listed()] == ["look 2"]
+        found = LookLibrary(session, PictureTable())
+        assert [one.name for one in found.infos()] == ["look 2"]
         [said] = store.remarks
         assert "1 step, the look look 1 could not be read" in said
 

@@ -25,7 +25,7 @@ from lightpaint.paint import session_exports as exports
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import picture_table as pictures
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session.snapshot import Moment
+from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store import store
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
@@ -34,12 +34,12 @@ from lightpaint.paint.subject import Subject
 SIZE = (18, 32)
 
 
-class Heard:
+class IncomingMessage:
     """A studio of saved bases, and all that it says."""
 
     def __init__(self, folder: Path, *bases: lp.Basis, scene: Any = None) -> None:
         command = partial(solve_command, "room.basis.exr")
-        how = {"command": lambda paths, wishes: command(paths, (), wishes), "scene": scene}
+        how = {"command": lambda paths, requests: command(paths, (), requests), "scene": scene}
         subjects = [Subject(f"view {k}", folder, basis=its, **how) for k, its in enumerate(bases)]
         self.messages: list[Message] = []
         self.studio = Studio(subjects, lambda its: Store.open(folder / "session.db", its))
@@ -75,7 +75,7 @@ class Heard:
             "image": np.full((*shape, 3), light, np.float32),
             "importance": np.ones(shape, np.float32),
         }
-        [answer] = self.studio.said(protocol.Paint(stroke, region, True, view=view), arrays)
+        [answer] = self.studio.handle(protocol.Paint(stroke, region, True, view=view), arrays)
         return answer
 
 
@@ -98,19 +98,19 @@ def basis(make_basis: Any) -> lp.Basis:
 
 
 @pytest.fixture
-def heard(basis: lp.Basis, tmp_path: Path) -> Iterator[Heard]:
+def heard(basis: lp.Basis, tmp_path: Path) -> Iterator[IncomingMessage]:
     """A studio that is open."""
-    made = Heard(tmp_path, basis)
+    made = IncomingMessage(tmp_path, basis)
     yield made
     made.studio.close()
 
 
-def test_what_is_exported_is_solved_alike(heard: Heard, basis: lp.Basis, tmp_path: Path):
+def test_what_is_exported_is_solved_alike(heard: IncomingMessage, basis: lp.Basis, tmp_path: Path):
     heard.paint(1, 0.8)
-    heard.studio.said(protocol.Ask(1, {"limits": {"min": 0.1, "max": 0.45}}), {})
-    heard.studio.said(protocol.Set({"colors": "free"}), {})
+    heard.studio.handle(protocol.Ask(1, {"limits": {"min": 0.1, "max": 0.45}}), {})
+    heard.studio.handle(protocol.Set({"colors": "free"}), {})
     exact = heard.exact()
-    heard.studio.said(protocol.Export(("target", "picture", "lighting")), {})
+    heard.studio.handle(protocol.Export(("target", "picture", "lighting")), {})
     exported = heard.wait(lambda m: m.kind == "exported")
     assert set(exported.fields["files"]) == {
         str(tmp_path / "painting.exr"),
@@ -135,23 +135,25 @@ def test_what_is_exported_is_solved_alike(heard: Heard, basis: lp.Basis, tmp_pat
         [emission[name] for name in basis.names], exact.arrays["weights"], rtol=1e-12
     )
     heard.messages.clear()
-    heard.studio.said(protocol.Export(("lighting",)), {})
+    heard.studio.handle(protocol.Export(("lighting",)), {})
     assert heard.wait(lambda m: m.kind == "exported").fields["command"] == ""
 
 
-def test_what_is_not_of_a_painting_is_exported_without_one(heard: Heard, tmp_path: Path):
-    heard.studio.said(protocol.Export(("target", "picture", "lighting", "report")), {})
+def test_what_is_not_of_a_painting_is_exported_without_one(heard: IncomingMessage, tmp_path: Path):
+    heard.studio.handle(protocol.Export(("target", "picture", "lighting", "report")), {})
     exported = heard.wait(lambda m: m.kind == "exported").fields
     files = [str(tmp_path / "answer.png"), str(tmp_path / "lighting.json")]
     assert exported == {"files": files, "command": "", "is_unpainted": True}
-    heard.studio.said(protocol.Export(("target",)), {})
+    heard.studio.handle(protocol.Export(("target",)), {})
     said = heard.wait(lambda m: m.kind == "say" and "nothing is painted" in m.fields["text"])
     assert said.fields["what"] == "export"
 
 
-def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(heard: Heard, tmp_path: Path):
+def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(
+    heard: IncomingMessage, tmp_path: Path
+):
     arrays = {"image": np.ones((4, 4, 3), np.float32), "importance": np.ones((4, 4), np.float32)}
-    heard.studio.said(protocol.Paint(1, (0, 4, 0, 4), False), arrays)
+    heard.studio.handle(protocol.Paint(1, (0, 4, 0, 4), False), arrays)
     identity = heard.studio.session.store.identity
     heard.studio.close()
     with Store.open(tmp_path / "session.db", identity) as store:
@@ -159,7 +161,7 @@ def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(heard: Heard, tmp
         np.testing.assert_array_equal(store.steps[0].patches[0].after.image, arrays["image"])
 
 
-def test_one_export_is_written_at_a_time(heard: Heard, monkeypatch: pytest.MonkeyPatch):
+def test_one_export_is_written_at_a_time(heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch):
     """Also of what needs no render: they go to the same files."""
     at_work, most = 0, 0
     real = exports.export
@@ -178,12 +180,14 @@ def test_one_export_is_written_at_a_time(heard: Heard, monkeypatch: pytest.Monke
     heard.paint(1, 0.8)
     heard.exact()
     for _ in range(3):
-        heard.studio.said(protocol.Export(("target", "lighting")), {})
+        heard.studio.handle(protocol.Export(("target", "lighting")), {})
     heard.wait(lambda _: sum(m.kind == "exported" for m in heard.messages) == 3)
     assert most == 1
 
 
-def test_an_export_can_be_stopped(heard: Heard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_export_can_be_stopped(
+    heard: IncomingMessage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     """What is there by then stays, and is named; one that begins later is not stopped with it."""
     begun = threading.Event()
 
@@ -194,21 +198,21 @@ def test_an_export_can_be_stopped(heard: Heard, tmp_path: Path, monkeypatch: pyt
             time.sleep(0.001)
         yield tmp_path / "never.html"
 
-    monkeypatch.setattr(exports, "_report", report)
+    monkeypatch.setattr(exports, "_write_report", report)
     heard.paint(1, 0.8)
     heard.exact()
-    heard.studio.said(protocol.Export(("lighting", "report")), {})
+    heard.studio.handle(protocol.Export(("lighting", "report")), {})
     assert begun.wait(10)
-    heard.studio.said(protocol.Export((), run=False), {})
+    heard.studio.handle(protocol.Export((), run=False), {})
     exported = heard.wait(lambda m: m.kind == "exported", seconds=5)
     files = [str(tmp_path / name) for name in ("painting.exr", "lighting.json")]
     assert exported.fields == {"files": files, "command": "", "is_stopped": True}
     heard.messages.clear()
-    heard.studio.said(protocol.Export(("lighting",)), {})
+    heard.studio.handle(protocol.Export(("lighting",)), {})
     assert "is_stopped" not in heard.wait(lambda m: m.kind == "exported").fields
 
 
-def test_an_exact_answer_tells_of_each_light(heard: Heard, basis: lp.Basis):
+def test_an_exact_answer_tells_of_each_light(heard: IncomingMessage, basis: lp.Basis):
     heard.paint(1, 0.8)
     fields = heard.exact().fields
     assert fields["exact"]
@@ -236,8 +240,8 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
         return real(its, k)
 
     monkeypatch.setattr(cleaning, "clean_plane", clean_plane)
-    monkeypatch.setattr(studio, "bases_of", lambda *_: iter([[basis], [better]]))
-    heard = Heard(tmp_path, basis)
+    monkeypatch.setattr(studio, "obtain_bases", lambda *_: iter([[basis], [better]]))
+    heard = IncomingMessage(tmp_path, basis)
     assert is_taken.wait(30)
     assert len(cleaned) == len(basis.lights)
     fields = heard.studio.state().fields
@@ -262,7 +266,7 @@ def test_lights_of_unknown_noise_are_cleaned_too(
     none = np.zeros_like(basis.half_differences)
     unknown = replace(basis, noise=none, origin=origin)
     assert not unknown.knows_noise
-    heard = Heard(tmp_path, unknown)
+    heard = IncomingMessage(tmp_path, unknown)
     heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
     heard.studio.close()
 
@@ -273,9 +277,9 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
     """Else a page forgets a picture that another thread made while all there is was told."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     goes_on, is_telling, better = threading.Event(), threading.Event(), replace(basis)
-    tell = Studio.tell
+    tell = Studio.publish
 
-    def bases_of(*_: Any) -> Iterator[list[lp.Basis]]:
+    def obtain_bases(*_: Any) -> Iterator[list[lp.Basis]]:
         yield [basis]
         assert goes_on.wait(30)
         yield [better]
@@ -286,12 +290,12 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
             time.sleep(0.2)
         tell(self, message)
 
-    monkeypatch.setattr(Studio, "tell", slow)
-    monkeypatch.setattr(studio, "bases_of", bases_of)
-    heard = Heard(tmp_path, basis)
+    monkeypatch.setattr(Studio, "publish", slow)
+    monkeypatch.setattr(studio, "obtain_bases", obtain_bases)
+    heard = IncomingMessage(tmp_path, basis)
     goes_on.set()
     assert is_telling.wait(30)
-    heard.studio.put("verified", np.zeros((*SIZE, 3), np.float16))
+    heard.studio.publish_picture("verified", np.zeros((*SIZE, 3), np.float16))
     heard.wait(lambda _: sum(m.kind == "state" for m in heard.messages) == 2)
     heard.wait(lambda m: m.kind == "renewed" and "verified" in m.fields["resources"])
     known: dict[str, int] = {}
@@ -307,7 +311,7 @@ def test_clean_planes_come_later_and_keep_the_light(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    heard = Heard(tmp_path / "first", basis)
+    heard = IncomingMessage(tmp_path / "first", basis)
     heard.wait(lambda m: m.kind == "renewed" and "clean/2" in m.fields["resources"])
     state = heard.studio.state().fields
     for k, light in enumerate(state["lights"]):
@@ -325,7 +329,7 @@ def test_clean_planes_come_later_and_keep_the_light(
     while not kept_planes(basis) and time.monotonic() < until:
         time.sleep(0.01)
     # The next session has the same at once, and one of other pixels has not.
-    again = Heard(tmp_path / "again", basis)
+    again = IncomingMessage(tmp_path / "again", basis)
     first = again.wait(lambda m: m.kind == "state").fields
     for k in range(len(basis.lights)):
         assert f"clean/{k}" in first["resources"]
@@ -359,35 +363,35 @@ def test_kept_pictures_that_are_damaged_are_made_again(
     np.testing.assert_array_equal(found.halves, clean.halves)
 
 
-def test_a_look_is_gone_back_to_and_undone(heard: Heard):
+def test_a_look_is_gone_back_to_and_undone(heard: IncomingMessage):
     heard.paint(1, 0.8)
-    [looks] = heard.studio.said(protocol.SaveLook("  bright \n day "), {})
+    [looks] = heard.studio.handle(protocol.SaveLook("  bright \n day "), {})
     [look] = looks.fields["looks"]
     assert look["name"] == "bright day"
     first = heard.studio.session.views[0].image.copy()
     heard.paint(2, 0.1)
     second = heard.studio.session.views[0].image.copy()
-    heard.studio.said(protocol.LoadLook(look["id"]), {})
+    heard.studio.handle(protocol.LoadLook(look["id"]), {})
     np.testing.assert_array_equal(heard.studio.session.views[0].image, first)
-    heard.studio.said(protocol.Undo(), {})
+    heard.studio.handle(protocol.Undo(), {})
     np.testing.assert_array_equal(heard.studio.session.views[0].image, second)
-    heard.studio.said(protocol.CopyLook(look["id"]), {})
-    heard.studio.said(protocol.RenameLook(look["id"], "noon"), {})
-    [message] = heard.studio.said(protocol.DropLook(look["id"]), {})
+    heard.studio.handle(protocol.CopyLook(look["id"]), {})
+    heard.studio.handle(protocol.RenameLook(look["id"], "noon"), {})
+    [message] = heard.studio.handle(protocol.DropLook(look["id"]), {})
     assert [x["name"] for x in message.fields["looks"]] == ["bright day copy"]
     with pytest.raises(lp.LightpaintError, match="no look"):
-        heard.studio.said(protocol.LoadLook(99), {})
+        heard.studio.handle(protocol.LoadLook(99), {})
 
 
-def test_a_look_that_is_gone_back_to_has_its_own_answer_at_once(heard: Heard):
+def test_a_look_that_is_gone_back_to_has_its_own_answer_at_once(heard: IncomingMessage):
     """Not one that comes from that of another look, until the exact one is there."""
     heard.paint(1, 0.8)
     kept = heard.exact().arrays["weights"]
-    [looks] = heard.studio.said(protocol.SaveLook("day"), {})
+    [looks] = heard.studio.handle(protocol.SaveLook("day"), {})
     heard.paint(2, 0.02, (0, 12, 0, 16))
     other = heard.exact().arrays["weights"]
     assert np.abs(other - kept).max() > 0.1 * kept.max()
-    [patch] = heard.studio.said(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
+    [patch] = heard.studio.handle(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
     np.testing.assert_array_equal(patch.arrays["weights"], kept)
     np.testing.assert_allclose(heard.exact().arrays["weights"], kept, rtol=1e-6)
 
@@ -396,13 +400,13 @@ def test_rounds_of_samples_are_counted_as_one_work():
     """In samples per pixel of those that are wanted, whatever the passes are of."""
     heard: list[tuple[int, int, str]] = []
     tell = lambda _, done, total, unit="passes": heard.append((done, total, unit))  # noqa: E731
-    one, other = subject.together(tell, 2)
+    one, other = subject.joint_progress(tell, 2)
     for part in (one, other):
-        hear = subject.in_samples(part, 0, 8, 64, lights=3)
+        hear = subject.progress_in_samples(part, 0, 8, 64, lights=3)
         for k in range(5):
             hear("basis", k, 4)
     for part in (one, other):
-        hear = subject.in_samples(part, 8, 64, 64, lights=3)
+        hear = subject.progress_in_samples(part, 8, 64, 64, lights=3)
         for light in ("key", "fill", "rim"):  # rendered each alone
             for k in range(3):
                 hear(f"basis: {light}", k, 2)
@@ -413,42 +417,42 @@ def test_rounds_of_samples_are_counted_as_one_work():
     assert heard[-1][:2] == (128, 128)
 
 
-def test_what_lies_between_two_looks_is_kept(heard: Heard):
+def test_what_lies_between_two_looks_is_kept(heard: IncomingMessage):
     answers = []
     for stroke, light in ((1, 0.8), (2, 0.1)):
         heard.paint(stroke, light)
         answers.append(heard.exact().arrays["weights"])
-        [message] = heard.studio.said(protocol.SaveLook(f"look {stroke}"), {})
+        [message] = heard.studio.handle(protocol.SaveLook(f"look {stroke}"), {})
     one, two = (look["id"] for look in message.fields["looks"])
-    [message] = heard.studio.said(protocol.MixLooks(one, two, 0.25, "between"), {})
-    heard.studio.said(protocol.LoadLook(message.fields["looks"][-1]["id"]), {})
+    [message] = heard.studio.handle(protocol.MixLooks(one, two, 0.25, "between"), {})
+    heard.studio.handle(protocol.LoadLook(message.fields["looks"][-1]["id"]), {})
     between = heard.exact().arrays["weights"]
     np.testing.assert_allclose(between, 0.75 * answers[0] + 0.25 * answers[1], rtol=1e-9)
     with pytest.raises(lp.LightpaintError, match="part is 2"):
-        heard.studio.said(protocol.MixLooks(one, two, 2, "beyond"), {})
+        heard.studio.handle(protocol.MixLooks(one, two, 2, "beyond"), {})
 
 
-def test_what_was_done_is_there_again(heard: Heard, basis: lp.Basis, tmp_path: Path):
+def test_what_was_done_is_there_again(heard: IncomingMessage, basis: lp.Basis, tmp_path: Path):
     heard.paint(1, 0.8)
     heard.paint(2, 0.3, (0, 6, 10, 30))
-    heard.studio.said(protocol.Ask(0, {"lock": True}), {})
-    heard.studio.said(protocol.SaveLook("a"), {})
+    heard.studio.handle(protocol.Ask(0, {"lock": True}), {})
+    heard.studio.handle(protocol.SaveLook("a"), {})
     session = heard.studio.session
     heard.studio.close()
-    again = Heard(tmp_path, basis)
+    again = IncomingMessage(tmp_path, basis)
     np.testing.assert_array_equal(again.studio.session.views[0].image, session.views[0].image)
-    assert again.studio.session.wishes == session.wishes
+    assert again.studio.session.requests == session.requests
     state = again.studio.state().fields
     assert len(state["history"]["undo"]) == 3
     assert [look["name"] for look in state["looks"]] == ["a"]
-    again.studio.said(protocol.Undo(), {})
-    again.studio.said(protocol.Undo(), {})
+    again.studio.handle(protocol.Undo(), {})
+    again.studio.handle(protocol.Undo(), {})
     assert again.studio.session.views[0].importance[2, 20] == 0
     again.studio.close()
 
 
 def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
-    heard: Heard, monkeypatch: pytest.MonkeyPatch
+    heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch
 ):
     @contextmanager
     def full(_: Any) -> Iterator[None]:
@@ -470,20 +474,20 @@ def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
     assert [m.fields["text"] for m in heard.messages if said(m)] == at_terminal
 
 
-def test_why_it_is_not_closer(heard: Heard, monkeypatch: pytest.MonkeyPatch):
+def test_why_it_is_not_closer(heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch):
     copied: list[str] = []  # by which threads all pixels were, for which strokes wait
-    moment = Session.moment
+    snapshot = Session.snapshot
 
-    def copies(session: Session) -> Moment:
+    def copies(session: Session) -> SessionSnapshot:
         copied.append(threading.current_thread().name)
-        return moment(session)
+        return snapshot(session)
 
-    monkeypatch.setattr(Session, "moment", copies)
+    monkeypatch.setattr(Session, "snapshot", copies)
 
     def explained() -> Any:
         heard.messages.clear()
         copied.clear()
-        heard.studio.said(protocol.Explain(), {})
+        heard.studio.handle(protocol.Explain(), {})
         message = heard.wait(lambda m: m.kind == "explained")
         assert message.fields["sentences"]
         assert not message.fields["is_old"]
@@ -499,34 +503,36 @@ def test_why_it_is_not_closer(heard: Heard, monkeypatch: pytest.MonkeyPatch):
     assert explained()[3:12, 10:15].max() > 128
 
 
-def test_a_preview_shows_what_the_change_does_then(heard: Heard, monkeypatch: pytest.MonkeyPatch):
+def test_a_preview_shows_what_the_change_does_then(
+    heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch
+):
     """To the last pixel, where no clean planes are there; and nothing is done before."""
-    monkeypatch.setattr(cleaning.Cleaning, "shown", lambda _, bases: [None] * len(bases))
+    monkeypatch.setattr(cleaning.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases))
     heard.paint(1, 1.2)
     heard.paint(2, 0.02, (3, 12, 20, 30))
     heard.exact()
     studio = heard.studio
     version, before = studio.session.version, studio.session.weights.copy()
     for number, values in enumerate(({"hold": 0.5}, {"hold": 0.0}, {"colors": "white"})):
-        assert studio.said(protocol.Preview(number, values), {})[0].kind == "started"
+        assert studio.handle(protocol.Preview(number, values), {})[0].kind == "started"
         seen = heard.wait(lambda m, n=number: m.kind == "previewed" and m.fields["number"] == n)
         assert studio.session.version == version + 2 * number
         np.testing.assert_array_equal(studio.session.weights, before)
         assert not seen.fields["is_old"]
         assert "of what is missed" in seen.fields["text"] or "no closer" in seen.fields["text"]
-        studio.said(protocol.Set(values), {})
+        studio.handle(protocol.Set(values), {})
         heard.exact()
         mixed = studio.session.views[0].basis.mix(studio.session.weights)
-        shown = pictures.small_picture(mixed, studio.session.transform)
+        shown = pictures.display_thumbnail(mixed, studio.session.transform)
         np.testing.assert_array_equal(seen.arrays["after"], shown)
         assert (seen.arrays["after"] != seen.arrays["before"]).any()
-        studio.said(protocol.Undo(), {})
+        studio.handle(protocol.Undo(), {})
         heard.exact()
     with pytest.raises(lp.LightpaintError, match="nothing is called 'holds'"):
-        studio.said(protocol.Preview(9, {"holds": 1}), {})
+        studio.handle(protocol.Preview(9, {"holds": 1}), {})
 
 
-def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: Heard):
+def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: IncomingMessage):
     """What the button sets brings what it says, and changes the rest less than no hold does."""
     heard.paint(1, 1.2)
     answer = heard.exact()
@@ -536,7 +542,7 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: Heard):
     assert 0 < advised["hold"] < 3
     [found] = [
         heard.wait(lambda m: m.kind == "previewed" and m.fields["number"] == 1)
-        for _ in heard.studio.said(protocol.Preview(1, {"hold": advised["hold"]}), {})
+        for _ in heard.studio.handle(protocol.Preview(1, {"hold": advised["hold"]}), {})
     ]
     share = round(100 * advised["closes"])
     told = re.match(r"Closes (\d+) % of what is missed", found.fields["text"])
@@ -544,7 +550,7 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: Heard):
     assert int(told[1]) == pytest.approx(share, abs=3)  # of enough pixels, not of all
     changed = []
     for hold in (advised["hold"], 0.0):
-        heard.studio.said(protocol.Set({"hold": hold}), {})
+        heard.studio.handle(protocol.Set({"hold": hold}), {})
         heard.exact()
         session = heard.studio.session
         view = session.views[0]
@@ -553,9 +559,9 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: Heard):
     assert changed[0] < changed[1]
 
 
-def test_without_a_scene_there_is_nothing_to_render(heard: Heard):
+def test_without_a_scene_there_is_nothing_to_render(heard: IncomingMessage):
     with pytest.raises(lp.LightpaintError, match="no scene to render"):
-        heard.studio.said(protocol.Verify(), {})
+        heard.studio.handle(protocol.Verify(), {})
     with pytest.raises(lp.LightpaintError, match="no picture"):
         heard.studio.resource("../secret")
 
@@ -567,9 +573,9 @@ class Renders:
         self.views: list[str] = []  # of those that have begun
         self.at_work = self.most = 0
         self.is_enough = threading.Event()
-        monkeypatch.setattr(exports, "verified", self.verified)
+        monkeypatch.setattr(exports, "render_verification", self.render_verification)
 
-    def verified(self, subject: Subject, basis: lp.Basis, _: Any, progress: Any) -> Any:
+    def render_verification(self, subject: Subject, basis: lp.Basis, _: Any, progress: Any) -> Any:
         self.views.append(subject.source)
         self.at_work += 1
         self.most = max(self.most, self.at_work)
@@ -584,12 +590,12 @@ class Renders:
 @pytest.fixture
 def with_scenes(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[tuple[Heard, Renders]]:
+) -> Iterator[tuple[IncomingMessage, Renders]]:
     """A studio of two views, and what stands for their renders."""
     side = replace(basis, origin=replace(basis.origin, sensor="side"))
     scene: Any = SimpleNamespace(spp=4)
     made = Renders(monkeypatch)
-    heard = Heard(tmp_path, basis, side, scene=scene)
+    heard = IncomingMessage(tmp_path, basis, side, scene=scene)
     yield heard, made
     made.is_enough.set()
     heard.studio.close()
@@ -600,16 +606,16 @@ def is_stopped(message: Message) -> bool:
     return message.kind == "stopped" and message.fields["what"] == "verify"
 
 
-def test_a_verifying_render_can_be_stopped(with_scenes: tuple[Heard, Renders]):
+def test_a_verifying_render_can_be_stopped(with_scenes: tuple[IncomingMessage, Renders]):
     heard, renders = with_scenes
-    heard.studio.said(protocol.Verify(), {})
+    heard.studio.handle(protocol.Verify(), {})
     heard.wait(lambda m: m.kind == "progress" and m.fields["what"] == "verify")
-    [told] = heard.studio.said(protocol.Verify(run=False), {})
+    [told] = heard.studio.handle(protocol.Verify(run=False), {})
     assert (told.kind, told.fields["what"]) == ("started", "stop")
     heard.wait(is_stopped)
     assert renders.at_work == 0
     # And there can be another.
-    heard.studio.said(protocol.Verify(view=1), {})
+    heard.studio.handle(protocol.Verify(view=1), {})
     renders.is_enough.set()
     assert heard.wait(lambda m: m.kind == "verified").fields["view"] == 1
     assert heard.studio.resource("verified@1").shape == (*SIZE, 3)
@@ -621,36 +627,36 @@ def test_a_verifying_render_can_be_stopped(with_scenes: tuple[Heard, Renders]):
 
 
 def test_a_render_that_is_stopped_before_it_begins_does_not_begin(
-    with_scenes: tuple[Heard, Renders], monkeypatch: pytest.MonkeyPatch
+    with_scenes: tuple[IncomingMessage, Renders], monkeypatch: pytest.MonkeyPatch
 ):
     """The exact answer comes first, and may take longer than somebody waits."""
     heard, renders = with_scenes
     heard.paint(1, 0.8)
     heard.exact()
     begun, goes_on = threading.Event(), threading.Event()
-    solution = Moment.solution
+    solution = SessionSnapshot.solution
 
-    def slow(moment: Moment) -> Any:
+    def slow(snapshot: SessionSnapshot) -> Any:
         begun.set()
         goes_on.wait(30)
-        return solution(moment)
+        return solution(snapshot)
 
-    monkeypatch.setattr(Moment, "solution", slow)
-    heard.studio.said(protocol.Verify(), {})
+    monkeypatch.setattr(SessionSnapshot, "solution", slow)
+    heard.studio.handle(protocol.Verify(), {})
     assert begun.wait(30)
-    heard.studio.said(protocol.Verify(run=False), {})
+    heard.studio.handle(protocol.Verify(run=False), {})
     goes_on.set()
     heard.wait(is_stopped)
     assert not renders.views
 
 
-def test_who_verifies_again_stops_the_render_before(with_scenes: tuple[Heard, Renders]):
+def test_who_verifies_again_stops_the_render_before(with_scenes: tuple[IncomingMessage, Renders]):
     """Somebody has painted on, or come back with another page."""
     heard, renders = with_scenes
-    heard.studio.said(protocol.Verify(), {})
+    heard.studio.handle(protocol.Verify(), {})
     heard.wait(lambda _: renders.at_work)
     for view in (0, 1):
-        heard.studio.said(protocol.Verify(view=view), {})
+        heard.studio.handle(protocol.Verify(view=view), {})
     heard.wait(lambda _: renders.views[-1] == "view 1")
     renders.is_enough.set()
     assert heard.wait(lambda m: m.kind == "verified").fields["view"] == 1
@@ -660,20 +666,20 @@ def test_who_verifies_again_stops_the_render_before(with_scenes: tuple[Heard, Re
 
 
 def test_what_is_painted_while_an_answer_is_sought_is_answered_too(
-    heard: Heard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    heard: IncomingMessage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     begun, goes_on = threading.Event(), threading.Event()
-    solution = Moment.solution
+    solution = SessionSnapshot.solution
 
-    def slow(moment: Moment) -> Any:
+    def slow(snapshot: SessionSnapshot) -> Any:
         if threading.current_thread().name == "lightpaint-export":
             begun.set()
         goes_on.wait(30)
-        return solution(moment)
+        return solution(snapshot)
 
-    monkeypatch.setattr(Moment, "solution", slow)
+    monkeypatch.setattr(SessionSnapshot, "solution", slow)
     heard.paint(1, 0.8)
-    heard.studio.said(protocol.Export(("target", "lighting")), {})
+    heard.studio.handle(protocol.Export(("target", "lighting")), {})
     assert begun.wait(30)
     painted = heard.studio.session.views[0].image.copy()
     answer = heard.paint(2, 0.1, (3, 12, 16, 30))
@@ -698,7 +704,7 @@ def both(basis: lp.Basis) -> list[lp.Basis]:
 
 
 def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_path: Path):
-    heard = Heard(tmp_path, *both)
+    heard = IncomingMessage(tmp_path, *both)
     studio = heard.studio
     names = [basis.origin.sensor for basis in both]
     state = studio.state().fields
@@ -713,18 +719,18 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     assert exact.fields["delta_e"] == max(one["delta_e"] for one in exact.fields["of_views"])
     for shares in exact.fields["shares"]:
         assert sum(shares) == pytest.approx(1)
-    [looks] = studio.said(protocol.SaveLook("two"), {})
-    studio.said(protocol.Undo(), {})
+    [looks] = studio.handle(protocol.SaveLook("two"), {})
+    studio.handle(protocol.Undo(), {})
     assert not studio.session.views[1].is_painted
-    made = studio.said(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
+    made = studio.handle(protocol.LoadLook(looks.fields["looks"][0]["id"]), {})
     assert [message.fields["view"] for message in made] == [0, 1]
     assert studio.resource("look/1@1").dtype == np.uint8
     again = heard.exact()
     np.testing.assert_allclose(again.arrays["weights"], exact.arrays["weights"], rtol=1e-9)
-    studio.said(protocol.Explain(1), {})
+    studio.handle(protocol.Explain(1), {})
     assert heard.wait(lambda m: m.kind == "explained").fields["view"] == 1
     assert studio.resource("beyond@1").shape == (10, 16)
-    studio.said(protocol.Export(("target", "picture", "lighting")), {})
+    studio.handle(protocol.Export(("target", "picture", "lighting")), {})
     exported = heard.wait(lambda m: m.kind == "exported").fields
     files = [tmp_path / f"painting-{name}.exr" for name in names]
     pictures = [tmp_path / f"answer-{name}.png" for name in names]
@@ -734,34 +740,34 @@ def test_several_views_are_painted_kept_and_exported(both: list[lp.Basis], tmp_p
     assert " ".join(targets) in exported["command"]
     solution = correct_noise(lp.solve(both, [lp.read_target(file) for file in files]))
     np.testing.assert_allclose(solution.weights, exact.arrays["weights"], rtol=1e-9)
-    studio.said(protocol.Export(("report",)), {})
+    studio.handle(protocol.Export(("report",)), {})
     said = heard.wait(lambda m: m.kind == "say" and "needs their scene" in m.fields["text"])
     assert said.fields["what"] == "export"
     with pytest.raises(lp.LightpaintError, match="no view 2"):
-        studio.said(protocol.Explain(2), {})
+        studio.handle(protocol.Explain(2), {})
     studio.close()
 
 
 def test_a_view_that_comes_later_finds_the_session(both: list[lp.Basis], tmp_path: Path):
-    heard = Heard(tmp_path, both[0])
+    heard = IncomingMessage(tmp_path, both[0])
     heard.paint(1, 0.8)
-    heard.studio.said(protocol.SaveLook("alone"), {})
+    heard.studio.handle(protocol.SaveLook("alone"), {})
     painted = heard.studio.session.views[0].image.copy()
     heard.studio.close()
-    heard = Heard(tmp_path, *both)
+    heard = IncomingMessage(tmp_path, *both)
     studio = heard.studio
     heard.paint(2, 0.1, (1, 6, 2, 9), view=1)
     heard.paint(3, 0.4, (0, 6, 2, 9))
     told = studio.state().fields["history"]["undo"]
     assert told == [f"stroke, {name}" for name in ("sensor", "side", "sensor")]
     # The look knows nothing of the view, and leaves it as it was before it was painted.
-    studio.said(protocol.LoadLook(1), {})
+    studio.handle(protocol.LoadLook(1), {})
     np.testing.assert_array_equal(studio.session.views[0].image, painted)
     assert [view.is_painted for view in studio.session.views] == [True, False]
-    [looks] = studio.said(protocol.SaveLook("both"), {})
-    [looks] = studio.said(protocol.MixLooks(1, 2, 0.5, "between"), {})
+    [looks] = studio.handle(protocol.SaveLook("both"), {})
+    [looks] = studio.handle(protocol.MixLooks(1, 2, 0.5, "between"), {})
     assert len(looks.fields["looks"]) == 3
-    studio.said(protocol.DropLook(2), {})
+    studio.handle(protocol.DropLook(2), {})
     with pytest.raises(lp.LightpaintError, match="no picture"):
         studio.resource("look/2@1")
     studio.close()
@@ -777,19 +783,19 @@ def test_a_render_that_fails_is_said_to_who_waits(tmp_path: Path):
     heard: list[Message] = []
     studio = Studio([Broken("room.xml", tmp_path)], lambda _: Store.open(tmp_path / "x.db", _))
     studio.on_message = heard.append
-    studio._obtain()
+    studio._obtain_bases()
     assert heard[0].fields["done"] == studio.state().fields["progress"]["done"] == 1
     assert heard[-1].kind == "waiting"
     assert "ZeroDivisionError: of our own" in heard[-1].fields["text"]
 
 
 def test_a_render_that_comes_after_another_stroke_is_of_an_earlier_answer(
-    with_scenes: tuple[Heard, Renders],
+    with_scenes: tuple[IncomingMessage, Renders],
 ):
     heard, renders = with_scenes
     heard.paint(1, 0.8)
     heard.exact()
-    heard.studio.said(protocol.Verify(), {})
+    heard.studio.handle(protocol.Verify(), {})
     heard.wait(lambda m: m.kind == "progress" and m.fields["what"] == "verify")
     heard.paint(2, 0.3)
     renders.is_enough.set()

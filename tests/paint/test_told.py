@@ -13,12 +13,12 @@ from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.paint.protocol import Advice
 from lightpaint.paint.session.answer_messages import (
-    HELP,
+    ADVICE_TEXTS,
     advice,
-    foreseen,
-    helped,
-    sketched,
-    unpainted_headline,
+    preview_text,
+    removable_reason,
+    sketch_headline,
+    unpainted_text,
     why_not_closer,
 )
 from lightpaint.report.sentences import spoken_cause
@@ -79,7 +79,7 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
 )
 def test_a_sketch_is_helped_and_not_judged(missed: float, about: Any, said: str):
     seen = replace(Seen(missed, 0.0, 20.0, PLACE), **about)
-    assert sketched(seen) == said
+    assert sketch_headline(seen) == said
     assert "cannot" not in said
 
 
@@ -98,16 +98,16 @@ def test_a_sketch_is_helped_and_not_judged(missed: float, about: Any, said: str)
 )
 def test_what_a_sentence_advises_is_said_as_data(about: Any, helps: str | None):
     seen = replace(Seen(10.0, 0.0, 20.0, PLACE), **about)
-    cause, fields = helped(seen), advice(seen)
+    cause, fields = removable_reason(seen), advice(seen)
     assert (cause and cause.kind) == helps
     assert (fields and fields.kind) == helps
-    advised = [held for held, words in HELP.items() if words in sketched(seen)]
-    assert advised == [one for one in (helps,) if one in HELP]
+    advised = [held for held, words in ADVICE_TEXTS.items() if words in sketch_headline(seen)]
+    assert advised == [one for one in (helps,) if one in ADVICE_TEXTS]
 
 
 def test_a_button_says_what_it_lets_go_and_what_that_brings():
     seen = replace(Seen(10.0, 0.0, 20.0, PLACE), reasons=(OFF, HOLD))
-    assert "; annex_window is switched off." in sketched(seen)
+    assert "; annex_window is switched off." in sketch_headline(seen)
     fields = Advice("off", ("annex_window",), closes=0.57, hold=None)
     assert advice(seen) == fields
     weaker = Loosening(0.8, 0.35, Elsewhere(2.0, 12.0, "annex"))
@@ -128,25 +128,25 @@ def test_a_preview_says_what_it_brings_and_what_it_costs():
     annex = Elsewhere(2.0, 12.0, "annex")
     its = {"delta_e": (17.2, 6.9), "is_at_cost": False}
     told = "Closes 57 % of what is missed (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
-    assert foreseen(0.57, annex, **its) == (told, False)
-    costly = foreseen(0.57, annex, **{**its, "is_at_cost": True})
+    assert preview_text(0.57, annex, **its) == (told, False)
+    costly = preview_text(0.57, annex, **{**its, "is_at_cost": True})
     assert costly == (f"{told} That is more than it brings.", True)
-    none = foreseen(0.004, None, **its)[0]
+    none = preview_text(0.004, None, **its)[0]
     assert none == "Brings the answer no closer."
 
 
 def test_what_harms_the_rest_is_not_praised():
     """Letting go blew out the annex, and was told as 57 %."""
     seen = Seen(8.6, 0.0, 20.0, PLACE, there=("lamp",), elsewhere=Elsewhere(19.0, 51.0, "annex"))
-    said = sketched(seen)
+    said = sketch_headline(seen)
     assert said.startswith("57 % of the way, at the cost of the annex (ΔE 51): ")
-    mild = sketched(replace(seen, elsewhere=Elsewhere(2.0, 7.0, "annex")))
+    mild = sketch_headline(replace(seen, elsewhere=Elsewhere(2.0, 7.0, "annex")))
     assert mild.startswith("About half of the way, 57 %, and changes the annex by ΔE 7.0: ")
 
 
 def test_what_is_close_is_said_as_elsewhere():
     seen = Seen(2.0, 0.0, 20.0, PLACE)
-    assert sketched(seen) == headline(seen)
+    assert sketch_headline(seen) == headline(seen)
 
 
 @pytest.mark.parametrize("colors", ["free", "white"])
@@ -175,8 +175,8 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
 
 @pytest.mark.parametrize("is_asked", [False, True])
 def test_lamps_that_became_white_are_not_called_the_present_lighting(is_asked: bool):
-    said = unpainted_headline(is_asked=is_asked, is_white=True)
+    said = unpainted_text(is_asked=is_asked, is_white=True)
     assert "nearest to its colour" in said
     assert "present lighting" not in said
-    plain = unpainted_headline(is_asked=is_asked, is_white=False)
+    plain = unpainted_text(is_asked=is_asked, is_white=False)
     assert ("present lighting" in plain) != is_asked

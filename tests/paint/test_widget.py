@@ -257,7 +257,9 @@ def test_two_threads_may_tell_at_once(
         time.sleep(pause_s)  # one begins, and ends, before the other
         weights = np.full((3, 3), pause_s)
         asked = lp.Constraints.of({"key": {"lock": pause_s}})
-        painter._follow({"lighting": lp.Lighting.of_weights(basis, weights), "constraints": asked})
+        painter._sync_traits(
+            {"lighting": lp.Lighting.of_weights(basis, weights), "constraints": asked}
+        )
 
     monkeypatch.setattr(painter, "set_trait", slowly)
     with ThreadPoolExecutor(2) as threads:
@@ -274,19 +276,19 @@ def test_what_is_told_is_of_one_time(
 ) -> None:
     """Also where something is painted by another thread just then."""
     painter, paint = open_(), np.full((*SIZE, 3), 0.5, np.float32)
-    now, moment = painter._studio.now, painter._studio.moment
+    now, snapshot = painter._studio.snapshot_and_lighting, painter._studio.snapshot
 
     def painted_on(look: Callable[[], Any]) -> Any:
         found = look()
         monkeypatch.undo()
         whole = Pixels(paint, np.ones(SIZE, np.float32), None)
-        painter._studio.load({0: whole}, painter._studio.session.wishes, "by another")
+        painter._studio.load({0: whole}, painter._studio.session.requests, "by another")
         return found
 
     before = painter._studio.session.weights.copy()
-    monkeypatch.setattr(painter._studio, "now", lambda: painted_on(now))
-    monkeypatch.setattr(painter._studio, "moment", lambda: painted_on(moment))
-    told = painter._now()
+    monkeypatch.setattr(painter._studio, "snapshot_and_lighting", lambda: painted_on(now))
+    monkeypatch.setattr(painter._studio, "snapshot", lambda: painted_on(snapshot))
+    told = painter._current_values()
     assert told["target"] is None
     assert not np.allclose(painter._studio.session.weights, before)
     np.testing.assert_array_equal(told["lighting"].weights_for(basis), before)
@@ -470,8 +472,8 @@ class Rendered:
         self.goes_on = threading.Event()
         scene: Any = SimpleNamespace(spp=4, size=basis.size)
         subject = Subject("room.xml", folder, scene=scene, settings=Settings(use_cache=False))
-        monkeypatch.setattr(cells, "subjects_given", lambda *_, **__: (subject,))
-        monkeypatch.setattr(studio, "bases_of", self._bases)
+        monkeypatch.setattr(cells, "widget_subjects", lambda *_, **__: (subject,))
+        monkeypatch.setattr(studio, "obtain_bases", self._bases)
 
     def _bases(self, *_: Any) -> Iterator[list[lp.Basis]]:
         self.goes_on.wait(30)
@@ -625,7 +627,7 @@ def test_junk_is_answered(basis: lp.Basis, open_: Any, monkeypatch: Any, capsys:
     assert page.say("fetch", name="../secret")["kind"] == "failed"
     bad = {"image": np.full((*SIZE, 3), np.nan, np.float32)}
     assert "NaN" in page.say("paint", bad, stroke=0, region=[0, 12, 0, 20])["text"]
-    monkeypatch.setattr(painter._studio, "said", lambda *_: 1 / 0)
+    monkeypatch.setattr(painter._studio, "handle", lambda *_: 1 / 0)
     assert "failed inside lightpaint: ZeroDivisionError" in page.say("undo")["text"]
     assert "Traceback" in capsys.readouterr().err
     monkeypatch.undo()
@@ -691,7 +693,7 @@ def test_a_full_disk_is_said_and_tried_again(
     def said(tone: str) -> Any:
         return [x["text"] for x, _ in page.heard() if x["kind"] == "say" and x["tone"] == tone]
 
-    monkeypatch.setattr(beside, "TRY_S", 0.01)
+    monkeypatch.setattr(beside, "RETRY_S", 0.01)
     painter = open_(store=tmp_path / "evening.db")
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
@@ -733,9 +735,9 @@ def test_who_is_closed_cannot_be_set(basis: lp.Basis, open_: Any) -> None:
 
 def test_who_closes_waits_for_no_other_painter(open_: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whose renders may go on for as long as they like."""
-    monkeypatch.setattr(Studio, "renders", property(lambda _: True))
+    monkeypatch.setattr(Studio, "has_scenes", property(lambda _: True))
     one, _ = open_(), open_()
-    mine = list(one._studio._threads._all)
+    mine = list(one._studio._threads._threads)
     begun_s = time.monotonic()
     one.close()
     assert time.monotonic() - begun_s < 30
@@ -744,7 +746,7 @@ def test_who_closes_waits_for_no_other_painter(open_: Any, monkeypatch: pytest.M
 
 def test_who_is_closed_is_let_go_of(basis: lp.Basis, monkeypatch: pytest.MonkeyPatch) -> None:
     """A notebook whose cells run again keeps no painter of before, nor its pictures."""
-    monkeypatch.setattr(Studio, "renders", property(lambda _: True))
+    monkeypatch.setattr(Studio, "has_scenes", property(lambda _: True))
 
     def closed() -> Any:
         painter = lp.Painter(basis)
@@ -775,7 +777,7 @@ def test_a_cell_that_is_put_right_finds_its_file(
 ) -> None:
     """Whatever was wrong with it, and also where an exception keeps what it was raised in."""
     path = tmp_path / "evening.db"
-    open_(store=path)._studio.said(protocol.Tie((("key", "fill"),)), {})
+    open_(store=path)._studio.handle(protocol.TieLights((("key", "fill"),)), {})
     asked = {"key": {"lock": [1, 1, 1]}, "fill": {"lock": [3, 1, 1]}}
     with pytest.raises(lp.LightpaintError, match="on one dimmer") as kept:
         open_(store=path, constraints=lp.Constraints.of(asked))

@@ -20,7 +20,7 @@ from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
     from lightpaint.paint.server.server import Server
-    from lightpaint.paint.store.light_requests import Wishes
+    from lightpaint.paint.store.light_requests import LightRequests
 
 #: What it means that others can.
 RISK = (
@@ -51,17 +51,17 @@ def paint(
 ) -> CommandOutcome:
     """`lightpaint paint SCENE|BASIS|LIGHTS`, of one view or of several."""
     # The server and the session file bring much that no other command needs.
-    from lightpaint.paint.launch import paint_in_browser, subjects_of
+    from lightpaint.paint.launch import make_subjects, paint_in_browser
     from lightpaint.paint.server.server import check_installed
 
     check_installed()
     from lightpaint.cli.commands.session_options import solve_command
     from lightpaint.cli.output.vocabulary import from_any_folder
 
-    def command(paintings: Mapping[str, str], wishes: "Wishes") -> str:
-        return from_any_folder(solve_command(sources[0].path, paintings, options, wishes))
+    def command(paintings: Mapping[str, str], requests: "LightRequests") -> str:
+        return from_any_folder(solve_command(sources[0].path, paintings, options, requests))
 
-    subjects = subjects_of(
+    subjects = make_subjects(
         sources,
         folder,
         settings=settings,
@@ -93,7 +93,7 @@ def paint(
             terminal.write(said)
         if with_browser and _has_browser():
             # Some browsers keep who starts them waiting.
-            given = (server.url_once(),)
+            given = (server.one_time_url(),)
             Thread(target=_show, args=given, name="browser", daemon=True).start()
 
     try:

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import Any
 
-from lightpaint.paint.store.light_requests import Wishes
+from lightpaint.paint.store.light_requests import LightRequests
 
 
 def solve_command(
-    source: str, paintings: Mapping[str, str], options: Sequence[str], wishes: Wishes
+    source: str, paintings: Mapping[str, str], options: Sequence[str], requests: LightRequests
 ) -> str:
     """The command that answers exported paintings as their session does.
 
@@ -18,17 +18,17 @@ def solve_command(
     words = ["lightpaint solve", quote(source)]
     for sensor, path in paintings.items():
         words.append(f"--target {quote(f'{sensor}={path}')}" if sensor else quote(path))
-    return " ".join([*words, *options, *options_of(wishes)])
+    return " ".join([*words, *options, *options_of(requests)])
 
 
-def options_of(wishes: Wishes) -> list[str]:
+def options_of(requests: LightRequests) -> list[str]:
     """What is asked, as options of `lightpaint solve`."""
     made = []
-    for name, asked in wishes.lights.items():
+    for name, asked in requests.lights.items():
         made += [option for key in asked for option in _options(name, key, asked)]
-    for names in wishes.ties:
+    for names in requests.ties:
         made.append(f"--tie {quote(','.join(names))}")
-    for key, value in wishes.values.items():
+    for key, value in requests.values.items():
         option = f"--{key.replace('_', '-')}"
         made.append(option if value is True else f"{option} {value}")
     return made

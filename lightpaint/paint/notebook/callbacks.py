@@ -1,4 +1,4 @@
-"""What a notebook's painter tells and is told: objects that are set, and callbacks that hear.
+"""Traits of the notebook's painter that cells set and observe, and callbacks that may fail.
 
 Imported only where ipywidgets is installed.
 """
@@ -13,26 +13,28 @@ import traitlets
 
 from lightpaint.files import first_line
 
-Told = TypeVar("Told")
-Given = TypeVar("Given")
+Readable = TypeVar("Readable")
+Assignable = TypeVar("Assignable")
 
 
-class LiveTrait(traitlets.Any, Generic[Told, Given]):  # type: ignore[misc]
-    """What the session tells with `set_trait`; what is assigned to it is a wish to the session."""
+class LiveTrait(traitlets.Any, Generic[Readable, Assignable]):  # type: ignore[misc]
+    """A trait that the session updates with `set_trait`; a cell that assigns to it asks the
+    session.
+    """
 
     if TYPE_CHECKING:
 
-        def __get__(self, obj: Any, cls: Any = None) -> Told: ...
+        def __get__(self, obj: Any, cls: Any = None) -> Readable: ...
 
-    def __set__(self, obj: Any, value: Given) -> None:
+    def __set__(self, obj: Any, value: Assignable) -> None:
         obj._assign(self.name, value)
 
 
 @dataclass(frozen=True)
 class Callback:
-    """A function that is told of changes: whatever it does, others are told as well.
+    """A function that observes changes; an error in it keeps no other callback from running.
 
-    warn: hears in one line what failed.
+    warn: receives in one line what failed.
     """
 
     handler: Callable[[Any], Any]
@@ -43,11 +45,11 @@ class Callback:
             self.handler(change)
         except Exception as error:
             # From the callback's own line on.
-            traceback.print_exception(error.with_traceback(_after_this(error)))
-            said = f"{type(error).__name__}: {first_line(error)}"
-            self.warn(f"a callback of painter.{change['name']} failed: {said}")
+            traceback.print_exception(error.with_traceback(_from_caller(error)))
+            text = f"{type(error).__name__}: {first_line(error)}"
+            self.warn(f"a callback of painter.{change['name']} failed: {text}")
 
 
-def _after_this(error: Exception) -> TracebackType | None:
+def _from_caller(error: Exception) -> TracebackType | None:
     here = error.__traceback__
     return here and (here.tb_next or here)

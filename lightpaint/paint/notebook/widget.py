@@ -1,7 +1,7 @@
 """The painter in a notebook: `lp.Painter`, an anywidget over the same page and the same session.
 
-The kernel's thread says and hears everything: what the studio's threads have to say is handed to
-its event loop, where there is one. Without one, as in a script, they say it themselves.
+All messages pass through the kernel's thread: the studio's threads hand theirs to its event loop.
+Without a loop, as in a script, they send them themselves.
 """
 
 import asyncio
@@ -24,10 +24,10 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
-from lightpaint.paint.background_threads import told
-from lightpaint.paint.notebook import widget_arguments as cells
+from lightpaint.paint.background_threads import error_text
+from lightpaint.paint.notebook import widget_arguments
 from lightpaint.paint.notebook.widget_files import widget_script, widget_style
-from lightpaint.paint.notebook.widget_views import Places
+from lightpaint.paint.notebook.widget_views import WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
@@ -47,29 +47,29 @@ try:
 except ImportError as error:
     raise PaintError("lp.Painter needs anywidget: pip install 'lightpaint[notebook]'") from error
 
-#: What can be set from a cell, and is told of.
-LIVE = ("target", "targets", "lighting", "constraints")
+#: Traits that cells set and observe.
+LIVE_TRAITS = ("target", "targets", "lighting", "constraints")
 
-#: What setting them means.
-ACTS: dict[str, Callable[[Session, Any], cells.Loaded]] = {
-    "target": cells.of_target,
-    "targets": cells.of_targets,
-    "lighting": cells.of_lighting,
-    "constraints": cells.of_constraints,
+#: Functions that turn a trait's new value into what the session loads.
+LOADERS: dict[str, Callable[[Session, Any], widget_arguments.LoadArguments]] = {
+    "target": widget_arguments.load_target,
+    "targets": widget_arguments.load_targets,
+    "lighting": widget_arguments.load_lighting,
+    "constraints": widget_arguments.load_constraints,
 }
 
 #: Painters of this process that keep their session in a file, by its path.
-KEPT_IN: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
+PAINTERS_BY_FILE: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
 
 
-#: Pixels of the screen with less than which nobody can paint.
-LEAST_HEIGHT = 240
+#: Least height of the painter, in pixels of the screen.
+MIN_HEIGHT = 240
 
-#: What a painter takes of the room beside other widgets: without it, an HBox gives it none.
-LAYOUT = {"width": "100%", "min_width": "320px"}
+#: Default layout: without a width, an HBox gives the painter none.
+DEFAULT_LAYOUT = {"width": "100%", "min_width": "320px"}
 
-#: How often what callbacks set may make callbacks set something again.
-ROUNDS = 20
+#: Rounds in which callbacks may set what makes callbacks set something again.
+MAX_CALLBACK_ROUNDS = 20
 
 
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]
@@ -116,7 +116,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     _esm = widget_script()
     _sheet = traitlets.Unicode(widget_style()).tag(sync=True)
-    height = traitlets.Int(720, min=LEAST_HEIGHT).tag(sync=True)
+    height = traitlets.Int(720, min=MIN_HEIGHT).tag(sync=True)
     target: LiveTrait[Target | None, Target | None] = LiveTrait(None)
     targets: LiveTrait[tuple[Target | None, ...], Sequence[Target | None]] = LiveTrait(())
     lighting: LiveTrait[Lighting | None, Lighting] = LiveTrait(None)
@@ -124,7 +124,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def __init__(
         self,
-        scene: cells.Paintable | Sequence[cells.Paintable],
+        scene: widget_arguments.Paintable | Sequence[widget_arguments.Paintable],
         target: Target | Sequence[Target | None] | None = None,
         *,
         constraints: Constraints | None = None,
@@ -135,29 +135,38 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         layout: Mapping[str, Any] | ipywidgets.Layout | None = None,
         **settings: Unpack[SettingsByName],
     ) -> None:
-        self._lock, self._is_there, self._is_telling = RLock(), Event(), False
+        self._lock, self._ready, self._is_notifying = RLock(), Event(), False
         self._is_closed = False
-        self._waiting: list[tuple[str, Any]] = []  # what is to be set as soon as it can be
+        self._pending: list[tuple[str, Any]] = []  # what is to be set as soon as it can be
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
-        asked = {"settings": cells.settings_given(settings, ARGUMENTS), "constraints": constraints}
-        transform = transform or cells.transform_of_paint(target)
-        subjects = cells.subjects_given(scene, folder=folder, transform=transform, **asked)
+        options = {
+            "settings": widget_arguments.read_settings(settings, ARGUMENT_NAMES),
+            "constraints": constraints,
+        }
+        transform = transform or widget_arguments.transform_of_targets(target)
+        subjects = widget_arguments.widget_subjects(
+            scene, folder=folder, transform=transform, **options
+        )
         if target is not None:
-            cells.check_given(target, subjects)
-        place = cells.place_given(store)
-        if place is not None:
-            if (before := KEPT_IN.get(place.resolve())) is not None:
+            widget_arguments.check_target_sizes(target, subjects)
+        path = widget_arguments.store_path(store)
+        if path is not None:
+            if (before := PAINTERS_BY_FILE.get(path.resolve())) is not None:
                 before.close()  # its cell runs again
-            KEPT_IN[place.resolve()] = self
-        self._studio = Studio(subjects, partial(_opened, place))
-        self._places = Places(self._studio, self._lock, self._carry)
+            PAINTERS_BY_FILE[path.resolve()] = self
+        self._studio = Studio(subjects, partial(_open_store, path))
+        self._views = WidgetViews(self._studio, self._lock, self._send_to_pages)
         self._failed = ""
-        room = layout if isinstance(layout, ipywidgets.Layout) else {**LAYOUT, **(layout or {})}
+        room = (
+            layout
+            if isinstance(layout, ipywidgets.Layout)
+            else {**DEFAULT_LAYOUT, **(layout or {})}
+        )
         super().__init__(height=height, layout=room)
-        self.on_msg(self._said)
-        self._studio.on_message = self._hears
+        self.on_msg(self._on_page_message)
+        self._studio.on_message = self._on_studio_message
         try:
             self._begin(target)
         except BaseException:
@@ -165,61 +174,70 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             raise
 
     def _begin(self, target: Target | Sequence[Target | None] | None) -> None:
-        """Paint, at once where nothing is to be rendered. Raises LightpaintError."""
+        """Start the studio, and wait for it where nothing is to be rendered. Raises
+        LightpaintError.
+        """
         self._studio.start()
-        if self._studio.renders:
+        if self._studio.has_scenes:
             atexit.register(self.close)  # what renders cannot be left alone at the end
         else:
-            self._is_there.wait()
+            self._ready.wait()
             if self._failed:
                 raise PaintError(self._failed)
-            self._follow()
+            self._sync_traits()
         if target is not None:
-            self._set_once_there("targets" if cells.is_of_each_view(target) else "target", target)
+            self._set_when_ready(
+                "targets" if widget_arguments.is_per_view(target) else "target", target
+            )
 
     def __repr__(self) -> str:
         first, *others = self._studio.subjects
-        its = first.loaded if first.basis is None else first.basis
+        its = first.loaded_scene if first.basis is None else first.basis
         shown = f"{its.size[1]}x{its.size[0]}" if not others else f"{1 + len(others)} views"
         return f"Painter({first.name}, {len(its.lights)} lights, {shown})"
 
     @property
     def solution(self) -> Solution | None:
-        """The exact answer to what is painted now, with all that is known of it; None where
-        nothing is. Raises LightpaintError.
+        """Exact answer to the paintings as they are now, with its analysis; None where nothing is
+        painted.
+
+        Raises LightpaintError.
         """
-        moment = self._studio.moment()
-        if self._solved is None or self._solved[0] != moment.version:
-            found = moment.solution()
+        snapshot = self._studio.snapshot()
+        if self._solved is None or self._solved[0] != snapshot.version:
+            found = snapshot.solution()
             if found is not None:
                 found = with_findings(found, analyse(found))
-            self._solved = moment.version, found
+            self._solved = snapshot.version, found
         return self._solved[1]
 
     def save(self, path: str | Path, *, view: int = 0) -> None:
-        """Keep the painting (`.exr`) or its lighting (`.json`), as `lightpaint solve` reads them.
+        """Write the painting (`.exr`) or its lighting (`.json`), as `lightpaint solve` reads them.
 
-        view: of which view, in the order in which they were given.
+        view: index of the view, in the order in which the views were given.
 
-        Raises PaintError where nothing is painted yet, for another kind of file, or for a view that
-        there is none of.
+        Raises PaintError where nothing is painted yet, for another kind of file, and for a view
+        that does not exist.
         """
-        path, moment = Path(path), self._studio.moment()
-        if view not in range(len(moment.targets)):
-            raise PaintError(f"view is {view!r}: expected one of {len(moment.targets)}, from 0 on")
+        path, snapshot = Path(path), self._studio.snapshot()
+        if view not in range(len(snapshot.targets)):
+            raise PaintError(
+                f"view is {view!r}: expected one of {len(snapshot.targets)}, from 0 on"
+            )
         if path.suffix == ".json":
             write_lighting(path, self._lighting())
         elif path.suffix != ".exr":
             raise PaintError(f"{path}: expected .exr for the painting, .json for the lighting")
-        elif (target := moment.targets[view]) is None:
+        elif (target := snapshot.targets[view]) is None:
             raise PaintError("nothing is painted yet: there is no painting to keep")
         else:
             write_painting(path, target)
 
     def close(self) -> None:
-        """End it; a session with a file can be gone on with. A second time it does nothing.
+        """End the painter; a session with a file can be continued. Closing twice does nothing.
 
-        Raises OutputError if what was done last could not be written; it has ended all the same.
+        Raises OutputError if the last steps could not be written; the painter has ended all the
+        same.
         """
         if "_studio" not in vars(self) or self._is_closed:  # it has never begun, or ended before
             return
@@ -230,75 +248,84 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._studio.close()
         finally:
             super().close()
-            if self._studio.renders:
+            if self._studio.has_scenes:
                 self._studio.wait()
 
-    # What is set from a cell
+    # Assignments from a cell
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Raises AttributeError for a slip of the pen, which would be an attribute of its own."""
-        is_there = name.startswith("_") or hasattr(type(self), name)
-        if not is_there and (meant := cells.meant(name, [*LIVE, "height"])):
-            raise AttributeError(f"lp.Painter has no attribute {name!r}{meant}")
+        """Set an attribute. Raises AttributeError for a misspelt name, which would be a new
+        attribute.
+        """
+        is_known = name.startswith("_") or hasattr(type(self), name)
+        if not is_known and (hint := widget_arguments.did_you_mean(name, [*LIVE_TRAITS, "height"])):
+            raise AttributeError(f"lp.Painter has no attribute {name!r}{hint}")
         super().__setattr__(name, value)
 
     def _assign(self, name: str, value: Any) -> None:
-        """Do what somebody sets, or raise where they set it; a callback's wish is done later."""
+        """Apply what a cell sets, or raise where it sets it; what a callback sets is
+        applied later.
+        """
         if self._is_closed:
             raise PaintError(f"painter.{name} cannot be set: it is closed; make another lp.Painter")
         with self._lock:  # another thread may be telling something now
-            wish = ACTS[name](self._studio.session, value)
-            if self._is_telling:
-                self._waiting.append((name, value))
+            arguments = LOADERS[name](self._studio.session, value)
+            if self._is_notifying:
+                self._pending.append((name, value))
             else:
-                self._do(wish)
+                self._apply(arguments)
 
-    def _do(self, wish: cells.Loaded) -> None:
-        """Raises LightpaintError for what cannot be had."""
-        paintings, wishes, _ = wish
-        if not paintings and wishes == self._studio.session.wishes:
+    def _apply(self, arguments: widget_arguments.LoadArguments) -> None:
+        """Load paintings and requests into the session. Raises LightpaintError for what it
+        refuses.
+        """
+        paintings, requests, _ = arguments
+        if not paintings and requests == self._studio.session.requests:
             return  # it would be a step in which nothing happens, and answered for nothing
-        for message in self._studio.load(*wish):
-            self._places.tell(message)
-        self._follow()
+        for message in self._studio.load(*arguments):
+            self._views.send(message)
+        self._sync_traits()
 
-    def _set_waiting(self) -> None:
-        """What has been waiting is set, and then what callbacks have set meanwhile."""
-        for _ in range(ROUNDS):
-            waiting, self._waiting = self._waiting, []
-            for name, value in waiting:
-                self._set_late(name, value)
-        if self._waiting:
-            self._waiting = []
+    def _apply_pending(self) -> None:
+        """Apply what has been waiting, and then what callbacks have set meanwhile."""
+        for _ in range(MAX_CALLBACK_ROUNDS):
+            pending, self._pending = self._pending, []
+            for name, value in pending:
+                self._apply_late(name, value)
+        if self._pending:
+            self._pending = []
             self._warn(
                 "callbacks of the painter set something again whenever they are told of what they "
                 "have set: the last of it was not set"
             )
 
-    def _set_late(self, name: str, value: Any) -> None:
-        """What fails is shown, and ends nothing: who set it has gone on."""
+    def _apply_late(self, name: str, value: Any) -> None:
+        """Apply what was set earlier; a failure is shown and ends nothing, since its cell has
+        ended.
+        """
         try:
-            self._do(ACTS[name](self._studio.session, value))
+            self._apply(LOADERS[name](self._studio.session, value))
         except Exception as error:
             traceback.print_exc()
-            self._warn(f"painter.{name} was not set: {told(error, at_length=False)}")
+            self._warn(f"painter.{name} was not set: {error_text(error, at_length=False)}")
 
-    # What is told
+    # Notifications
 
     def observe(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:
-        """Have `handler` called with each change; what fails in it is shown, and ends nothing.
+        """Call `handler` with each change; an error in it is shown and ends nothing.
 
-        Raises PaintError for what cannot be called, and for names that there is nothing of.
+        Raises PaintError for a handler that cannot be called, and for names that are not traits.
         """
         if not callable(handler):
             raise PaintError(f"{handler!r} cannot observe a painter: expected a function")
         for name in [names] if isinstance(names, str) or names is traitlets.All else names:
             if name is not traitlets.All and not self.has_trait(name):
-                raise PaintError(f"painter.{name} cannot be observed{cells.meant(name, LIVE)}")
+                hint = widget_arguments.did_you_mean(name, LIVE_TRAITS)
+                raise PaintError(f"painter.{name} cannot be observed{hint}")
         super().observe(self._callback(handler), names, type)
 
     def unobserve(self, handler: Any, names: Any = traitlets.All, type: str = "change") -> None:
-        """Have it called no more."""
+        """Call `handler` no more."""
         super().unobserve(self._callback(handler), names, type)
 
     def _callback(self, handler: Any) -> Any:
@@ -306,97 +333,101 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         return handler if isinstance(handler, ObserveHandler) else Callback(handler, self._warn)
 
     def _warn(self, text: str) -> None:
-        self._places.tell(Notice(text=text, tone="warn"))
+        self._views.send(Notice(text=text, tone="warn"))
 
-    def _now(self) -> dict[str, Any]:
-        """What the session has, by name of what says so; what has not changed is the same object.
+    def _current_values(self) -> dict[str, Any]:
+        """Return the values of all live traits; a value that has not changed is the same object.
 
-        An exact answer comes twice, the second time with all that is known of it.
+        An exact answer arrives twice, the second time with its analysis.
         """
-        moment, lighting = self._studio.now()
-        targets = moment.targets
-        name = " + ".join(target.name for target in moment.painted_targets)
-        if cells.same_paintings(targets, self.targets):
+        snapshot, lighting = self._studio.snapshot_and_lighting()
+        targets = snapshot.targets
+        name = " + ".join(target.name for target in snapshot.painted_targets)
+        if widget_arguments.same_paintings(targets, self.targets):
             targets = self.targets
         lighting = lighting.named(name)
         return {
             "target": targets[0],
             "targets": targets,
             "lighting": self.lighting if lighting == self.lighting else lighting,
-            "constraints": moment.wishes.constraints(),
+            "constraints": snapshot.requests.constraints(),
         }
 
-    def _follow(self, new: dict[str, Any] | None = None) -> None:
-        """Have the live objects say what the session has."""
-        with self._telling():
-            for name, value in (new or self._now()).items():
+    def _sync_traits(self, new: dict[str, Any] | None = None) -> None:
+        """Set the live traits to the session's values."""
+        with self._notifying():
+            for name, value in (new or self._current_values()).items():
                 if value is not getattr(self, name):
                     self.set_trait(name, value)
 
     @contextmanager
-    def _telling(self) -> Iterator[None]:
-        """Who observes is told; what callbacks set is set when all have been told."""
+    def _notifying(self) -> Iterator[None]:
+        """Hold back what callbacks set until all observers have been called."""
         with self._lock:  # two threads that tell would each take the other's callbacks for theirs
-            before, self._is_telling = self._is_telling, True
+            before, self._is_notifying = self._is_notifying, True
             try:
                 yield
                 if not before:
-                    self._set_waiting()
+                    self._apply_pending()
             finally:
-                self._is_telling = before
+                self._is_notifying = before
 
     def _lighting(self) -> Lighting:
-        """The exact answer, or what is asked where nothing is painted."""
+        """Return the exact answer, or the requested lighting where nothing is painted."""
         solution = self.solution
-        return self._studio.now()[1] if solution is None else solution.lighting
+        return self._studio.snapshot_and_lighting()[1] if solution is None else solution.lighting
 
-    # What page and session say
+    # Messages of page and studio
 
-    def _said(self, _: Any, content: Any, buffers: Any) -> None:
-        self._places.hear(content, buffers)
+    def _on_page_message(self, _: Any, content: Any, buffers: Any) -> None:
+        self._views.receive(content, buffers)
 
-    def _carry(self, content: dict[str, Any], buffers: list[bytes]) -> None:
+    def _send_to_pages(self, content: dict[str, Any], buffers: list[bytes]) -> None:
         if self.comm is not None:
             self.send(content, buffers)
 
-    def _hears(self, message: Message) -> None:
-        """What the studio says by itself, from a thread of its own."""
+    def _on_studio_message(self, message: Message) -> None:
+        """Handle a message that the studio sends by itself, from a thread of its own."""
 
         def act() -> None:
             with self._lock:
-                self._heard(message)
+                self._forward(message)
 
-        if not self._is_there.is_set() and isinstance(message, SessionState | Notice):
+        if not self._ready.is_set() and isinstance(message, SessionState | Notice):
             self._failed = message.text if isinstance(message, Notice) else ""
-            self._is_there.set()
+            self._ready.set()
         if self._loop is None:
             act()
         elif not self._loop.is_closed():
             self._loop.call_soon_threadsafe(act, context=self._context)
 
-    def _heard(self, message: Message) -> None:
-        self._places.tell(message)
+    def _forward(self, message: Message) -> None:
+        self._views.send(message)
         if isinstance(message, SessionState) or _is_exact(message):
-            self._follow()
+            self._sync_traits()
 
-    def _set_once_there(self, name: str, value: Any) -> None:
-        """Now, or as soon as there is something to paint on. Raises LightpaintError if now."""
+    def _set_when_ready(self, name: str, value: Any) -> None:
+        """Set a trait now, or as soon as there is something to paint on. Raises LightpaintError if
+        now.
+        """
         with self._lock:
             if self._studio.store is None:
-                self._waiting.append((name, value))
+                self._pending.append((name, value))
             else:
                 setattr(self, name, value)
 
 
-#: What a painter is given that is no setting.
-ARGUMENTS = [name for name in signature(Painter).parameters if name not in ("self", "settings")]
+#: Arguments of a painter that are no settings.
+ARGUMENT_NAMES = [
+    name for name in signature(Painter).parameters if name not in ("self", "settings")
+]
 
 
-def _opened(place: Path | None, identity: Identity) -> Store:
-    if place is None:
+def _open_store(path: Path | None, identity: Identity) -> Store:
+    if path is None:
         return MemoryStore(identity)
-    with cells.in_a_notebook():
-        return Store.open(place, identity)
+    with widget_arguments.notebook_advice():
+        return Store.open(path, identity)
 
 
 def _is_exact(message: Message) -> bool:

@@ -1,4 +1,4 @@
-"""What a cell of a notebook gives to a painter, and sets in it."""
+"""Arguments and assignments of the notebook's painter, checked and translated for the session."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,10 +19,10 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.loss.painting import what_counts
 from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session_file import check_together
+from lightpaint.paint.session_file import check_view_names
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.database import AFRESH, ELSEWHERE
-from lightpaint.paint.store.light_requests import Wishes
+from lightpaint.paint.store.database import OTHER_FOLDER, START_AFRESH
+from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import check_nothing_idle
@@ -30,116 +30,125 @@ from lightpaint.scene.presets import on_film
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.target.target import Target
 
-#: What can be painted.
+#: Types that can be painted.
 Paintable = Basis | Scene | LightGroups | str | Path
 
-#: What errors advise who paints in a folder, or solves, and who paints in a notebook.
-ADVICE = {
-    AFRESH: "give another file as its store, or give that one another name",
-    ELSEWHERE: "give another file as its store",
+#: Advice in errors, by that for the command line and `solve`.
+NOTEBOOK_ADVICE = {
+    START_AFRESH: "give another file as its store, or give that one another name",
+    OTHER_FOLDER: "give another file as its store",
     "pass resize=True": "give target.resized((height, width))",
 }
 
-#: Paintings by view, what is asked with them, and what undo calls it.
-Loaded = tuple[Mapping[int, Pixels], Wishes, str]
+#: Arguments of `Studio.load`: paintings by view, requests, and the label of the step.
+LoadArguments = tuple[Mapping[int, Pixels], LightRequests, str]
 
 
-def of_targets(session: Session, targets: Any) -> Loaded:
-    """These paintings, one for each view; None leaves a view unpainted. Raises LightpaintError."""
-    fitted = _fitted_targets(targets, [view.size for view in session.views])
-    paintings = {k: _painting(session, k, one) for k, one in enumerate(fitted)}
-    return paintings, _as_painted(session.wishes, fitted), "paintings from a cell"
+def load_targets(session: Session, targets: Any) -> LoadArguments:
+    """Return what loads these paintings, one for each view; None leaves a view unpainted.
+
+    Raises LightpaintError.
+    """
+    fitted = _fit_targets(targets, [view.size for view in session.views])
+    paintings = {k: _pixels_to_load(session, k, one) for k, one in enumerate(fitted)}
+    return paintings, _requests_for(session.requests, fitted), "paintings from a cell"
 
 
-def of_target(session: Session, target: Any) -> Loaded:
-    """This painting of the first view. Raises LightpaintError."""
-    fitted = _fitted(target, session.views[0].size, "target")
-    wishes = _as_painted(session.wishes, [fitted])
-    return {0: _painting(session, 0, fitted)}, wishes, "painting from a cell"
+def load_target(session: Session, target: Any) -> LoadArguments:
+    """Return what loads this painting of the first view. Raises LightpaintError."""
+    fitted = _fit_target(target, session.views[0].size, "target")
+    requests = _requests_for(session.requests, [fitted])
+    return {0: _pixels_to_load(session, 0, fitted)}, requests, "painting from a cell"
 
 
-def _as_painted(wishes: Wishes, targets: Sequence[Target | None]) -> Wishes:
-    """Return `wishes` that answer these as `lp.solve` does: what follows from how they were made.
+def _requests_for(requests: LightRequests, targets: Sequence[Target | None]) -> LightRequests:
+    """Return `requests` that answer these paintings as `lp.solve` does.
 
-    What is light, with nothing under it, is taken at its word; what holds numbers of a display and
-    lay over nothing holds nothing else, unless somebody has said how firmly.
+    A painting of light, over nothing, is taken literally. One that holds display values, and was
+    painted over nothing, holds nothing unpainted, unless somebody has set how firmly.
     """
     painted = [target for target in targets if target is not None]
     if not painted:
-        return wishes
+        return requests
     over_look = any(target.over_look for target in painted)
     on_display = any(target.through_view for target in painted)
-    made = wishes.of_answer({"literal": not (over_look or on_display)})
+    made = requests.with_values({"literal": not (over_look or on_display)})
     if on_display and not over_look and "hold" not in made.values:
-        made = made.of_answer({"hold": 0.0})
+        made = made.with_values({"hold": 0.0})
     return made
 
 
-def check_given(target: Any, subjects: Sequence[Subject]) -> None:
-    """Raise LightpaintError for what cannot be painted on, also while its lights are rendered."""
-    sizes = [(subject.basis or subject.loaded).size for subject in subjects]
-    if is_of_each_view(target):
-        _fitted_targets(target, sizes)
+def check_target_sizes(target: Any, subjects: Sequence[Subject]) -> None:
+    """Raise LightpaintError for what cannot be painted on, even while its lights are still
+    rendered.
+    """
+    sizes = [(subject.basis or subject.loaded_scene).size for subject in subjects]
+    if is_per_view(target):
+        _fit_targets(target, sizes)
     else:
-        _fitted(target, sizes[0], "target")
+        _fit_target(target, sizes[0], "target")
 
 
-def transform_of_paint(target: Any) -> ViewTransform | None:
-    """Return the one view transform that a target, or those of all views, were seen through."""
-    targets = target if is_of_each_view(target) else [target]
+def transform_of_targets(target: Any) -> ViewTransform | None:
+    """Return the one view transform through which a target, or those of all views, were painted."""
+    targets = target if is_per_view(target) else [target]
     seen = {its.transform for its in targets if isinstance(its, Target) and its.through_view}
     return seen.pop() if len(seen) == 1 else None
 
 
-def is_of_each_view(target: Any) -> bool:
-    """Whether it stands for `targets`, and not for the first of them alone."""
+def is_per_view(target: Any) -> bool:
+    """Return whether a value stands for `targets`, and not for the first one alone."""
     return isinstance(target, list | tuple)
 
 
-def _fitted_targets(targets: Any, sizes: Sequence[tuple[int, int]]) -> list[Target | None]:
-    if not is_of_each_view(targets) or len(targets) != len(sizes):
+def _fit_targets(targets: Any, sizes: Sequence[tuple[int, int]]) -> list[Target | None]:
+    if not is_per_view(targets) or len(targets) != len(sizes):
         raise PaintError(
             f"painter.targets is a list of {len(sizes)}, a lp.Target or None for each view"
         )
-    return [_fitted(one, size, "targets") for one, size in zip(targets, sizes, strict=True)]
+    return [_fit_target(one, size, "targets") for one, size in zip(targets, sizes, strict=True)]
 
 
-def _fitted(target: Any, size: tuple[int, int], name: str) -> Target | None:
+def _fit_target(target: Any, size: tuple[int, int], name: str) -> Target | None:
     if not isinstance(target, Target | None):
         kind = type(target).__name__
-        raise PaintError(f"painter.{name} is a lp.Target or None, not {kind}{_made_of(target)}")
-    with in_a_notebook():
+        raise PaintError(
+            f"painter.{name} is a lp.Target or None, not {kind}{_conversion_hint(target)}"
+        )
+    with notebook_advice():
         return None if target is None else target.fitted_to(size, resize=False)
 
 
-def _made_of(given: Any) -> str:
-    """How a target is made of that."""
-    if isinstance(given, np.ndarray):
+def _conversion_hint(value: Any) -> str:
+    """Return how to make a target of such a value."""
+    if isinstance(value, np.ndarray):
         return ": give lp.Target.of(array)"
-    return ": give lp.read_target(path)" if isinstance(given, str | Path) else ""
+    return ": give lp.read_target(path)" if isinstance(value, str | Path) else ""
 
 
 @contextmanager
-def in_a_notebook() -> Iterator[None]:
-    """What an error advises, in arguments that a painter has."""
+def notebook_advice() -> Iterator[None]:
+    """Rename the arguments in an error's advice to those that a painter has."""
     try:
         yield
     except LightpaintError as error:
         text = str(error)
-        for elsewhere, here in ADVICE.items():
+        for elsewhere, here in NOTEBOOK_ADVICE.items():
             text = text.replace(elsewhere, here)
         raise type(error)(text) from None
 
 
-def _painting(session: Session, view: int, target: Target | None) -> Pixels:
+def _pixels_to_load(session: Session, view: int, target: Target | None) -> Pixels:
     if target is None:
         return Pixels.unpainted(session.views[view].present)
     its = session.views[view]
-    return _pixels_of(what_counts(target, its.basis.emitters_seen, session.answering.fit.emitters))
+    return _pixels_of(
+        what_counts(target, its.basis.emitters_seen, session.live_answer.fit.emitters)
+    )
 
 
-def of_lighting(session: Session, lighting: Any) -> Loaded:
-    """Every light held there. Raises LightpaintError."""
+def load_lighting(session: Session, lighting: Any) -> LoadArguments:
+    """Return what locks every light at this lighting. Raises LightpaintError."""
     if not isinstance(lighting, Lighting):
         raise PaintError(f"painter.lighting is a lp.Lighting, not {type(lighting).__name__}")
     weights = lighting.weights_for(session.basis)
@@ -148,82 +157,84 @@ def of_lighting(session: Session, lighting: Any) -> Loaded:
         for light, weight in zip(session.basis.lights, weights, strict=True)
         if not light.is_fixed
     }
-    wishes = Wishes(lights, session.wishes.ties, session.wishes.values)
-    return {}, wishes, "lighting from a cell"
+    requests = LightRequests(lights, session.requests.ties, session.requests.values)
+    return {}, requests, "lighting from a cell"
 
 
-def of_constraints(session: Session, constraints: Any) -> Loaded:
-    """This asked, and nothing else. Raises LightpaintError."""
+def load_constraints(session: Session, constraints: Any) -> LoadArguments:
+    """Return what replaces all requests by these constraints. Raises LightpaintError."""
     if not isinstance(constraints, Constraints | None):
         kind = type(constraints).__name__
         raise PaintError(f"painter.constraints is a lp.Constraints or None, not {kind}")
-    lights, values = session.basis.lights, session.wishes.values
-    wishes = Wishes.asking(constraints or Constraints(), lights, values)
-    return {}, wishes, "constraints from a cell"
+    lights, values = session.basis.lights, session.requests.values
+    requests = LightRequests.from_constraints(constraints or Constraints(), lights, values)
+    return {}, requests, "constraints from a cell"
 
 
 def same_paintings(new: Sequence[Target | None], old: Sequence[Target | None]) -> bool:
-    """Whether nothing has been painted between them."""
-    return len(new) == len(old) and all(map(_same, new, old))
+    """Return whether nothing has been painted between two tuples of targets."""
+    return len(new) == len(old) and all(map(_is_same_target, new, old))
 
 
-def _same(new: Target | None, old: Target | None) -> bool:
+def _is_same_target(new: Target | None, old: Target | None) -> bool:
     if new is None or old is None:
         return new is old
-    return _pixels_of(new).same(_pixels_of(old))
+    return _pixels_of(new).equals(_pixels_of(old))
 
 
 def _pixels_of(target: Target) -> Pixels:
     return Pixels(target.image, target.importance, target.at_least)
 
 
-def settings_given(given: Mapping[str, Any], names: Iterable[str]) -> Settings:
-    """What a painter is given by name beside its own arguments, `names`.
+def read_settings(value: Mapping[str, Any], names: Iterable[str]) -> Settings:
+    """Return the `Settings` among a painter's keyword arguments; `names` are its other arguments.
 
-    Raises TypeError for what has no such name, LightpaintError for a value that means nothing.
+    Raises TypeError for an unknown name, LightpaintError for an invalid value.
     """
     known = [field.name for field in fields(Settings)]
-    for name in given:
+    for name in value:
         if name not in known:
-            raise TypeError(f"lp.Painter has no argument {name!r}{meant(name, [*names, *known])}")
-    return Settings(**given)
+            raise TypeError(
+                f"lp.Painter has no argument {name!r}{did_you_mean(name, [*names, *known])}"
+            )
+    return Settings(**value)
 
 
-def meant(name: str, known: Iterable[str]) -> str:
-    """Behind an error of a name that there is nothing of; nothing if none is near."""
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return a hint to append to an error about an unknown name; "" if no known name is near."""
     near = get_close_matches(name, known, 1)
     return f": did you mean {near[0]!r}?" if near else ""
 
 
-def place_given(store: Any) -> Path | None:
-    """Where a session is kept. Raises PaintError for what is no path."""
+def store_path(store: Any) -> Path | None:
+    """Return the path of the session file, if one is given. Raises PaintError for anything else."""
     if not isinstance(store, str | Path | None):
         raise PaintError(f"store is {store!r}: expected the path of a file, like 'evening.db'")
     return None if store is None else Path(store)
 
 
-def subjects_given(given: Paintable | Sequence[Paintable], **how: Any) -> tuple[Subject, ...]:
-    """What is painted, of one view or of several. how: as of `_subject`.
+def widget_subjects(value: Paintable | Sequence[Paintable], **options: Any) -> tuple[Subject, ...]:
+    """Return what is to be painted, of one view or of several. options: as of `_make_subject`.
 
-    Raises LightpaintError for what cannot be.
+    Raises LightpaintError for what cannot be painted.
     """
-    _check_asked(**how)
-    several = list(given) if isinstance(given, list | tuple) else [given]
+    _check_types(**options)
+    several = list(value) if isinstance(value, list | tuple) else [value]
     if not several:
         raise PaintError("lp.Painter paints at least one view: give a basis, or a scene")
-    made = tuple(_subject(one, among=len(several), **how) for one in several)
+    made = tuple(_make_subject(one, view_count=len(several), **options) for one in several)
     if len(made) > 1 and len({subject.scene is None for subject in made}) > 1:
         raise PaintError("scenes and bases at once: give one kind for all views")
     if len(made) > 1 and any(subject.groups is not None for subject in made):
         raise PaintError("light groups have one view only: give bases, or scenes")
-    check_together([subject.sensor for subject in made])
+    check_view_names([subject.sensor for subject in made])
     bases = [subject.basis for subject in made if subject.basis is not None]
     for basis in bases[1:]:
         check_same_lights(bases[0], basis)
     return made
 
 
-def _check_asked(*, constraints: Any, transform: Any, **_: Any) -> None:
+def _check_types(*, constraints: Any, transform: Any, **_: Any) -> None:
     if not isinstance(constraints, Constraints | None):
         kind = type(constraints).__name__
         raise PaintError(f"the constraints are a {kind}: give lp.Constraints.of(...)")
@@ -233,42 +244,44 @@ def _check_asked(*, constraints: Any, transform: Any, **_: Any) -> None:
         )
 
 
-def _subject(
-    given: Any,
+def _make_subject(
+    value: Any,
     folder: str | Path | None,
     settings: Settings,
     constraints: Constraints | None,
     transform: ViewTransform | TransformChoice | None,
-    among: int,
+    view_count: int,
 ) -> Subject:
-    """What is painted. Raises LightpaintError for what cannot be."""
+    """Return what is to be painted in one view. Raises LightpaintError for what cannot be
+    painted.
+    """
     about: dict[str, Any] = {
         "settings": settings,
         "constraints": constraints or Constraints(),
         "choice": TransformChoice.of(transform),
-        "among": among,
+        "view_count": view_count,
     }
-    if isinstance(given, str | Path):
-        if Path(given).suffix.lower() == ".exr":
+    if isinstance(value, str | Path):
+        if Path(value).suffix.lower() == ".exr":
             raise PaintError(
-                f"{given} is no scene: give lp.read_basis({str(given)!r}) or, of another "
-                f"renderer's light groups, lp.read_light_groups({str(given)!r})"
+                f"{value} is no scene: give lp.read_basis({str(value)!r}) or, of another "
+                f"renderer's light groups, lp.read_light_groups({str(value)!r})"
             )
-        given = load_scene(given)
-    if isinstance(given, Scene):
-        scene = on_film(given, settings.quality, settings.resolution)
+        value = load_scene(value)
+    if isinstance(value, Scene):
+        scene = on_film(value, settings.quality, settings.resolution)
         name = str(scene.path)
         about |= {"scene": scene}
-    elif isinstance(given, LightGroups):
-        name = str(given.path)
-        about |= {"basis": given.basis, "groups": given}
-    elif isinstance(given, Basis):
-        name = given.source or given.origin.scene
-        about |= {"basis": given}
+    elif isinstance(value, LightGroups):
+        name = str(value.path)
+        about |= {"basis": value.basis, "groups": value}
+    elif isinstance(value, Basis):
+        name = value.source or value.origin.scene
+        about |= {"basis": value}
     else:
-        kind = type(given).__name__
+        kind = type(value).__name__
         raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")
-    if not isinstance(given, Scene):
-        check_nothing_idle(settings, given)
+    if not isinstance(value, Scene):
+        check_nothing_idle(settings, value)
     place = Path(f"{called(Path(name))}.paint") if folder is None else Path(folder)
     return Subject(source=name, folder=place.absolute(), **about)

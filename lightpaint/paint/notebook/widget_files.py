@@ -4,10 +4,10 @@ from lightpaint.viewer.bundle import bundled, styles
 
 
 def widget_script() -> str:
-    """The painter as one ES module, whose default export is an anywidget's."""
+    """Return the painter as one ES module, whose default export is an anywidget's."""
     return bundled("paint/page/widget.js")
 
 
 def widget_style() -> str:
-    """Its style sheet."""
+    """Return the style sheet of the painter."""
     return styles("paint/page/style.css")

@@ -1,22 +1,30 @@
-"""The places of a notebook at which one painter is shown: who has it, and what is said to whom."""
+"""The views of one painter in a notebook: which of them has the session, and who receives what."""
 
 from collections.abc import Callable
 from threading import RLock
 from typing import Any
 
-from lightpaint.paint.background_threads import told, tone_of
-from lightpaint.paint.frames import said_of
-from lightpaint.paint.protocol import VERSION, Closing, Failure, Hello, Message, Said, TakeOver
+from lightpaint.paint.background_threads import error_text, error_tone
+from lightpaint.paint.frames import parse_request
+from lightpaint.paint.protocol import (
+    VERSION,
+    AnyRequest,
+    Closing,
+    Failure,
+    Hello,
+    Message,
+    TakeOver,
+)
 from lightpaint.paint.studio import Studio
 
-#: Numbers of messages that one place has at which the painter is shown: `seq // MESSAGES`.
-MESSAGES = 2**32
+#: Message numbers of one view, which is view `seq // MESSAGES_PER_VIEW`.
+MESSAGES_PER_VIEW = 2**32
 
 
-class Places:
-    """Pages of one studio, of which all hear what is sent, and the one shown last has it.
+class WidgetViews:
+    """The places in a notebook that show one painter; the one shown last has the session.
 
-    lock: held while a message is answered. send: JSON and buffers, to all of them.
+    lock: held while a message is answered. send: sends JSON and buffers to all of them.
     """
 
     def __init__(
@@ -25,43 +33,43 @@ class Places:
         self._studio, self._lock, self._send = studio, lock, send
         self._page = 0
 
-    def hear(self, content: Any, buffers: Any) -> None:
-        """Answer a page, whatever it says."""
+    def receive(self, content: Any, buffers: Any) -> None:
+        """Answer a page, whatever it sends."""
         seq = content.get("seq") if isinstance(content, dict) else None
         try:
-            seq, said, arrays = said_of(content, [bytes(x) for x in buffers or ()])
-            page = seq // MESSAGES
+            seq, request, arrays = parse_request(content, [bytes(x) for x in buffers or ()])
+            page = seq // MESSAGES_PER_VIEW
             with self._lock:
-                if (answers := self._answers(page, said, arrays)) is None:
-                    self._tell_taken(page, seq)
+                if (answers := self._handle(page, request, arrays)) is None:
+                    self._send_taken(page, seq)
                     return
         except Exception as error:  # of our own, too, which anywidget would say nothing of
-            answers = [Failure(text=told(error), tone=tone_of(error))]
+            answers = [Failure(text=error_text(error), tone=error_tone(error))]
         for k, message in enumerate(answers):
-            self.tell(message, seq if k == 0 else None)
+            self.send(message, seq if k == 0 else None)
 
-    def _answers(self, page: int, said: Said, arrays: Any) -> list[Message] | None:
-        """What is answered; None to a page that does not have it."""
-        if isinstance(said, Hello) and said.version != VERSION:
+    def _handle(self, page: int, request: AnyRequest, arrays: Any) -> list[Message] | None:
+        """Return the answers to a request; None for a page that does not have the session."""
+        if isinstance(request, Hello) and request.version != VERSION:
             text = "lightpaint has been updated: run the cell again"
             return [Closing(reason="version", text=text)]
-        if isinstance(said, Hello | TakeOver):
+        if isinstance(request, Hello | TakeOver):
             is_back = page == self._page
-            self._give(page)
+            self._hand_over(page)
             return [self._studio.greet(is_back=is_back)]
-        return self._studio.said(said, arrays) if page == self._page else None
+        return self._studio.handle(request, arrays) if page == self._page else None
 
-    def _give(self, page: int) -> None:
-        """Who was shown last has the session; who had it is told."""
+    def _hand_over(self, page: int) -> None:
+        """Give the session to the page that was shown last, and tell the one that had it."""
         before, self._page = self._page, page
         if before not in (0, page):
-            self._tell_taken(before)
+            self._send_taken(before)
 
-    def _tell_taken(self, page: int, reply: int | None = None) -> None:
+    def _send_taken(self, page: int, reply: int | None = None) -> None:
         text = "the painter is open at another place"
-        self.tell(Closing(reason="taken", text=text), reply, page=page)
+        self.send(Closing(reason="taken", text=text), reply, page=page)
 
-    def tell(self, message: Message, reply: int | None = None, *, page: int | None = None) -> None:
-        """Say it to who has the painter, or to `page`."""
+    def send(self, message: Message, reply: int | None = None, *, page: int | None = None) -> None:
+        """Send a message to the page that has the session, or to `page`."""
         about = {"page": self._page if page is None else page}
         self._send(message.content(reply) | about, message.buffers())

@@ -12,20 +12,21 @@ import numpy.typing as npt
 DTYPES = {"float16": "<f2", "float32": "<f4", "float64": "<f8", "int16": "<i2", "uint8": "|u1"}
 
 
-#: Of a field that a message leaves out while it is None.
+#: Metadata of a field that a message omits while it is None.
 OPTIONAL = {"is_optional": True}
 
 
 class Message:
-    """One message: a frozen dataclass, whose arrays travel beside the JSON of its other fields.
+    """Base of all messages: a frozen dataclass, whose arrays travel beside the JSON of its other
+    fields.
 
     Attributes:
         kind: Names the message in its JSON.
-        buffers_given: Arrays that a client sends beside a message, and what each holds.
+        request_buffers: Arrays that a client sends beside a message, and what each holds.
     """
 
     kind: ClassVar[str] = ""
-    buffers_given: ClassVar[Mapping[str, str]] = {}
+    request_buffers: ClassVar[Mapping[str, str]] = {}
 
     def __init_subclass__(cls, *, kind: str = "", **more: Any) -> None:
         super().__init_subclass__(**more)
@@ -34,12 +35,12 @@ class Message:
     @property
     def fields(self) -> dict[str, Any]:
         """The fields but for arrays, as plain values of JSON."""
-        return {k: plain(v) for k, v in _given(self).items() if not isinstance(v, np.ndarray)}
+        return {k: plain(v) for k, v in _sent_fields(self).items() if not isinstance(v, np.ndarray)}
 
     @property
     def arrays(self) -> dict[str, npt.NDArray[Any]]:
         """The arrays by name."""
-        return {k: v for k, v in _given(self).items() if isinstance(v, np.ndarray)}
+        return {k: v for k, v in _sent_fields(self).items() if isinstance(v, np.ndarray)}
 
     def content(self, reply: int | None = None) -> dict[str, Any]:
         """Return the JSON. reply: number of the message that this one answers."""
@@ -63,7 +64,7 @@ class Message:
 def plain(value: Any) -> Any:
     """Return values of JSON for dataclasses, tuples and NumPy's numbers; NaN and Inf are null."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {name: plain(one) for name, one in _given(value).items()}
+        return {name: plain(one) for name, one in _sent_fields(value).items()}
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
@@ -75,7 +76,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _given(record: Any) -> dict[str, Any]:
+def _sent_fields(record: Any) -> dict[str, Any]:
     """Return the fields of a dataclass by name, without those that are left out."""
     found = {one.name: (getattr(record, one.name), one.metadata) for one in fields(record)}
     return {

@@ -22,13 +22,13 @@ def sections() -> dict[str, str]:
     """Return the generated parts of the document by the names of their marks."""
     records = [one for one in vars(parts).values() if _is_part(one)]
     return {
-        "requests": "\n".join(_entry(one.kind, one) for one in requests.KINDS.values()),
+        "requests": "\n".join(_entry(one.kind, one) for one in requests.REQUESTS.values()),
         "events": "\n".join(_entry(one.kind, one) for one in events.EVENTS.values()),
         "parts": "\n".join(_entry(one.__name__, one) for one in records),
     }
 
 
-def with_sections(text: str) -> str:
+def replace_sections(text: str) -> str:
     """Return a document with its generated parts made anew."""
     for name, made in sections().items():
         pattern = rf"<!-- {name} -->\n.*?<!-- end of {name} -->"
@@ -45,19 +45,19 @@ def _entry(name: str, record: type[Any]) -> str:
     """Return a heading, the docstring, and a table of the fields."""
     said = (inspect.getdoc(record) or "").split("\n\n")
     made = [f"### `{name}`", *(" ".join(one.split("\n")) for one in said)]
-    types = [(field, _within(kind).replace("|", "\\|")) for field, kind in field_types(record)]
+    types = [(field, _nested_kind(kind).replace("|", "\\|")) for field, kind in field_types(record)]
     rows = [f"| `{field}` | `{kind}` |" for field, kind in types]
     if rows:
         made.append("\n".join(["| field | type |", "|---|---|", *rows]))
     hints = get_type_hints(record)
     arrays = [x.name for x in fields(record) if get_origin(hints[x.name]) is np.ndarray]
-    given = [f"`{x}` {what}" for x, what in getattr(record, "buffers_given", {}).items()]
+    given = [f"`{x}` {what}" for x, what in getattr(record, "request_buffers", {}).items()]
     if arrays or given:
         made.append("Buffers: " + ", ".join(given or [f"`{x}`" for x in arrays]) + ".")
     return "\n\n".join(made) + "\n"
 
 
-def _within(kind: str) -> str:
+def _nested_kind(kind: str) -> str:
     """Return a type in which a message within another one is called by its kind."""
     for event in events.EVENTS.values():
         kind = kind.replace(f"Omit<{event.__name__}, 'kind' | 'arrays'>", event.kind)
@@ -66,4 +66,4 @@ def _within(kind: str) -> str:
 
 if __name__ == "__main__":
     file = Path(sys.argv[1])
-    file.write_text(with_sections(file.read_text(encoding="utf-8")), encoding="utf-8")
+    file.write_text(replace_sections(file.read_text(encoding="utf-8")), encoding="utf-8")

@@ -10,11 +10,11 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.paint.protocol.base import OPTIONAL, Message
 from lightpaint.paint.protocol.parts import (
+    EditState,
     Findings,
     LightInfo,
     LookInfo,
     SampleCount,
-    Standing,
     TableInfo,
     Tone,
     TransformInfo,
@@ -25,9 +25,9 @@ from lightpaint.paint.store.canvas_pixels import Region
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProgressReport(Message, kind="progress"):
-    """How far something is that takes long. Unasked.
+    """The progress of a long task. Unasked.
 
-    what: `export`, `basis`, or what the renderer calls it.
+    what: `export`, `basis`, or the renderer's name for it.
     """
 
     what: str
@@ -38,9 +38,9 @@ class ProgressReport(Message, kind="progress"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VerificationResult(Message, kind="verified"):
-    """The render of the answer in a view has come: the picture `verified`. Unasked.
+    """The result of a verification; its render is the picture `verified`. Unasked.
 
-    is_old: whether somebody has painted on since.
+    is_old: whether the session has changed since.
     """
 
     agrees: bool
@@ -51,7 +51,7 @@ class VerificationResult(Message, kind="verified"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SessionPending(Message, kind="waiting"):
-    """There is no picture yet; `state` follows. text: why, if something went wrong."""
+    """The state while there is no picture yet; `state` follows. text: an error, if one occurred."""
 
     version: int
     scene: str
@@ -64,16 +64,16 @@ class SessionPending(Message, kind="waiting"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SessionState(Standing, Message, kind="state"):
-    """All there is: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
-    gets better. All lists of lights are in the order of `lights`.
+class SessionState(EditState, Message, kind="state"):
+    """The whole state: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
+    improves. All lists of lights are in the order of `lights`.
 
     version: of this protocol. size: height and width of the first view, and `objects` its names.
     lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
-    that grows when one is made anew. verified: the last render of each view. first: whether nothing
-    was ever done. stroke: number of the last stroke that was heard of. command: that answers the
-    exported paintings. is_back: the client had the session before, and nobody since, as whoever is
-    told unasked. weights: (lights, 3) float64, the last answer.
+    that grows when one is replaced. verified: the last verification of each view. first: whether
+    the session has no step yet. stroke: number of the last stroke that arrived. command: solves for
+    the exported paintings. is_back: the client had the session before, and nobody since; true for
+    whoever receives it unasked. weights: (lights, 3) float64, the last answer.
     """
 
     version: int
@@ -101,13 +101,13 @@ class SessionState(Standing, Message, kind="state"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AnswerUpdate(Standing, Findings, Message, kind="answer"):
-    """The lights as they are now: the answer to what is painted or asked, and unasked once the
-    exact answer is there, and again when more is known of it.
+class AnswerUpdate(EditState, Findings, Message, kind="answer"):
+    """The lights as they are now: the answer to paint and requests, and unasked once the exact
+    answer is found, and again with its analysis.
 
-    version: grows with every change of the session. stroke: the last one that was heard of. exact:
-    whether it is what `lightpaint solve` finds. mode: how it was found under the brush. weights:
-    (lights, 3) float64.
+    version: grows with every change of the session. stroke: number of the last stroke that arrived.
+    exact: whether it is what `lightpaint solve` finds. mode: how it was found under the brush.
+    weights: (lights, 3) float64.
     """
 
     version: int
@@ -118,14 +118,14 @@ class AnswerUpdate(Standing, Findings, Message, kind="answer"):
 
     @property
     def findings(self) -> Findings:
-        """The findings of the answer, by themselves."""
+        """Findings of the answer, by themselves."""
         return Findings(**{name: getattr(self, name) for name in Findings.__dataclass_fields__})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CanvasPatch(Standing, Message, kind="patch"):
-    """What a canvas holds now, after undo and the like: one for each view that has changed, which
-    `views` lists.
+class CanvasPatch(EditState, Message, kind="patch"):
+    """New pixels of a canvas, after undo and the like: one message for each view that has changed,
+    all of which `views` lists.
 
     image: (rows, columns, 3) float32. importance: (rows, columns) float32. weights: (lights, 3)
     float64.
@@ -145,7 +145,7 @@ class CanvasPatch(Standing, Message, kind="patch"):
     @property
     def answer(self) -> AnswerUpdate:
         """The same without pixels."""
-        standing = {name: getattr(self, name) for name in Standing.__dataclass_fields__}
+        standing = {name: getattr(self, name) for name in EditState.__dataclass_fields__}
         return AnswerUpdate(
             version=self.version,
             stroke=self.stroke,
@@ -158,7 +158,7 @@ class CanvasPatch(Standing, Message, kind="patch"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PictureUpdate(Message, kind="renewed"):
-    """Pictures that are there anew, and their numbers. Unasked."""
+    """New or replaced pictures, and their numbers. Unasked."""
 
     resources: Mapping[str, int]
 
@@ -173,8 +173,8 @@ class PictureData(Message, kind="fetched"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LookList(Message, kind="looks"):
-    """The looks that are kept, and all pictures: the answer to what changes looks, and unasked when
-    an observer has proposed one.
+    """The kept looks, and all pictures: the answer to requests about looks, and unasked when an
+    observer has proposed one.
     """
 
     looks: tuple[LookInfo, ...]
@@ -183,14 +183,14 @@ class LookList(Message, kind="looks"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TaskStarted(Message, kind="started"):
-    """Something that takes long has begun. what: the request, or `stop`."""
+    """Notice that a long task has started. what: the request, or `stop`."""
 
     what: Literal["export", "verify", "explain", "preview", "stop"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TaskStopped(Message, kind="stopped"):
-    """Something that was stopped has come to its end. Unasked."""
+    """Notice that a stopped task has ended. Unasked."""
 
     what: Literal["verify"]
 
@@ -199,8 +199,9 @@ class TaskStopped(Message, kind="stopped"):
 class ExportResult(Message, kind="exported"):
     """Files that were written. Unasked.
 
-    command: answers the exported paintings; "" where there is none. is_stopped: whether more were
-    to come. is_unpainted: whether what needs a painting was left out.
+    command: solves for the exported paintings; "" where there is none. is_stopped: whether the
+    export was stopped before its end. is_unpainted: whether files that need a painting were left
+    out.
     """
 
     files: tuple[str, ...]
@@ -211,7 +212,9 @@ class ExportResult(Message, kind="exported"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Explanation(Message, kind="explained"):
-    """Why a view is not closer; the picture `beyond` shows where. Unasked."""
+    """The reasons why a view is not closer to its painting; the picture `beyond` shows where.
+    Unasked.
+    """
 
     sentences: tuple[str, ...]
     view: int
@@ -220,8 +223,8 @@ class Explanation(Message, kind="explained"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PreviewResult(Message, kind="previewed"):
-    """What a change would do. Unasked. number: of the preview. is_at_cost: whether it changes more
-    than it brings. before, after: (h, w, 3) uint8.
+    """The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
+    whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
     """
 
     number: int
@@ -244,7 +247,7 @@ class Notice(Message, kind="say"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Failure(Message, kind="failed"):
-    """Why a request was not done; nothing has changed."""
+    """The reason why a request was refused; nothing has changed."""
 
     text: str
     tone: Tone | None = field(default=None, metadata=OPTIONAL)
@@ -252,8 +255,8 @@ class Failure(Message, kind="failed"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Closing(Message, kind="closed"):
-    """The client does not have the session, or no more: another has `taken` it, the painter has
-    `ended`, or the client speaks another `version` of this protocol.
+    """Notice that the client does not have the session, or has lost it: another client has `taken`
+    it, the painter has `ended`, or the client speaks another `version` of this protocol.
     """
 
     reason: Literal["taken", "ended", "version"]
@@ -262,10 +265,10 @@ class Closing(Message, kind="closed"):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Acknowledgement(Message, kind="done"):
-    """A request was done, and there is nothing to say of it."""
+    """Confirmation of a request that has no other answer."""
 
 
-#: What a client is told, by kind.
+#: The events by kind.
 EVENTS: Mapping[str, type[Any]] = {
     event.kind: event
     for event in (

@@ -1,4 +1,4 @@
-"""Parts of what clients are told: records inside the messages of `events.py`."""
+"""Records inside the messages of `events.py`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,12 +10,12 @@ from lightpaint.paint.protocol.base import OPTIONAL
 
 @dataclass(frozen=True)
 class LightInfo:
-    """What does not change of a light.
+    """The constant properties of a light.
 
-    present: its emission before anything was painted. parameter, plugin: where the scene has it.
-    form: how the scene writes its emission. members: emitters that it is a group of. group: name
-    of that group; null for a single emitter. is_fixed: whether it is kept as it is. is_scalar:
-    whether it has one number for all channels. scale: what its stored plane is multiplied by.
+    present: its emission before anything was painted. parameter, plugin: where the scene defines
+    it. form: how the scene writes its emission. members: emitters of the group that it is. group:
+    name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
+    whether one number stands for all channels. scale: factor of its stored plane.
     """
 
     name: str
@@ -34,10 +34,10 @@ class LightInfo:
 
 @dataclass(frozen=True)
 class ViewInfo:
-    """One picture that is painted.
+    """A view that is painted.
 
-    size: height and width in pixels. objects: names, in the order of the picture `objects`.
-    scales: what the stored plane of each light is multiplied by.
+    size: height and width in pixels. objects: names, in the order of the picture `objects`. scales:
+    factor of the stored plane of each light.
     """
 
     name: str
@@ -48,7 +48,7 @@ class ViewInfo:
 
 @dataclass(frozen=True)
 class LookInfo:
-    """A look that is kept. stamp: when, in seconds since 1970. thumbnail: name of its picture."""
+    """A kept look. stamp: when, in seconds since 1970. thumbnail: name of its picture."""
 
     id: int
     name: str
@@ -77,7 +77,7 @@ class TableInfo:
 
 @dataclass(frozen=True)
 class SampleCount:
-    """Samples per pixel that have been rendered, and that are wanted."""
+    """Samples per pixel that are rendered, and that are wanted."""
 
     spp: int
     wanted: int
@@ -86,7 +86,7 @@ class SampleCount:
 
 @dataclass(frozen=True)
 class HistoryInfo:
-    """Labels of the last steps that can be taken back and done again; count: of all steps."""
+    """Labels of the last steps that can be undone and redone; count: of all steps."""
 
     undo: tuple[str, ...]
     redo: tuple[str, ...]
@@ -95,7 +95,7 @@ class HistoryInfo:
 
 @dataclass(frozen=True)
 class ResolvedFit:
-    """How the painting is answered where nobody has set it, as of `lightpaint.Fit`."""
+    """The values in effect for settings that nobody has set, as of `lightpaint.Fit`."""
 
     space: str | None
     hold: float | None
@@ -104,10 +104,10 @@ class ResolvedFit:
 
 @dataclass(frozen=True)
 class Advice:
-    """What keeps the lights from the paint and can be let go of.
+    """A constraint that keeps the lights from the paint and can be loosened.
 
-    kind: of the constraint. names: lights of which it was asked. closes: share of what is missed
-    that goes without it; null where it takes more than that. hold: the weaker hold to set.
+    kind: of the constraint. names: its lights. closes: share of the miss that goes without it; null
+    where it takes more than that. hold: the weaker hold to set.
     """
 
     kind: str
@@ -118,7 +118,7 @@ class Advice:
 
 @dataclass(frozen=True)
 class Closeness:
-    """How close an answer is in one view. delta_e_asked: ΔE of the present look."""
+    """Closeness of an answer in one view. delta_e_asked: ΔE of the present look."""
 
     headline: str
     help: Advice | None
@@ -131,9 +131,9 @@ class Closeness:
 class LightAnswer:
     """The answer for one light.
 
-    stops: against its present emission; null where it is, or was, off. kelvin: null for what is no
-    white. share: of the light in the picture. error: how sure it is, in words. held: whether a
-    constraint holds it. unreached: whether no paint asks for it.
+    stops: against its present emission; null where it is, or was, off. kelvin: null for a colour
+    that is not white. share: of the light in the picture. error: how sure it is, in words. held:
+    whether a constraint holds it. unreached: whether no paint depends on it.
     """
 
     emission: RGB
@@ -149,10 +149,10 @@ class LightAnswer:
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """What is known of an exact answer; the sentences come later than the lights.
+    """Properties of an answer; the sentences follow later than the lights.
 
     lights: in the order of the state. shares: of each light, by view, where there are several.
-    of_views: how close each view is; null for views that are not painted.
+    of_views: closeness of each view; null for views that are not painted.
     """
 
     lights: tuple[LightAnswer, ...] | None = field(default=None, metadata=OPTIONAL)
@@ -166,11 +166,11 @@ class Findings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Standing:
-    """What can be undone, and what is asked of the lights and of the answer.
+class EditState:
+    """The steps that can be undone, and the requests in effect.
 
-    asked: by name of light, keys and values as in a lights file. ties: names on one dimmer.
-    settings: what somebody has set. meant: what that comes to.
+    asked: constraints by name of light, keys and values as in a lights file. ties: names on one
+    dimmer. settings: set by somebody. meant: the values in effect.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -180,5 +180,5 @@ class Standing:
     meant: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
 
 
-#: How something is said to a person.
+#: Tone of a message to a person.
 Tone = Literal["info", "warn"]

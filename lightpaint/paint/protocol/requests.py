@@ -12,7 +12,7 @@ from lightpaint.arrays import RGB
 from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.store.canvas_pixels import Region
 
-#: Of this protocol; a page of another one is told to load itself anew.
+#: Version of this protocol; a page of another version is told to reload.
 VERSION = 2
 
 
@@ -35,7 +35,7 @@ class Paint(Message, kind="paint"):
     it is.
     """
 
-    buffers_given: ClassVar[Mapping[str, str]] = {
+    request_buffers: ClassVar[Mapping[str, str]] = {
         "image": "(rows, columns, 3) float32",
         "importance": "(rows, columns) float32",
     }
@@ -60,20 +60,20 @@ class Drop(Message, kind="drop"):
 
 @dataclass(frozen=True)
 class Undo(Message, kind="undo"):
-    """Take the last step back, of paint or of what is asked. Answered by `patch`."""
+    """Take back the last step, of paint or of constraints and settings. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
 class Redo(Message, kind="redo"):
-    """Do again what was taken back. Answered by `patch`."""
+    """Repeat a step that was taken back. Answered by `patch`."""
 
 
 @dataclass(frozen=True)
 class Ask(Message, kind="ask"):
-    """What is asked of one light from now on; nothing frees it. Answered by `answer`.
+    """The constraints on one light from now on; an empty object frees it. Answered by `answer`.
 
     asked: keys and values as in a lights file: lock, off, limits, color, kelvin, duv, primaries.
-    done: whether it is kept; false while a slider moves.
+    done: whether it becomes a step; false while a slider moves.
     """
 
     light: int
@@ -83,7 +83,7 @@ class Ask(Message, kind="ask"):
 
 @dataclass(frozen=True)
 class AskAll(Message, kind="ask_all"):
-    """What is asked of several lights from now on, by name, as of `Ask`: one step. Answered by
+    """The constraints on several lights from now on, by name, as of `Ask`: one step. Answered by
     `answer`.
     """
 
@@ -91,18 +91,18 @@ class AskAll(Message, kind="ask_all"):
 
 
 @dataclass(frozen=True)
-class Tie(Message, kind="tie"):
-    """Which lights are on one dimmer: all such groups, of names. Answered by `answer`."""
+class TieLights(Message, kind="tie"):
+    """The lights that share a dimmer: all such groups, of names. Answered by `answer`."""
 
     ties: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
 class Set(Message, kind="set"):
-    """How the painting is answered, as of `Fit`. Answered by `answer`.
+    """Settings of the answer, as of `Fit`. Answered by `answer`.
 
-    values: of hold, space, colors, literal, prefer_current, sparse; null for what follows from
-    the painting.
+    values: of hold, space, colors, literal, prefer_current, sparse; null for the default that
+    follows from the painting.
     """
 
     values: Mapping[str, Any]
@@ -110,11 +110,12 @@ class Set(Message, kind="set"):
 
 @dataclass(frozen=True)
 class Preview(Message, kind="preview"):
-    """What a change would do, before it is made. Answered by `started`, later by `previewed`, with
-    small pictures of the answer now and then, `before` and `after` (h, w, 3) uint8.
+    """A request to show what a change would do, before it is made. Answered by `started`, later by
+    `previewed`, with small pictures of the answer now and after the change, `before` and `after`
+    (h, w, 3) uint8.
 
-    number: of the preview, which the page counts; `previewed` gives it back. values, asked, ties:
-    as of `Set`, `AskAll` and `Tie`; null for ties as they are. view: whose pictures they are.
+    number: of the preview, which the page counts; `previewed` returns it. values, asked, ties: as
+    of `Set`, `AskAll` and `TieLights`; null for ties as they are. view: whose pictures they are.
     """
 
     number: int
@@ -133,14 +134,14 @@ class SaveLook(Message, kind="save_look"):
 
 @dataclass(frozen=True)
 class LoadLook(Message, kind="load_look"):
-    """Go on from a look; a step that can be undone. Answered by `patch`."""
+    """Continue from a look; a step that can be undone. Answered by `patch`."""
 
     look: int
 
 
 @dataclass(frozen=True)
 class RenameLook(Message, kind="rename_look"):
-    """Answered by `looks`."""
+    """Give a look another name. Answered by `looks`."""
 
     look: int
     name: str
@@ -148,15 +149,15 @@ class RenameLook(Message, kind="rename_look"):
 
 @dataclass(frozen=True)
 class CopyLook(Message, kind="copy_look"):
-    """Answered by `looks`."""
+    """Keep a copy of a look. Answered by `looks`."""
 
     look: int
 
 
 @dataclass(frozen=True)
 class MixLooks(Message, kind="mix_looks"):
-    """Keep what lies between two looks: a look whose lights are held at the share `part` of the way
-    from the first to the second. Answered by `looks`.
+    """Keep a mix of two looks: its lights are locked at the share `part` of the way from the first
+    to the second. Answered by `looks`.
     """
 
     first: int
@@ -167,7 +168,7 @@ class MixLooks(Message, kind="mix_looks"):
 
 @dataclass(frozen=True)
 class DropLook(Message, kind="drop_look"):
-    """Answered by `looks`."""
+    """Delete a look. Answered by `looks`."""
 
     look: int
 
@@ -196,8 +197,8 @@ class Verify(Message, kind="verify"):
 
 @dataclass(frozen=True)
 class Explain(Message, kind="explain"):
-    """Why a view is not closer. Answered by `started`, later by `explained` and the picture
-    `beyond`.
+    """A request for the reasons why a view is not closer to its painting. Answered by `started`,
+    later by `explained` and the picture `beyond`.
     """
 
     view: int = 0
@@ -205,19 +206,21 @@ class Explain(Message, kind="explain"):
 
 @dataclass(frozen=True)
 class TakeOver(Message, kind="take_over"):
-    """Go on here, and not on the page that has the session. Answered by `state`."""
+    """Take the session over from the page that has it. Answered by `state`."""
 
 
 @dataclass(frozen=True)
 class Fetch(Message, kind="fetch"):
-    """Where there is no HTTP: answered by `fetched`, with the picture as its array."""
+    """A request for a picture, where there is no HTTP. Answered by `fetched`, with the picture as
+    its array.
+    """
 
     name: str
 
 
 @dataclass(frozen=True)
 class Observe(Message, kind="observe"):
-    """The first message of an observer: a client that is told lighting, looks and progress, and
+    """The first message of an observer: a client that receives lighting, looks and progress, and
     never has the session. It may then send `fetch`, `export` and `propose`, and nothing else.
     Answered by `state` or `waiting`.
     """
@@ -237,8 +240,8 @@ class Propose(Message, kind="propose"):
     lights: Mapping[str, RGB]
 
 
-#: What a page may say, by kind.
-Said = (
+#: All requests of clients.
+AnyRequest = (
     Hello
     | Paint
     | Drop
@@ -246,7 +249,7 @@ Said = (
     | Redo
     | Ask
     | AskAll
-    | Tie
+    | TieLights
     | Set
     | Preview
     | SaveLook
@@ -264,5 +267,5 @@ Said = (
     | Propose
 )
 
-#: The same by kind.
-KINDS: Mapping[str, type[Any]] = {request.kind: request for request in get_args(Said)}
+#: The requests by kind.
+REQUESTS: Mapping[str, type[Any]] = {request.kind: request for request in get_args(AnyRequest)}

@@ -21,7 +21,7 @@ from lightpaint.paint.store.canvas_pixels import Region
 #: Where the types lie, beside the scripts that use them.
 FILE = Path(__file__).parents[1] / "page" / "engine" / "messages.d.ts"
 
-HEAD = """// Made by `python -m lightpaint.paint.protocol.typescript` of the dataclasses.
+HEADER = """// Made by `python -m lightpaint.paint.protocol.typescript` of the dataclasses.
 
 /** An array; float16 is the bits of halves in a Uint16Array.  */
 export interface Picture {
@@ -33,21 +33,21 @@ export type RGB = [number, number, number];
 export type Region = [top: number, bottom: number, left: number, right: number];
 """
 
-#: Aliases that have names of their own there.
-NAMED = {RGB: "RGB", Region: "Region"}
+#: Python aliases that have names of their own in TypeScript.
+ALIASES = {RGB: "RGB", Region: "Region"}
 
-PLAIN = {str: "string", int: "number", float: "number", bool: "boolean", type(None): "null"}
+PRIMITIVES = {str: "string", int: "number", float: "number", bool: "boolean", type(None): "null"}
 
 
 def declarations() -> str:
     """Return the whole file."""
     records = [one for one in vars(parts).values() if _is_record_of(one, parts)]
-    made = [HEAD, *(_interface(one, is_request=False) for one in records)]
+    made = [HEADER, *(_interface(one, is_request=False) for one in records)]
     made += [_interface(one, is_request=False) for one in events.EVENTS.values()]
-    made += [_interface(one, is_request=True) for one in requests.KINDS.values()]
+    made += [_interface(one, is_request=True) for one in requests.REQUESTS.values()]
     for name, what, kinds in (
-        ("Events", "What clients are told, by kind.", events.EVENTS),
-        ("Requests", "Fields of what clients send, by kind.", requests.KINDS),
+        ("Events", "Events from the session, by kind.", events.EVENTS),
+        ("Requests", "Fields of clients' requests, by kind.", requests.REQUESTS),
     ):
         rows = "".join(f"  {kind}: {one.__name__};\n" for kind, one in kinds.items())
         made.append(f"/** {what} */\nexport interface {name} {{\n{rows}}}\n")
@@ -86,28 +86,28 @@ def field_types(record: type[Any], *, is_request: bool = True) -> list[tuple[str
         may_lack = _is_optional(one) or (not is_told and _has_default(one))
         # Left out where it is None; a request may give null all the same.
         hint = _without_none(hints[one.name]) if _is_optional(one) else hints[one.name]
-        made.append((f"{one.name}?" if may_lack else one.name, typed(hint)))
+        made.append((f"{one.name}?" if may_lack else one.name, typescript_type(hint)))
     return made
 
 
-def typed(hint: Any) -> str:
-    """Return the annotation of a field as TypeScript has it."""
-    if hint in NAMED:
-        return NAMED[hint]
+def typescript_type(hint: Any) -> str:
+    """Return the TypeScript type of a field's annotation."""
+    if hint in ALIASES:
+        return ALIASES[hint]
     outer, inner = get_origin(hint), get_args(hint)
-    if hint in PLAIN:
-        return PLAIN[hint]
+    if hint in PRIMITIVES:
+        return PRIMITIVES[hint]
     if outer is Literal:
         return " | ".join(f"'{value}'" for value in inner)
     if outer is UnionType:
-        return " | ".join(map(typed, inner))
+        return " | ".join(map(typescript_type, inner))
     if outer is tuple and inner[-1] is ...:
-        item = typed(inner[0])
+        item = typescript_type(inner[0])
         return f"({item})[]" if " | " in item and not item.endswith(">") else f"{item}[]"
     if outer is tuple:
-        return f"[{', '.join(map(typed, inner))}]"
+        return f"[{', '.join(map(typescript_type, inner))}]"
     if outer is Mapping:
-        return f"Record<{typed(inner[0])}, {typed(inner[1])}>"
+        return f"Record<{typescript_type(inner[0])}, {typescript_type(inner[1])}>"
     if hint in events.EVENTS.values():  # within another message it has no kind of its own
         return f"Omit<{hint.__name__}, 'kind' | 'arrays'>"
     return "any" if hint is Any else str(hint.__name__)

@@ -11,12 +11,12 @@ from lightpaint.errors import PaintError
 
 #: Where it listens unless somebody says otherwise or another does already: at one place, so that
 #: the browser finds again what the page has put down for itself.
-PORT = 8421
+DEFAULT_PORT = 8421
 
 #: Names of the machine itself.
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
-#: What to do about an address that cannot be had.
+#: Advice in errors about an address.
 ADVICE = (
     "give an address of this machine, 0.0.0.0 for all of them, or leave it out, which lets in "
     "nobody but programs of this machine"
@@ -27,7 +27,7 @@ CONNECT_S = 2.0
 
 
 class Reach(Enum):
-    """Who can connect: programs of this machine, whoever reaches one address of it, or any."""
+    """Machines that can connect: this one, those that reach one of its addresses, or any."""
 
     MACHINE = "machine"
     ADDRESS = "address"
@@ -36,35 +36,35 @@ class Reach(Enum):
 
 @dataclass(frozen=True)
 class Address:
-    """Where a socket listens.
+    """The address of a listening socket.
 
     name: how the address is written in a URL, without its port; it leads here. names: further names
-    by which requests may call this server, in lower case. here: as `name`, for a browser of this
-    machine; None for the same.
+    by which requests may call this server, in lower case. local_name: as `name`, for a browser of
+    this machine; None for the same.
     """
 
     name: str
     port: int
     reach: Reach
     names: frozenset[str] = frozenset()
-    here: str | None = None
+    local_name: str | None = None
 
     @property
     def url(self) -> str:
-        """The page, which a token has still to open."""
+        """URL of the page, which needs a token to open."""
         return f"http://{self.name}:{self.port}/"
 
     @property
-    def url_here(self) -> str:
-        """The same for a browser of this machine, to which its own name is the safest."""
-        return f"http://{self.here or self.name}:{self.port}/"
+    def local_url(self) -> str:
+        """The same for a browser of this machine, to which the machine's own name is the safest."""
+        return f"http://{self.local_name or self.name}:{self.port}/"
 
 
 #: A socket that listens, and where.
-Listening = tuple[socket.socket, Address]
+BoundSocket = tuple[socket.socket, Address]
 
 
-def listen(host: str | None = None, port: int | None = None) -> Listening:
+def listen(host: str | None = None, port: int | None = None) -> BoundSocket:
     """Return a socket that listens, and its address, which has been tried.
 
     host: name or number of an address of this machine, None for the loopback. port: None for the
@@ -72,33 +72,33 @@ def listen(host: str | None = None, port: int | None = None) -> Listening:
 
     Raises PaintError where there is none.
     """
-    family, number, is_number = _resolved("127.0.0.1" if host is None else host)
-    made = _bound(host or number, family, number, port)
-    here = None
+    family, number, is_number = _resolve("127.0.0.1" if host is None else host)
+    socket_ = _bind(host or number, family, number, port)
+    local_name = None
     try:
-        at, *_ = made.getsockname()
-        bound, its_port = ipaddress.ip_address(at), int(made.getsockname()[1])
+        address, *_ = socket_.getsockname()
+        bound, bound_port = ipaddress.ip_address(address), int(socket_.getsockname()[1])
         mapped = getattr(bound, "ipv4_mapped", None)
         if bound.is_unspecified:
-            here = next((x for x in LOOPBACK if _leads_here(x, its_port)), "localhost")
-            name, reach = _outward_name(its_port) or here, Reach.ALL
+            local_name = next((x for x in LOOPBACK if _is_reachable(x, bound_port)), "localhost")
+            name, reach = _outward_name(bound_port) or local_name, Reach.ALL
         else:
             is_loopback = (mapped or bound).is_loopback
             reach = Reach.MACHINE if is_loopback else Reach.ADDRESS
-            name = _written(bound) if is_number or host is None else _ascii(host).lower()
-        if not _leads_here(name, its_port):
+            name = _url_host(bound) if is_number or host is None else _to_ascii(host).lower()
+        if not _is_reachable(name, bound_port):
             raise PaintError(f"nothing can connect to {name}: {ADVICE}")
     except BaseException:
-        made.close()
+        socket_.close()
         raise
     names = {name.lower()}
     if reach is not Reach.MACHINE:
         names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
-    return made, Address(name, its_port, reach, frozenset(names), here)
+    return socket_, Address(name, bound_port, reach, frozenset(names), local_name)
 
 
-def _resolved(host: str) -> tuple[socket.AddressFamily, str, bool]:
-    """Family and number of an address, and whether it was given as a number."""
+def _resolve(host: str) -> tuple[socket.AddressFamily, str, bool]:
+    """Return family and number of an address, and whether it was given as a number."""
     name = host[1:-1] if host.startswith("[") and host.endswith("]") else host
     if not name.strip():
         raise PaintError(f"an empty host is no address: {ADVICE}")
@@ -106,7 +106,7 @@ def _resolved(host: str) -> tuple[socket.AddressFamily, str, bool]:
         raise PaintError(f"no browser opens {host}, an address of one network card: {ADVICE}")
     for flags in (socket.AI_NUMERICHOST, 0):
         try:
-            found = socket.getaddrinfo(_ascii(name), 0, type=socket.SOCK_STREAM, flags=flags)
+            found = socket.getaddrinfo(_to_ascii(name), 0, type=socket.SOCK_STREAM, flags=flags)
         except (OSError, ValueError):
             continue
         # IPv4 first: that is what tunnels and people expect of `localhost`.
@@ -115,9 +115,9 @@ def _resolved(host: str) -> tuple[socket.AddressFamily, str, bool]:
     raise PaintError(f"{host[:80]!r} is no address of this machine: {ADVICE}")
 
 
-def _bound(host: str, family: socket.AddressFamily, number: str, port: int | None) -> socket.socket:
+def _bind(host: str, family: socket.AddressFamily, number: str, port: int | None) -> socket.socket:
     reason = "ports are numbers up to 65535"
-    for tried in (PORT, 0) if port is None else (port,):
+    for tried in (DEFAULT_PORT, 0) if port is None else (port,):
         if not 0 <= tried < 2**16:
             break
         is_any_6 = family == socket.AF_INET6 and ipaddress.ip_address(number).is_unspecified
@@ -135,23 +135,23 @@ def _bound(host: str, family: socket.AddressFamily, number: str, port: int | Non
 
 
 def _outward_name(port: int) -> str | None:
-    """How others on its network call this machine, where all of its addresses are listened to;
-    None where it is in no network.
+    """Return this machine's name on its network, where the socket listens at all addresses; None
+    where it is in no network.
     """
-    for family, elsewhere in ((socket.AF_INET, "203.0.113.1"), (socket.AF_INET6, "2001:db8::1")):
+    for family, remote in ((socket.AF_INET, "203.0.113.1"), (socket.AF_INET6, "2001:db8::1")):
         # No packet is sent: it asks by which address one would go.
         try:
-            with socket.socket(family, socket.SOCK_DGRAM) as asking:
-                asking.connect((elsewhere, 9))
-                own = ipaddress.ip_address(str(asking.getsockname()[0]).partition("%")[0])
+            with socket.socket(family, socket.SOCK_DGRAM) as probe:
+                probe.connect((remote, 9))
+                own = ipaddress.ip_address(str(probe.getsockname()[0]).partition("%")[0])
         except OSError:
             continue
-        if not own.is_link_local and _leads_here(_written(own), port):
-            return _written(own)
+        if not own.is_link_local and _is_reachable(_url_host(own), port):
+            return _url_host(own)
     return None
 
 
-def _leads_here(name: str, port: int) -> bool:
+def _is_reachable(name: str, port: int) -> bool:
     place = name.removeprefix("[").removesuffix("]"), port
     try:
         socket.create_connection(place, CONNECT_S).close()
@@ -160,9 +160,9 @@ def _leads_here(name: str, port: int) -> bool:
     return True
 
 
-def _written(number: ipaddress.IPv4Address | ipaddress.IPv6Address) -> str:
+def _url_host(number: ipaddress.IPv4Address | ipaddress.IPv6Address) -> str:
     return f"[{number}]" if number.version == 6 else str(number)
 
 
-def _ascii(name: str) -> str:
+def _to_ascii(name: str) -> str:
     return name if name.isascii() else name.encode("idna").decode()

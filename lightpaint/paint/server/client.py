@@ -1,4 +1,4 @@
-"""One page on its socket: what it says, in order; what is said to it, as fast as it can hear."""
+"""One client on its socket: queues of incoming and outgoing messages."""
 
 import asyncio
 from collections.abc import Mapping
@@ -8,11 +8,13 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import of_frame, said_of, to_frame
+from lightpaint.paint.frames import from_frame, parse_request, to_frame
 from lightpaint.paint.protocol import (
     VERSION,
     AnswerUpdate,
+    AnyRequest,
     Closing,
+    EditState,
     Failure,
     Hello,
     LookList,
@@ -20,26 +22,23 @@ from lightpaint.paint.protocol import (
     Paint,
     PictureUpdate,
     ProgressReport,
-    Said,
     SessionState,
-    Standing,
     TakeOver,
 )
 
-#: Messages of a page that wait to be answered, and bytes of them, before no more are taken from its
-#: socket.
-MOST_HEARD, MOST_HEARD_BYTES = 64, 2**27
+#: Queued messages of a page, and bytes of them, beyond which no more are read from its socket.
+MAX_QUEUED, MAX_QUEUED_BYTES = 64, 2**27
 
-#: Messages that wait to be sent, and seconds that one may take: who is slower has gone, or comes
-#: back and is told the state anew.
-MOST_UNSENT, SLOWEST_S = 512, 60.0
+#: Messages that wait to be sent, and seconds that one may take: a slower client is cut off, and
+#: receives the whole state when it is back.
+MAX_UNSENT, SEND_TIMEOUT_S = 512, 60.0
 
-#: Bytes of pictures and the like that wait to be sent, before what the page asks for next is done.
-MOST_UNSENT_BYTES = 2**26
+#: Bytes that wait to be sent, beyond which the next request waits.
+MAX_UNSENT_BYTES = 2**26
 
 
 class Socket(Protocol):
-    """What Starlette's WebSocket has of it."""
+    """The part of Starlette's WebSocket that a client uses."""
 
     async def receive(self) -> Any: ...
     async def send_bytes(self, data: bytes) -> None: ...
@@ -47,198 +46,204 @@ class Socket(Protocol):
 
 
 @dataclass
-class Heard:
-    """One message of a page, or why it is none.
+class IncomingMessage:
+    """A message of a page, or the reason why it is none.
 
-    replies: its number, and those of live paint that it has made superfluous. size: bytes.
+    replies: its number, and those of live paint that it has replaced. size: bytes.
     """
 
     replies: list[int] = field(default_factory=list)
-    said: Said | None = None
+    request: AnyRequest | None = None
     arrays: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
     refusal: Message | None = None
     size: int = 0
 
     @property
     def asks_for_session(self) -> bool:
-        """Whether it is answered by all there is to know."""
-        return isinstance(self.said, Hello | TakeOver)
+        """True if the answer is the whole state."""
+        return isinstance(self.request, Hello | TakeOver)
 
     @property
     def takes_over(self) -> bool:
-        """Whether the session is to be taken from another page."""
-        return isinstance(self.said, TakeOver)
+        """True if the client takes the session from another page."""
+        return isinstance(self.request, TakeOver)
 
 
 class Client:
-    """One page. page: a name that it has made up for itself, by which it is known when it is back
-    after a dropped connection; "" if it has none.
+    """A page or a program on its socket. page: a name that the page chose for itself, by which it
+    is known when it is back after a dropped connection; "" if it has none.
 
     Attributes:
-        observes: Whether it has begun as an observer, which it stays.
-        has_left: Whether it says no more; what it has said may wait to be answered.
+        is_observer: Whether it has begun as an observer, which it stays.
+        is_disconnected: Whether it sends no more; queued messages may still wait for an answer.
     """
 
     def __init__(self, socket: Socket, page: str = "") -> None:
         self.page = page[:64]
         self._socket = socket
-        self._heard: list[Heard] = []
+        self._incoming: list[IncomingMessage] = []
         self._unsent: list[tuple[Message, int | None]] = []
-        self._is_heard, self._is_taken = asyncio.Event(), asyncio.Event()
-        self._is_to_send, self._is_sent = asyncio.Event(), asyncio.Event()
-        self._is_answered, self._is_to_take = asyncio.Event(), asyncio.Event()
-        self._is_sent.set()
-        self._is_answered.set()
-        self._is_gone = False
-        self.has_left = self.observes = False
+        self._has_incoming, self._has_room = asyncio.Event(), asyncio.Event()
+        self._has_unsent, self._all_sent = asyncio.Event(), asyncio.Event()
+        self._all_answered, self._may_read_on = asyncio.Event(), asyncio.Event()
+        self._all_sent.set()
+        self._all_answered.set()
+        self._is_abandoned = False
+        self.is_disconnected = self.is_observer = False
 
-    async def keep_hearing(self) -> None:
-        """Take what the page says until it leaves, but no more than waits already."""
+    async def receive_all(self) -> None:
+        """Queue the client's messages until it disconnects, as many as the queue takes."""
         try:
-            while not self._is_gone:
+            while not self._is_abandoned:
                 message = await self._socket.receive()
                 if message["type"] != "websocket.receive":
                     return
                 frame = message.get("bytes")
-                heard = _heard(frame)
-                heard.size = len(frame or b"")
-                await self._takes(heard)
+                incoming = _parse_frame(frame)
+                incoming.size = len(frame or b"")
+                await self._enqueue(incoming)
         finally:
-            self.has_left = True
-            self._is_to_take.set()
+            self.is_disconnected = True
+            self._may_read_on.set()
 
-    async def _takes(self, heard: Heard) -> None:
-        """Have it answered, in its turn."""
-        if not self._covers_last(heard):
-            self._heard.append(heard)
-        self._is_answered.clear()
-        self._is_heard.set()
-        while self._hears_too_much and not self._is_gone:
-            self._is_taken.clear()
-            await self._is_taken.wait()
+    async def _enqueue(self, incoming: IncomingMessage) -> None:
+        """Queue a message, and wait while the queue is full."""
+        if not self._replace_covered(incoming):
+            self._incoming.append(incoming)
+        self._all_answered.clear()
+        self._has_incoming.set()
+        while self._is_queue_full and not self._is_abandoned:
+            self._has_room.clear()
+            await self._has_room.wait()
 
     @property
-    def _hears_too_much(self) -> bool:
-        waiting = len(self._heard)
-        return waiting >= MOST_HEARD or sum(x.size for x in self._heard) > MOST_HEARD_BYTES
+    def _is_queue_full(self) -> bool:
+        waiting = len(self._incoming)
+        return waiting >= MAX_QUEUED or sum(x.size for x in self._incoming) > MAX_QUEUED_BYTES
 
-    async def next_heard(self) -> Heard:
-        """What is to be answered next; what was before it has been, and most of it was taken."""
-        while self._unsent_bytes > MOST_UNSENT_BYTES and not (self._is_gone or self.has_left):
-            self._is_to_take.clear()
-            await self._is_to_take.wait()
-        while not self._heard:
-            self._is_answered.set()
-            self._is_heard.clear()
-            await self._is_heard.wait()
-        self._is_taken.set()
-        return self._heard.pop(0)
+    async def next_message(self) -> IncomingMessage:
+        """Return the next message, once most of the answers before it are sent."""
+        while self._unsent_bytes > MAX_UNSENT_BYTES and not (
+            self._is_abandoned or self.is_disconnected
+        ):
+            self._may_read_on.clear()
+            await self._may_read_on.wait()
+        while not self._incoming:
+            self._all_answered.set()
+            self._has_incoming.clear()
+            await self._has_incoming.wait()
+        self._has_room.set()
+        return self._incoming.pop(0)
 
-    def give_up(self) -> None:
-        """Say no more to it, and take no more from it."""
-        self._is_gone = True
+    def abandon(self) -> None:
+        """Send nothing more, and read nothing more."""
+        self._is_abandoned = True
         self._unsent.clear()
-        for event in (self._is_sent, self._is_to_send, self._is_taken, self._is_to_take):
+        for event in (self._all_sent, self._has_unsent, self._has_room, self._may_read_on):
             event.set()
 
-    def _covers_last(self, heard: Heard) -> bool:
-        """Put `heard` in the place of live paint that waits and that it covers, if it does."""
-        if not self._heard or not (last := self._heard[-1]).said:
+    def _replace_covered(self, incoming: IncomingMessage) -> bool:
+        """Replace queued live paint that `incoming` covers; return whether there was some."""
+        if not self._incoming or not (last := self._incoming[-1]).request:
             return False
-        old, new = last.said, heard.said
+        old, new = last.request, incoming.request
         if not (isinstance(old, Paint) and isinstance(new, Paint)):
             return False
         if old.done or (old.stroke, old.view) != (new.stroke, new.view):
             return False
         if not _is_within(old.region, new.region):
             return False
-        heard.replies[:0] = last.replies
-        self._heard[-1] = heard
+        incoming.replies[:0] = last.replies
+        self._incoming[-1] = incoming
         return True
 
     def send(self, message: Message, reply: int | None = None) -> None:
-        """Say something to the page, as soon as it can hear. reply: what it answers."""
-        if self._is_gone:
+        """Queue a message for the client. reply: number of the message that it answers."""
+        if self._is_abandoned:
             return
-        if reply is None and (sort := _sort(message)) is not None:
+        if reply is None and (key := _replacement_key(message)) is not None:
             for k, (other, its) in enumerate(self._unsent):
-                if its is None and _sort(other) == sort:
-                    message = _merged(other, message)
+                if its is None and _replacement_key(other) == key:
+                    message = _merge(other, message)
                     del self._unsent[k]
                     break
         self._unsent.append((message, reply))
-        self._is_sent.clear()
-        self._is_to_send.set()
-        if len(self._unsent) > MOST_UNSENT:
-            self.give_up()
+        self._all_sent.clear()
+        self._has_unsent.set()
+        if len(self._unsent) > MAX_UNSENT:
+            self.abandon()
 
-    async def keep_sending(self) -> None:
-        """Send until the page has gone."""
-        while not self._is_gone:
+    async def send_all(self) -> None:
+        """Send queued messages until the client is abandoned."""
+        while not self._is_abandoned:
             while not self._unsent:
-                self._is_sent.set()
-                self._is_to_send.clear()
-                await self._is_to_send.wait()
-                if self._is_gone:
+                self._all_sent.set()
+                self._has_unsent.clear()
+                await self._has_unsent.wait()
+                if self._is_abandoned:
                     break
-            if self._is_gone:
+            if self._is_abandoned:
                 break
             message, reply = self._unsent.pop(0)
-            self._is_to_take.set()
+            self._may_read_on.set()
             frame = to_frame(message.content(reply), message.buffers())
             try:
-                await asyncio.wait_for(self._socket.send_bytes(frame), SLOWEST_S)
+                await asyncio.wait_for(self._socket.send_bytes(frame), SEND_TIMEOUT_S)
             except Exception:  # whatever a socket says that has nobody at its end
-                self.give_up()
-        await self.leave(1013)
+                self.abandon()
+        await self.close(1013)
 
     @property
     def _unsent_bytes(self) -> int:
         arrays = [array for message, _ in self._unsent for array in message.arrays.values()]
         return sum(array.nbytes for array in arrays)
 
-    async def answered(self) -> None:
-        """Wait until all that the page has said is answered."""
-        await self._is_answered.wait()
+    async def wait_answered(self) -> None:
+        """Wait until all messages of the client are answered."""
+        await self._all_answered.wait()
 
-    async def sent(self) -> None:
-        """Wait until the page has heard everything."""
-        await self._is_sent.wait()
+    async def wait_sent(self) -> None:
+        """Wait until all messages to the client are sent."""
+        await self._all_sent.wait()
 
-    async def leave(self, code: int) -> None:
-        """Close the socket, if it is still there."""
-        self.give_up()
+    async def close(self, code: int) -> None:
+        """Close the socket, if it is still open."""
+        self.abandon()
         try:
             await asyncio.wait_for(self._socket.close(code), 1.0)
         except Exception:  # it is not
             return
 
 
-def _heard(frame: bytes | None) -> Heard:
-    """What a frame says; of one that says nothing, why."""
+def _parse_frame(frame: bytes | None) -> IncomingMessage:
+    """Return the message in a frame, or the reason why it holds none."""
     content: dict[str, Any] = {}
     try:
         if frame is None:
             raise PaintError("messages are binary frames")
-        content, buffers = of_frame(frame)
+        content, buffers = from_frame(frame)
         if _is_other_version(content):
             text = "lightpaint has been updated: load this page again"
-            return Heard(_number(content), None, {}, Closing(reason="version", text=text))
-        seq, said, arrays = said_of(content, buffers)
-        return Heard([seq], said, arrays)
+            return IncomingMessage(
+                _sequence_numbers(content), None, {}, Closing(reason="version", text=text)
+            )
+        seq, request, arrays = parse_request(content, buffers)
+        return IncomingMessage([seq], request, arrays)
     except PaintError as error:
-        return Heard(_number(content), None, {}, Failure(text=str(error)))
+        return IncomingMessage(_sequence_numbers(content), None, {}, Failure(text=str(error)))
 
 
 def _is_other_version(content: Mapping[str, Any]) -> bool:
-    """Whether it is the first message of a page of another version, whatever else it says."""
+    """Return whether this is the first message of a page of another version, whatever else it
+    holds.
+    """
     version = content.get("version")
     return (
         content.get("kind") in ("hello", "observe") and type(version) is int and version != VERSION
     )
 
 
-def _number(content: Mapping[str, Any]) -> list[int]:
+def _sequence_numbers(content: Mapping[str, Any]) -> list[int]:
     seq = content.get("seq")
     return [seq] if type(seq) is int and 0 <= seq < 2**53 else []
 
@@ -248,19 +253,19 @@ def _is_within(inner: tuple[int, ...], outer: tuple[int, ...]) -> bool:
     return top <= inner[0] and inner[1] <= bottom and left <= inner[2] and inner[3] <= right
 
 
-def _sort(message: Message) -> tuple[Any, ...] | None:
-    """Of messages that nobody asked for: those of which only the newest counts."""
+def _replacement_key(message: Message) -> tuple[Any, ...] | None:
+    """Return a key for events of which only the newest counts; None for others."""
     if isinstance(message, ProgressReport):
         return "progress", message.what
     is_newest = isinstance(message, AnswerUpdate | PictureUpdate | LookList | SessionState)
     return (message.kind,) if is_newest else None
 
 
-def _merged(old: Message, new: Message) -> Message:
+def _merge(old: Message, new: Message) -> Message:
     if isinstance(old, PictureUpdate) and isinstance(new, PictureUpdate):
         return PictureUpdate(resources={**old.resources, **new.resources})
     if isinstance(old, AnswerUpdate) and isinstance(new, AnswerUpdate):
         # Live answers leave out what is asked, which the one that is replaced may have said.
-        names = [one for one in Standing.__dataclass_fields__ if getattr(new, one) is None]
+        names = [one for one in EditState.__dataclass_fields__ if getattr(new, one) is None]
         return replace(new, **{name: getattr(old, name) for name in names})
     return new

@@ -1,4 +1,4 @@
-"""The file by which programs find a painter that runs: its address and token, for its owner."""
+"""The file by which programs find a running painter: its address and token, for its owner alone."""
 
 import json
 import os
@@ -10,20 +10,20 @@ from typing import Any
 from lightpaint.files import replacing
 
 #: Its name, in the session's folder.
-CONNECTION = "painter.json"
+CONNECTION_FILE = "painter.json"
 
 
 class ConnectionFile:
-    """The file of one painter, in the folder of its session.
+    """The connection file of one painter, in the folder of its session.
 
-    about: what it says, as JSON, with a `token` that is of this painter alone.
+    about: its content, as JSON, with a `token` that is of this painter alone.
     """
 
     def __init__(self, folder: Path, about: Mapping[str, Any]) -> None:
-        self.path, self._about = folder / CONNECTION, dict(about)
+        self.path, self._about = folder / CONNECTION_FILE, dict(about)
 
     def write(self) -> None:
-        """Put it there, in the place of one that a killed painter has left.
+        """Write the file, replacing one that a killed painter has left.
 
         Raises OutputError for whatever the system refuses.
         """
@@ -34,7 +34,7 @@ class ConnectionFile:
                 file.write(json.dumps(self._about) + "\n")
 
     def remove(self) -> None:
-        """Take it away, unless it is another painter's by now."""
+        """Delete the file, unless it is another painter's by now."""
         with suppress(OSError, ValueError, AttributeError):
             found = json.loads(self.path.read_text(encoding="utf-8"))
             if found.get("token") == self._about["token"]:

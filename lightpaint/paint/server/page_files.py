@@ -1,12 +1,12 @@
-"""The files of the page: a table that is made at the start, which is all that can be asked for."""
+"""The files of the page, read once at the start: nothing else can be requested."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from lightpaint.viewer.bundle import bundled
 
-#: What a browser is told of each kind of file; others are not part of the page.
-KINDS = {
+#: Content types by suffix; other files are not part of the page.
+CONTENT_TYPES = {
     ".html": "text/html;charset=utf-8",
     ".js": "text/javascript;charset=utf-8",
     ".css": "text/css;charset=utf-8",
@@ -18,30 +18,30 @@ KINDS = {
     ".txt": "text/plain;charset=utf-8",
 }
 
-PAGE = Path(__file__).parents[1] / "page"
+PAGE_FOLDER = Path(__file__).parents[1] / "page"
 
 #: What draws in it, and in pages of other rooms, served as `/viewer`. Modules of the page name it
 #: by its place in the package; of the many `..` in that, those beyond the root count for nothing.
-VIEWER = Path(__file__).parents[2] / "viewer"
+VIEWER_FOLDER = Path(__file__).parents[2] / "viewer"
 
 #: The module that begins it; a browser gets it with all that it imports.
-ENTRY = "/main.js"
+ENTRY_MODULE = "/main.js"
 
 ICON = "/icon.svg"
 
 
 @dataclass(frozen=True)
 class PageFile:
-    """One file of the page, as it was at the start."""
+    """A file of the page, as it was at the start."""
 
     kind: str
     content: bytes
 
 
-def page_files(folder: Path = PAGE) -> dict[str, PageFile]:
-    """What is answered to which path; `/` is the page itself.
+def page_files(folder: Path = PAGE_FOLDER) -> dict[str, PageFile]:
+    """Return the files of the page by their paths; `/` is the page itself.
 
-    What is hidden, links to something else, and what is no file of a page is passed over.
+    Hidden files, links that lead elsewhere, and other kinds of files are left out.
     """
     root = folder.resolve()
     table = _files_below(root, "/")
@@ -50,10 +50,12 @@ def page_files(folder: Path = PAGE) -> dict[str, PageFile]:
     if ICON in table:
         # Some browsers ask for it whatever a page says.
         table["/favicon.ico"] = table[ICON]
-    if root == PAGE.resolve():
-        table |= _files_below(VIEWER.resolve(), "/viewer/")
+    if root == PAGE_FOLDER.resolve():
+        table |= _files_below(VIEWER_FOLDER.resolve(), "/viewer/")
         # A browser takes ten milliseconds for each file, whoever serves it.
-        table[ENTRY] = PageFile(KINDS[".js"], bundled(f"paint/page{ENTRY}").encode())
+        table[ENTRY_MODULE] = PageFile(
+            CONTENT_TYPES[".js"], bundled(f"paint/page{ENTRY_MODULE}").encode()
+        )
     return table
 
 
@@ -63,8 +65,10 @@ def _files_below(root: Path, start: str) -> dict[str, PageFile]:
     for path in sorted(root.rglob("*")):
         place = path.relative_to(root)
         is_hidden = any(part.startswith((".", "_")) for part in place.parts)
-        if is_hidden or path.suffix not in KINDS or not path.resolve().is_relative_to(root):
+        if is_hidden or path.suffix not in CONTENT_TYPES or not path.resolve().is_relative_to(root):
             continue
         if path.is_file():
-            table[f"{start}{place.as_posix()}"] = PageFile(KINDS[path.suffix], path.read_bytes())
+            table[f"{start}{place.as_posix()}"] = PageFile(
+                CONTENT_TYPES[path.suffix], path.read_bytes()
+            )
     return table

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 from lightpaint.errors import PaintError
 from lightpaint.paint.frames import MAX_FRAME
 from lightpaint.paint.protocol import VERSION
-from lightpaint.paint.server.address import Listening, listen
+from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.client import Client
 from lightpaint.paint.server.guard import PROTOCOL, App, Guard
 from lightpaint.paint.server.page_files import PageFile, page_files
-from lightpaint.paint.server.session_clients import Line, Painted, pictured
+from lightpaint.paint.server.session_clients import Connections, ServedSession, picture_message
 from lightpaint.paint.store.store import Store
 from lightpaint.version import __version__
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from starlette.responses import Response
     from starlette.websockets import WebSocket
 
-#: Bytes of a message beside its pixels, and of each pixel (light and importance) that it may bring.
-BESIDE, OF_PIXEL = 2**20, 16
+#: Bytes of a message without its pixels, and of each pixel (light and importance) in it.
+MESSAGE_OVERHEAD_BYTES, BYTES_PER_PIXEL = 2**20, 16
 
 
 def check_installed() -> None:
@@ -40,12 +40,12 @@ def check_installed() -> None:
 
 
 def page_app(
-    line: Line,
+    connections: Connections,
     *,
     files: dict[str, PageFile] | None = None,
     is_program: Callable[[Any], bool] = lambda _: False,
 ) -> App:
-    """What is answered to those who may ask. is_program: whether a request is of no page."""
+    """Return the application behind the guard. is_program: whether a request comes from no page."""
     from starlette.applications import Starlette
     from starlette.responses import Response
     from starlette.routing import Route, WebSocketRoute
@@ -61,10 +61,10 @@ def page_app(
     async def data(request: "Request") -> "Response":
         name, asked = request.path_params["name"], request.query_params.get("g")
         if is_program(request.scope):
-            await line.at_rest()
-        before = line.generations.get(name)
+            await connections.wait_for_rest()
+        before = connections.generations.get(name)
         try:
-            picture = await pictured(line, name)
+            picture = await picture_message(connections, name)
         except PaintError as error:
             return Response(str(error), 404, media_type="text/plain")
         [about], [content] = picture.content()["buffers"], picture.buffers()
@@ -73,7 +73,7 @@ def page_app(
             "x-dtype": about["dtype"],
             "x-shape": ",".join(map(str, about["shape"])),
         }
-        if asked is not None and asked == str(before) == str(line.generations.get(name)):
+        if asked is not None and asked == str(before) == str(connections.generations.get(name)):
             # Another launch has another key, and other pictures.
             kept = "private, max-age=31536000, immutable"
             headers |= {"cache-control": kept, "vary": "Authorization"}
@@ -82,13 +82,13 @@ def page_app(
     async def live(websocket: "WebSocket") -> None:
         # A program may have offered none, and is not answered with what it did not offer.
         await websocket.accept(PROTOCOL if PROTOCOL in websocket.scope["subprotocols"] else None)
-        await line.serve(Client(websocket, websocket.query_params.get("page", "")))
+        await connections.serve(Client(websocket, websocket.query_params.get("page", "")))
 
     @asynccontextmanager
     async def lifespan(_: Any) -> AsyncIterator[None]:
-        line.begin()
+        connections.attach()
         yield
-        await line.end()
+        await connections.close()
 
     routes = [
         WebSocketRoute("/live", live),
@@ -99,93 +99,95 @@ def page_app(
 
 
 class Server:
-    """One session, served.
+    """The server of one session.
 
     host, port: as of `listen`; a host other than the loopback is for those who know why. listening:
-    what `listen` has returned, which `close` closes. say: as of `Line`. Raises PaintError where it
-    cannot listen.
+    the result of `listen`, which `close` closes. say: as of `Connections`. Raises PaintError where
+    it cannot listen.
 
     Attributes:
         address: Where it listens.
-        is_expected: Whether a browser has been told where the page is.
+        expects_page: Whether a browser was started with the page's address.
     """
 
     def __init__(
         self,
-        session: Painted,
+        session: ServedSession,
         store: Store | None = None,
         *,
         host: str | None = None,
         port: int | None = None,
-        listening: Listening | None = None,
+        listening: BoundSocket | None = None,
         say: Callable[[str], None] = lambda _: None,
     ) -> None:
         check_installed()
-        self._line = Line(session, store, say)
+        self._connections = Connections(session, store, say)
         self._socket, self.address = listening or listen(host, port)
-        self._guard = Guard(_nothing_yet, address=self.address)
-        self._serving: uvicorn.Server | None = None
-        self._is_to_stop = False
-        self.is_expected = False
+        self._guard = Guard(_no_app, address=self.address)
+        self._uvicorn: uvicorn.Server | None = None
+        self._stop_requested = False
+        self.expects_page = False
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """Port that it listens on."""
         return self.address.port
 
     @property
     def url(self) -> str:
-        """Where the page is, with the token that opens it: in the fragment, which stays there."""
+        """URL of the page, with the token that opens it in the fragment, which browsers send to
+        nobody.
+        """
         return f"{self.address.url}#token={self._guard.token}"
 
     @property
     def connection(self) -> dict[str, Any]:
-        """What a program of this machine has to know to connect."""
+        """Values that a program of this machine needs to connect."""
         token = self._guard.program_token
         about = {"version": __version__, "protocol": VERSION}
-        return {"address": self.address.url_here, "token": token, **about}
+        return {"address": self.address.local_url, "token": token, **about}
 
-    def url_once(self) -> str:
-        """Return the same for a browser that is started now: good once."""
-        self.is_expected = True
-        return f"{self.address.url_here}#token={self._guard.once()}"
+    def one_time_url(self) -> str:
+        """Return the URL for a browser that is started now; its token is good once."""
+        self.expects_page = True
+        return f"{self.address.local_url}#token={self._guard.one_time_token()}"
 
-    def keeps(self, store: Store) -> None:
-        """What is done is kept there, from now on; of a session that was opened later."""
-        self._line.store = store
-        if self._serving is not None:
-            self._serving.config.ws_max_size = self._largest
+    def set_store(self, store: Store) -> None:
+        """Set the store of a session that was opened later."""
+        self._connections.store = store
+        if self._uvicorn is not None:
+            self._uvicorn.config.ws_max_size = self._max_message_bytes
 
     @property
-    def _largest(self) -> int:
-        """Bytes of the longest message that a page may send."""
-        store = self._line.store
-        pixels = MAX_FRAME if store is None or store.identity is None else store.identity.largest
-        return min(MAX_FRAME, BESIDE + OF_PIXEL * pixels)
+    def _max_message_bytes(self) -> int:
+        """Size of the longest message that a page may send."""
+        store = self._connections.store
+        pixels = MAX_FRAME if store is None or store.identity is None else store.identity.max_pixels
+        return min(MAX_FRAME, MESSAGE_OVERHEAD_BYTES + BYTES_PER_PIXEL * pixels)
 
     @property
     def has_page(self) -> bool:
-        """Whether a page is there to hear what is said."""
-        return self._line.has_page
+        """True if a page has the session."""
+        return self._connections.has_page
 
     def run(self) -> None:
-        """Serve until Ctrl-C or the like, which is raised again when all has ended well."""
+        """Serve until Ctrl-C or a signal, which is raised again at a clean end."""
         # Whoever comes meanwhile waits at the socket.
         import uvicorn
 
-        from lightpaint.paint.server.http_connections import bounded_http
-        from lightpaint.paint.server.shutdown import EndingServer, PageSocket, hanging_up
+        from lightpaint.paint.server.http_connections import bounded_http_protocol
+        from lightpaint.paint.server.shutdown import GracefulServer, PageSocket, stop_on_hangup
 
         files = page_files()
         self._guard.app, self._guard.public = (
-            page_app(self._line, files=files, is_program=self._guard.is_program),
+            page_app(self._connections, files=files, is_program=self._guard.is_program),
             files,
         )
         config = uvicorn.Config(
             self._guard,
-            http=bounded_http(self._guard.knows),
+            http=bounded_http_protocol(self._guard.is_allowed),
             ws=PageSocket,
-            ws_max_size=self._largest,
+            ws_max_size=self._max_message_bytes,
             ws_per_message_deflate=False,
             ws_ping_interval=10.0,
             ws_ping_timeout=20.0,
@@ -197,22 +199,22 @@ class Server:
             limit_concurrency=256,
             timeout_graceful_shutdown=5,
         )
-        self._serving = EndingServer(config, self._line)
-        self._serving.should_exit = self._is_to_stop
-        with hanging_up(self._serving):
-            self._serving.run(sockets=[self._socket])
+        self._uvicorn = GracefulServer(config, self._connections)
+        self._uvicorn.should_exit = self._stop_requested
+        with stop_on_hangup(self._uvicorn):
+            self._uvicorn.run(sockets=[self._socket])
 
     def stop(self, why: str = "") -> None:
-        """Let `run` end, from another thread. why: what pages are told, if not the usual."""
-        self._line.farewell = why or self._line.farewell
-        self._is_to_stop = True
-        if self._serving is not None:
-            self._serving.should_exit = True
+        """End `run`, from another thread. why: text for the pages, instead of the usual one."""
+        self._connections.farewell = why or self._connections.farewell
+        self._stop_requested = True
+        if self._uvicorn is not None:
+            self._uvicorn.should_exit = True
 
     def close(self) -> None:
-        """Listen no more."""
+        """Close the listening socket."""
         self._socket.close()
 
 
-async def _nothing_yet(scope: Any, receive: Any, send: Any) -> None:
-    """What is behind the guard before anybody serves."""
+async def _no_app(scope: Any, receive: Any, send: Any) -> None:
+    """Handle requests before `run` has set the application: none arrives."""

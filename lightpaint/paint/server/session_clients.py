@@ -1,11 +1,11 @@
-"""The line between pages and one session: who has it, what is said, and in which order.
+"""The connections between clients and one session: who has it, and in which order requests are
+done.
 
-One page has the session. Another is told so, and may take it over; the first is told that. What
-a page says waits in a queue of its own and is done by one thread, a message after the other; of
-live paint that another stroke's part already covers, only the newest. What goes to a page that
-is slow is replaced by what is newer where only the newest counts.
+One page has the session. Another page is told so, and may take it over; the first one is then told.
+Requests of a page wait in a queue of its own, and one thread does them one after the other; of live
+paint only the newest counts. Events to a slow page replace those that they outdate.
 
-Whatever happens in the session is an answer to the page, and never the end of the line.
+An error in the session is an answer to the page, and never ends the connection.
 """
 
 import asyncio
@@ -19,10 +19,11 @@ from typing import Any, Protocol, TypeVar
 import numpy.typing as npt
 
 from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.paint.background_threads import told, tone_of
+from lightpaint.paint.background_threads import error_text, error_tone
 from lightpaint.paint.protocol import (
     Acknowledgement,
     AnswerUpdate,
+    AnyRequest,
     Ask,
     CanvasPatch,
     Closing,
@@ -39,28 +40,27 @@ from lightpaint.paint.protocol import (
     PictureUpdate,
     ProgressReport,
     Propose,
-    Said,
     SessionState,
     VerificationResult,
 )
-from lightpaint.paint.server.client import Client, Heard
+from lightpaint.paint.server.client import Client, IncomingMessage
 from lightpaint.paint.store.store import Store
 from lightpaint.progress import while_wanted
 
-#: Pages that are told that another has the session, at most.
-MOST_PAGES = 16
+#: Clients, at most.
+MAX_PAGES = 16
 
 #: Clients that only observe, at most.
-MOST_OBSERVERS = 8
+MAX_OBSERVERS = 8
 
 #: Seconds that a program's download waits for the brush to rest, at most.
 REST_S = 10.0
 
-#: Seconds for pages to hear the end.
-GOODBYE_S = 1.0
+#: Seconds for pages to receive the last messages.
+CLOSING_S = 1.0
 
-#: What observers are told of what goes on.
-OBSERVED = (
+#: Events that observers receive.
+OBSERVED_EVENTS = (
     SessionState,
     AnswerUpdate,
     LookList,
@@ -71,259 +71,266 @@ OBSERVED = (
     Notice,
 )
 
-_Made = TypeVar("_Made")
+_Result = TypeVar("_Result")
 
 
-class Painted(Protocol):
-    """What a session is to a server."""
+class ServedSession(Protocol):
+    """A session, as the server sees it."""
 
     on_message: Callable[[Message], None] | None
 
-    def said(self, said: Said, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
-        """What is answered; the first answers the message. Raises LightpaintError."""
+    def handle(self, request: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
+        """Return the answers; the first one replies to the request. Raises LightpaintError."""
 
     def greet(self, *, is_back: bool) -> Message:
-        """All that a page has to know; is_back: it had the session before, and nobody since."""
+        """Return the state for a page. is_back: it had the session before, and nobody since."""
 
     def state(self) -> Message:
-        """Return all that there is to know, and change nothing."""
+        """Return the state, and change nothing."""
 
     def resource(self, name: str) -> npt.NDArray[Any]:
-        """A picture. Raises PaintError if there is none of that name."""
+        """Return a picture. Raises PaintError if there is none of that name."""
 
 
-class Line:
-    """Pages of one session.
+class Connections:
+    """The clients of one session.
 
-    say: hears, in plain text, what somebody at the terminal should know.
+    report: receives, in plain text, what somebody at the terminal should know.
     """
 
     def __init__(
-        self, session: Painted, store: Store | None, say: Callable[[str], None] = lambda _: None
+        self,
+        session: ServedSession,
+        store: Store | None,
+        report: Callable[[str], None] = lambda _: None,
     ) -> None:
-        self.session, self.store, self.say = session, store, say
+        self.session, self.store, self.report = session, store, report
         self.generations: dict[str, int] = {}
         self._holder: Client | None = None
         self._last: Client | None = None
         self._clients: set[Client] = set()
         self.farewell = "the painter has ended; what was painted is kept"
         self._worker = ThreadPoolExecutor(1, "lightpaint-session")
-        self._is_over = False
+        self._is_closed = False
         self._leaving: asyncio.Future[None] | None = None
-        self._rest = asyncio.Event()  # set while no brush is down
-        self._rest.set()
+        self._brush_up = asyncio.Event()  # set while no brush is down
+        self._brush_up.set()
 
-    def begin(self) -> None:
-        """Hear the session from now on, in the running loop."""
+    def attach(self) -> None:
+        """Receive the session's events from now on, in the running loop."""
         loop = asyncio.get_running_loop()
 
         def post(message: Message) -> None:
             with suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(self._post, message)
+                loop.call_soon_threadsafe(self._publish, message)
 
         self.session.on_message = post
 
     @property
     def has_page(self) -> bool:
-        """Whether a page is there that has heard what there is."""
+        """True if a page has the session, and its state."""
         return self._holder is not None
 
-    async def end(self) -> None:
-        """Finish what pages have said, tell them, and finish what the session is at."""
-        self._rest.set()
-        await _all([client.answered() for client in self._clients])
-        self._is_over = True
+    async def close(self) -> None:
+        """Answer the queued requests, tell the pages, and finish the session's work."""
+        self._brush_up.set()
+        await _wait_all([client.wait_answered() for client in self._clients])
+        self._is_closed = True
         self.session.on_message = None
         for client in self._clients:
             client.send(Closing(reason="ended", text=self.farewell))
-        await _all([client.sent() for client in self._clients])
+        await _wait_all([client.wait_sent() for client in self._clients])
         await asyncio.to_thread(self._worker.shutdown, cancel_futures=True)
 
     async def serve(self, client: Client) -> None:
-        """Answer one page until it leaves."""
-        if self._is_over or len(self._clients) >= MOST_PAGES:
-            await client.leave(1013)
+        """Serve one client until it disconnects."""
+        if self._is_closed or len(self._clients) >= MAX_PAGES:
+            await client.close(1013)
             return
         self._clients.add(client)
-        sending = asyncio.create_task(client.keep_sending())
-        answering = asyncio.create_task(self._answering(client))
+        sending = asyncio.create_task(client.send_all())
+        live_answer = asyncio.create_task(self._answer_loop(client))
         try:
-            await client.keep_hearing()
+            await client.receive_all()
             # The last stroke of a page counts, though nobody is there for the answer.
-            last = asyncio.ensure_future(client.answered())
-            await asyncio.wait((last, answering), return_when=asyncio.FIRST_COMPLETED)
+            last = asyncio.ensure_future(client.wait_answered())
+            await asyncio.wait((last, live_answer), return_when=asyncio.FIRST_COMPLETED)
             last.cancel()
         finally:
             self._clients.discard(client)
             if self._holder is client:
                 self._holder = None
-                self._rest.set()
-            client.give_up()  # a task may be at the end of a wait, which swallows the cancelling
-            for task in (sending, answering):
+                self._brush_up.set()
+            client.abandon()  # a task may be at the end of a wait, which swallows the cancelling
+            for task in (sending, live_answer):
                 task.cancel()
             # Not gathered: whoever gives this wait up would hear of their end, not of its own.
-            await asyncio.wait((sending, answering))
+            await asyncio.wait((sending, live_answer))
 
     async def resource(self, name: str) -> npt.NDArray[Any]:
-        """A picture of the session. Raises PaintError if there is none of that name."""
-        return await self._done(self.session.resource, name)
+        """Return a picture of the session. Raises PaintError if there is none of that name."""
+        return await self._run(self.session.resource, name)
 
-    async def _done(self, work: Callable[..., _Made], *given: Any) -> _Made:
-        """What the session does, one thing at a time. Raises PaintError at the end."""
-        if self._is_over:
+    async def _run(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
+        """Run work in the session's thread, one at a time. Raises PaintError once closed."""
+        if self._is_closed:
             raise PaintError(self.farewell)
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._worker, partial(self._while_open, work, *given))
+        return await loop.run_in_executor(
+            self._worker, partial(self._run_while_open, work, *arguments)
+        )
 
-    def _while_open(self, work: Callable[..., _Made], *given: Any) -> _Made:
-        """What the session does, which long work of it gives up at the end."""
+    def _run_while_open(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
+        """Run work that gives up once the connections are closed."""
         with while_wanted(self._check_open):
-            return work(*given)
+            return work(*arguments)
 
     def _check_open(self) -> None:
-        if self._is_over:
+        if self._is_closed:
             raise PaintError(self.farewell)
 
-    async def _answering(self, client: Client) -> None:
+    async def _answer_loop(self, client: Client) -> None:
         while True:
-            heard = await client.next_heard()
-            answers = await self._answers(client, heard)
+            incoming = await client.next_message()
+            answers = await self._handle(client, incoming)
             for message in answers:
-                self._note(message)
+                self._update_generations(message)
                 if client is self._holder and not isinstance(message, SessionState):
-                    self._tell_observers(message)
+                    self._send_to_observers(message)
             first, *others = answers or [Acknowledgement()]
-            for seq in heard.replies or (None,):
+            for seq in incoming.replies or (None,):
                 client.send(first, seq)
             for message in others:
                 client.send(message)
 
-    async def _answers(self, client: Client, heard: Heard) -> list[Message]:
-        """What is said to one message; whatever goes wrong is said, too."""
+    async def _handle(self, client: Client, incoming: IncomingMessage) -> list[Message]:
+        """Return the answers to one message; every error becomes an answer."""
         try:
-            if heard.refusal is not None:
-                return [heard.refusal]
-            if isinstance(heard.said, Observe) or client.observes:
-                return await self._answers_to_observer(client, heard.said)
-            if heard.asks_for_session:
-                holder = await self._present_holder(client)
+            if incoming.refusal is not None:
+                return [incoming.refusal]
+            if isinstance(incoming.request, Observe) or client.is_observer:
+                return await self._handle_observer(client, incoming.request)
+            if incoming.asks_for_session:
+                holder = await self._current_holder(client)
                 if holder not in (None, client) and not (
-                    heard.takes_over or _same_page(holder, client)
+                    incoming.takes_over or _is_same_page(holder, client)
                 ):
-                    return [_taken("the painter is open in another tab")]
-                is_back = self._last is client or _same_page(self._last, client)
-                self._give(client)
-                return [await self._done(partial(self.session.greet, is_back=is_back))]
+                    return [_taken_message("the painter is open in another tab")]
+                is_back = self._last is client or _is_same_page(self._last, client)
+                self._hand_over(client)
+                return [await self._run(partial(self.session.greet, is_back=is_back))]
             if self._holder is not client:
-                return [_taken("this tab does not have the session")]
-            assert heard.said is not None
-            is_live = isinstance(heard.said, Paint | Ask) and not heard.said.done
-            (self._rest.clear if is_live else self._rest.set)()
-            return await self._done(self.session.said, heard.said, heard.arrays)
+                return [_taken_message("this tab does not have the session")]
+            assert incoming.request is not None
+            is_live = isinstance(incoming.request, Paint | Ask) and not incoming.request.done
+            (self._brush_up.clear if is_live else self._brush_up.set)()
+            return await self._run(self.session.handle, incoming.request, incoming.arrays)
         except LightpaintError as error:
-            return [Failure(text=str(error), tone=tone_of(error))]
+            return [Failure(text=str(error), tone=error_tone(error))]
         except Exception as error:
             # A mistake of lightpaint's own: whoever paints goes on, and whoever mends it is told.
-            self.say("".join(traceback.format_exception(error)))
-            return [Failure(text=told(error, at_length=False))]
+            self.report("".join(traceback.format_exception(error)))
+            return [Failure(text=error_text(error, at_length=False))]
 
-    async def _answers_to_observer(self, client: Client, said: Said | None) -> list[Message]:
-        """Answer one that never has the session, once no brush is down.
+    async def _handle_observer(self, client: Client, request: AnyRequest | None) -> list[Message]:
+        """Return the answers to an observer, once no brush is down.
 
         Raises LightpaintError for what observers may not do.
         """
-        if isinstance(said, Observe):
+        if isinstance(request, Observe):
             if client is self._holder:
                 raise PaintError("this client has the session: observe with a client of its own")
-            others = [one for one in self._clients if one.observes and one is not client]
-            if len(others) >= MOST_OBSERVERS:
-                raise PaintError(f"{MOST_OBSERVERS} observers are there already: close one of them")
-            client.observes = True
-            await self._rest.wait()
-            return [await self._done(self.session.state)]
-        is_export = isinstance(said, Export) and said.run
-        if not (is_export or isinstance(said, Fetch | Propose)):
+            others = [one for one in self._clients if one.is_observer and one is not client]
+            if len(others) >= MAX_OBSERVERS:
+                raise PaintError(f"{MAX_OBSERVERS} observers are there already: close one of them")
+            client.is_observer = True
+            await self._brush_up.wait()
+            return [await self._run(self.session.state)]
+        is_export = isinstance(request, Export) and request.run
+        if not (is_export or isinstance(request, Fetch | Propose)):
             raise PaintError(
                 "an observer may fetch, export and propose: to paint, connect another client"
             )
-        await self._rest.wait()
-        answers = await self._done(self.session.said, said, {})
-        if isinstance(said, Propose):
+        await self._brush_up.wait()
+        answers = await self._run(self.session.handle, request, {})
+        if isinstance(request, Propose):
             for message in answers:
-                self._tell_observers(message, but=client)
+                self._send_to_observers(message, but=client)
                 if self._holder is not None:
                     self._holder.send(message)
             if self._holder is not None:
-                self._holder.send(Notice(text=f"{said.name[:80]} was proposed: see the looks"))
+                self._holder.send(Notice(text=f"{request.name[:80]} was proposed: see the looks"))
         return answers
 
-    async def at_rest(self) -> None:
-        """Wait until no brush is down, but not for ever: who waits may hold it."""
+    async def wait_for_rest(self) -> None:
+        """Wait until no brush is down, but not for ever: the waiting program may hold it."""
         with suppress(TimeoutError):
-            await asyncio.wait_for(self._rest.wait(), REST_S)
+            await asyncio.wait_for(self._brush_up.wait(), REST_S)
 
-    def _tell_observers(self, message: Message, but: Client | None = None) -> None:
-        """Pass on what concerns them. What waits for a slow one is replaced by what is newer."""
-        told = message.answer if isinstance(message, CanvasPatch) else message
-        if isinstance(told, OBSERVED):
+    def _send_to_observers(self, message: Message, but: Client | None = None) -> None:
+        """Send observers the events that concern them; newer events replace those that wait."""
+        event = message.answer if isinstance(message, CanvasPatch) else message
+        if isinstance(event, OBSERVED_EVENTS):
             for client in self._clients:
-                if client.observes and client is not but:
-                    client.send(told)
+                if client.is_observer and client is not but:
+                    client.send(event)
 
-    async def _present_holder(self, client: Client) -> Client | None:
-        """Who has the session when `client` asks: what one that has left had said is done first."""
-        while (holder := self._holder) not in (None, client) and holder.has_left:
-            await holder.answered()
+    async def _current_holder(self, client: Client) -> Client | None:
+        """Return the client that has the session, after all requests of one that has
+        disconnected.
+        """
+        while (holder := self._holder) not in (None, client) and holder.is_disconnected:
+            await holder.wait_answered()
             if self._holder is holder:
                 self._holder = None
         return holder
 
-    def _give(self, client: Client) -> None:
-        """`client` has the session from now on."""
+    def _hand_over(self, client: Client) -> None:
+        """Give the session to `client`, and tell the client that had it."""
         before, self._holder, self._last = self._holder, client, client
-        self._rest.set()
+        self._brush_up.set()
         if before is None or before is client:
             return
-        if _same_page(before, client):  # it is at the other end of a lost connection
-            self._leaving = asyncio.ensure_future(before.leave(1001))
+        if _is_same_page(before, client):  # it is at the other end of a lost connection
+            self._leaving = asyncio.ensure_future(before.close(1001))
         else:
-            before.send(_taken("another tab has taken this session over"))
+            before.send(_taken_message("another tab has taken this session over"))
 
-    def _post(self, message: Message) -> None:
-        """What the session says by itself."""
-        self._note(message)
-        self._tell_observers(message)
+    def _publish(self, message: Message) -> None:
+        """Send an event of the session to its page and its observers."""
+        self._update_generations(message)
+        self._send_to_observers(message)
         if self._holder is not None:
             self._holder.send(message)
 
-    def _note(self, message: Message) -> None:
-        """Remember which pictures there are by now."""
+    def _update_generations(self, message: Message) -> None:
+        """Store the numbers of the pictures that there are by now."""
         if isinstance(message, SessionState):
             self.generations = dict(message.resources)
         elif isinstance(message, PictureUpdate):
             self.generations = {**self.generations, **message.resources}
 
 
-async def _all(waits: list[Coroutine[Any, Any, None]]) -> None:
-    """Wait for all of them, but not for those who are too slow."""
+async def _wait_all(waits: list[Coroutine[Any, Any, None]]) -> None:
+    """Wait for all of them, but not for clients that are too slow."""
     tasks = [asyncio.ensure_future(wait) for wait in waits]
     if tasks:
-        await asyncio.wait(tasks, timeout=GOODBYE_S)
+        await asyncio.wait(tasks, timeout=CLOSING_S)
     for task in tasks:
         task.cancel()
 
 
-def _taken(text: str) -> Message:
+def _taken_message(text: str) -> Message:
     return Closing(reason="taken", text=text)
 
 
-def _same_page(holder: Client | None, client: Client) -> bool:
-    """Whether it is the page that has the session, back after its connection was dropped."""
+def _is_same_page(holder: Client | None, client: Client) -> bool:
+    """Return whether `client` is the holder's page, back after its connection was dropped."""
     return holder is not None and client.page != "" and holder.page == client.page
 
 
-async def pictured(line: Line, name: str) -> Message:
-    """A picture as a message, whose bytes can be sent. Raises PaintError."""
+async def picture_message(connections: Connections, name: str) -> Message:
+    """Return a picture as a message, whose bytes can be sent. Raises PaintError."""
     if len(name) > 200:
         raise PaintError("no picture has such a name")
-    return PictureData(name=name, data=await line.resource(name))
+    return PictureData(name=name, data=await connections.resource(name))

@@ -1,4 +1,4 @@
-"""How the painter's server ends: pages are told, and who does not hear is not waited for.
+"""The end of the painter's server: it tells the pages, and cuts off those that do not answer.
 
 Imported only where uvicorn is installed.
 """
@@ -14,68 +14,68 @@ from types import FrameType
 import uvicorn
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from lightpaint.paint.server.session_clients import Line
+from lightpaint.paint.server.session_clients import Connections
 
 #: Seconds after which a connection is cut that has not taken what was still to be sent; uvicorn
 #: would wait longer, and then say so as an error at the terminal.
-PATIENCE_S = 2.0
+CUT_OFF_S = 2.0
 
 
 class PageSocket(WebSocketsSansIOProtocol):
-    """A page's socket, which may be at its own goodbye when the server says its."""
+    """A page's socket, which may be closing when the server closes it."""
 
     def send_receive_event_to_app(self) -> None:
-        """Pass a message on; text, which no page sends, as one that says nothing.
+        """Pass a message on; text, which no page sends, becomes an empty message.
 
-        uvicorn would show at the terminal where it could not read the text.
+        uvicorn would print to the terminal where it could not read the text.
         """
         if self.curr_msg_data_type == "text":
             self.curr_msg_data_type, self.frames = "bytes", [b""]
         super().send_receive_event_to_app()
 
     def shutdown(self) -> None:
-        """Say goodbye, unless the page has: uvicorn then ends in an error of `websockets`."""
+        """Close the socket, unless the page has: uvicorn then ends in an error of `websockets`."""
         if self.transport.is_closing():
             self.transport.abort()  # nobody is there for what was still to be sent
         else:
             super().shutdown()
 
 
-class EndingServer(uvicorn.Server):
-    """A server whose pages hear of the end, and that ends."""
+class GracefulServer(uvicorn.Server):
+    """A server that tells its pages before it ends, and then ends in bounded time."""
 
-    def __init__(self, config: uvicorn.Config, line: Line) -> None:
+    def __init__(self, config: uvicorn.Config, connections: Connections) -> None:
         super().__init__(config)
-        self._line = line
+        self._connections = connections
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """End; whoever asks for it again, while pages are told, does not make it any sooner.
+        """End the server; a second signal, while pages are told, changes nothing.
 
-        uvicorn would leave out the rest, and show in which line it was.
+        uvicorn would skip the rest, and print the line at which it stopped.
         """
         if not self.should_exit:
             super().handle_exit(sig, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Tell the pages, then end."""
-        await self._line.end()  # while they can still be told
-        asyncio.get_running_loop().call_later(PATIENCE_S, self._cut)
+        await self._connections.close()  # while they can still be told
+        asyncio.get_running_loop().call_later(CUT_OFF_S, self._abort)
         await super().shutdown(sockets)
 
-    def _cut(self) -> None:
+    def _abort(self) -> None:
         for connection in list(self.server_state.connections):
             connection.transport.abort()
 
 
 @contextmanager
-def hanging_up(server: uvicorn.Server) -> Iterator[None]:
-    """A terminal that closes ends `server` as SIGTERM does, unless that is ignored (nohup)."""
+def stop_on_hangup(server: uvicorn.Server) -> Iterator[None]:
+    """Stop `server` when its terminal closes, as SIGTERM does, unless SIGHUP is ignored (nohup)."""
     before = signal.getsignal(signal.SIGHUP)
-    is_heard = threading.current_thread() is threading.main_thread() and callable(before)
-    if is_heard:
+    is_handled = threading.current_thread() is threading.main_thread() and callable(before)
+    if is_handled:
         signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))
     try:
         yield
     finally:
-        if is_heard:
+        if is_handled:
             signal.signal(signal.SIGHUP, before)

@@ -1,4 +1,4 @@
-"""What a page is told of an answer: short sentences, and of each light what people go by."""
+"""Messages about an answer: short sentences, and the figures of each light that people go by."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -34,8 +34,8 @@ from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 WHITE, OFF = 0.02, 1e-4
 
 
-#: How far what was asked has come about, from which share of it on.
-WAYS = (
+#: Phrases for the share of the painting that the answer meets, each from this share on.
+PROGRESS_PHRASES = (
     (0.85, "Nearly there"),
     (0.6, "Most of the way"),
     (0.4, "About half of the way"),
@@ -43,28 +43,29 @@ WAYS = (
     (0.0, "A first step"),
 )
 
-#: The same of an answer that is no closer to the paint than the present look.
-NOT_YET = "No closer than it is now"
+#: Phrase for an answer that is no closer to the paint than the present look.
+NO_CLOSER_TEXT = "No closer than it is now"
 
-#: And of one that is farther from it.
-WORSE = "Farther from the paint than it is now, which undo brings back"
+#: Phrase for an answer that is farther from it.
+WORSE_TEXT = "Farther from the paint than it is now, which undo brings back"
 
-#: What to do about what holds the lights; a page has a button for each, and for what was asked of
-#: lights.
-HELP: dict[str, str] = {
+#: Advice on what keeps the lights from the paint; a page has a button for each.
+ADVICE_TEXTS: dict[str, str] = {
     "hold": "Paint more, or loosen it.",
     "colors": "The settings allow any colour.",
 }
 
-#: Why something is missed, for who paints it; and where something is asked of the lights.
-PARTS = {
+#: Reasons for a miss, for the painter; and where lights have constraints.
+MISS_TEXTS = {
     "unreachable": "no setting of these lights reaches",
     "forbidden": "would need a light to be darker than off",
     "compromise": "is given up for the other views",
     "noise": "is grain of the samples (more of them take it away)",
     "painting_noise": "is finer than light can be here: grain, edges and texture of the paint",
 }
-ASKED = {"forbidden": "would need lights of other colours or levels than they may have"}
+CONSTRAINED_MISS_TEXTS = {
+    "forbidden": "would need lights of other colours or levels than they may have"
+}
 
 
 def light_info(light: BasisLight, scale: float) -> LightInfo:
@@ -93,7 +94,7 @@ def answer_findings(bases: Sequence[Basis], weights: Doubles) -> Findings:
     """
     lit = [(basis.totals * weights) @ LUMINANCE for basis in bases]
     lights = tuple(
-        _light(light, weight, share)
+        _light_answer(light, weight, share)
         for light, weight, share in zip(bases[0].lights, weights, _shares(sum(lit)), strict=True)
     )
     shares = tuple(_shares(x) for x in lit) if len(bases) > 1 else None
@@ -105,15 +106,15 @@ def _shares(lit: Doubles) -> tuple[float, ...]:
     return tuple(float(x) / whole if whole > 0 else 0.0 for x in lit)
 
 
-def _light(light: BasisLight, weight: Doubles, share: float) -> LightAnswer:
-    seen = photometry(as_rgb(weight), unit=light.unit)
+def _light_answer(light: BasisLight, weight: Doubles, share: float) -> LightAnswer:
+    colour = photometry(as_rgb(weight), unit=light.unit)
     now, then = (float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight))
-    is_white = seen.kelvin is not None and seen.duv is not None and abs(seen.duv) <= WHITE
+    is_white = colour.kelvin is not None and colour.duv is not None and abs(colour.duv) <= WHITE
     return LightAnswer(
         emission=as_rgb(weight),
         stops=float(np.log2(then / now)) if now > 0 and then > OFF * now else None,
-        kelvin=seen.kelvin if is_white else None,
-        swatch=seen.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
+        kelvin=colour.kelvin if is_white else None,
+        swatch=colour.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
         is_on=then > OFF * now,
         share=share,
     )
@@ -121,7 +122,7 @@ def _light(light: BasisLight, weight: Doubles, share: float) -> LightAnswer:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the analysis of an answer says.
+    """The analysis of an answer, for the page.
 
     worst: of the view that is missed most. of_views: of each view; None for one that is not
     painted. lights: `error`, `held` and `unreached` of each, as of `LightAnswer`.
@@ -131,17 +132,17 @@ class Judgement:
     of_views: tuple[Closeness | None, ...]
     lights: tuple[tuple[str | None, bool, bool], ...]
 
-    def completes(self, found: Findings) -> Findings:
-        """Return the findings at once, with what the analysis says."""
+    def complete(self, findings: Findings) -> Findings:
+        """Return immediate findings with the results of the analysis."""
         lights = tuple(
             replace(light, error=error, held=is_held, unreached=is_unreached)
             for light, (error, is_held, is_unreached) in zip(
-                found.lights or (), self.lights, strict=True
+                findings.lights or (), self.lights, strict=True
             )
         )
         worst = self.worst
         return replace(
-            found,
+            findings,
             lights=lights,
             headline=worst.headline,
             help=worst.help,
@@ -152,10 +153,11 @@ class Judgement:
         )
 
 
-def judgement(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
-    """Return the headline, what holds the lights, and how sure each is and whether it is held.
+def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
+    """Return the headline, the limiting constraints, and how sure each light is and whether it is
+    held.
 
-    painted: the view of each analysis. What is said of the whole is of the view missed most.
+    painted: the view of each analysis. The headline is that of the view missed most.
     """
     solution = analyses[0].solution
     errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
@@ -171,7 +173,7 @@ def judgement(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement
     )
 
 
-def unpainted_headline(*, is_asked: bool, is_white: bool) -> str:
+def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
     """Say what the answer is before anything is painted, and after all of it has been undone.
 
     is_asked: whether something is asked of the lights. is_white: whether all are to be white.
@@ -185,7 +187,7 @@ def unpainted_headline(*, is_asked: bool, is_white: bool) -> str:
     return f"Nothing is painted: {stay}."
 
 
-def sketched(seen: Seen) -> str:
+def sketch_headline(seen: Seen) -> str:
     """Say how far a painting in progress has come, and what would bring it further: no judgement.
 
     A sketch begins with a stroke, of which little can come about before more is said. What it does
@@ -193,55 +195,57 @@ def sketched(seen: Seen) -> str:
     """
     if seen.is_close:
         return headline(seen)
-    said = _how_far(seen)
+    phrase = _progress_phrase(seen)
     if seen.place is None:
-        return f"{said}. Paint what matters most, or give it more importance."
+        return f"{phrase}. Paint what matters most, or give it more importance."
     # One reason at a time: the next one is told when that has been seen to.
     first = replace(seen, reasons=seen.causes[:1])
-    told = f"{said}: {spoken_missing(seen)} is missing; {spoken_reason(first)}."
-    cause = helped(seen)
-    if cause is None or cause.kind not in HELP:
-        return told
-    return f"{told} {HELP[cause.kind]}"
+    text = f"{phrase}: {spoken_missing(seen)} is missing; {spoken_reason(first)}."
+    cause = removable_reason(seen)
+    if cause is None or cause.kind not in ADVICE_TEXTS:
+        return text
+    return f"{text} {ADVICE_TEXTS[cause.kind]}"
 
 
-def _how_far(seen: Seen) -> str:
-    """`About half of the way, 50 %, and changes the annex by ΔE 12`.
+def _progress_phrase(seen: Seen) -> str:
+    """Return `About half of the way, 50 %, and changes the annex by ΔE 12`.
 
-    No praise where the rest has changed by more than the paint has come closer.
+    The phrase praises nothing where the rest has changed by more than the paint has come closer.
     """
     rest = seen.elsewhere if seen.changes_elsewhere else None
     if seen.share_met < 0.005:  # which would be said as 0 %
-        said = WORSE if seen.is_worse else NOT_YET
+        phrase = WORSE_TEXT if seen.is_worse else NO_CLOSER_TEXT
     elif rest is not None and seen.is_at_cost:
         cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
         return f"{spoken_percent(seen.share_met)} of the way, at the cost of {cost}"
     else:
-        far = next(words for least, words in WAYS if seen.share_met >= least)
-        said = f"{far}, {spoken_percent(seen.share_met)}"
-    return said if rest is None else f"{said}, and changes {spoken_changed(rest)}"
+        far = next(words for least, words in PROGRESS_PHRASES if seen.share_met >= least)
+        phrase = f"{far}, {spoken_percent(seen.share_met)}"
+    return phrase if rest is None else f"{phrase}, and changes {spoken_changed(rest)}"
 
 
 def why_not_closer(analysis: Analysis) -> list[str]:
-    """At most four sentences on what keeps the lights from what somebody paints.
+    """Return at most four sentences on what keeps the lights from the paint.
 
-    Where it is missed most, `sketched` says: it stands below the pictures anyway.
+    Where it is missed most stands in `sketch_headline`, below the pictures.
     """
-    seen, found = analysis.seen, analysis.diagnosis
-    if not (parts := parts_of_miss(found)):
+    seen, diagnosis = analysis.seen, analysis.diagnosis
+    if not (parts := parts_of_miss(diagnosis)):
         return [MET]
     problem = analysis.solution.problem
-    words = PARTS | (ASKED if problem.asks or problem.fit.colors != "free" else {})
-    words |= {"unreachable": PARTS["unreachable"] + while_held(seen)}
+    words = MISS_TEXTS | (
+        CONSTRAINED_MISS_TEXTS if problem.asks or problem.fit.colors != "free" else {}
+    )
+    words |= {"unreachable": MISS_TEXTS["unreachable"] + while_held(seen)}
     shares = ", ".join(f"{spoken_percent(share)} {words[part]}" for part, share in parts.items())
-    said = [f"Of what is missed (great misses count most), {shares}."]
-    if seen.place is None and found.place is not None:
-        said.append(spoken_place(found.place))
-    return said + what_holds(found, seen)
+    sentences = [f"Of what is missed (great misses count most), {shares}."]
+    if seen.place is None and diagnosis.place is not None:
+        sentences.append(spoken_place(diagnosis.place))
+    return sentences + what_holds(diagnosis, seen)
 
 
-def helped(seen: Seen) -> Reason | None:
-    """Return the reason that `sketched` names, where a person can take it away."""
+def removable_reason(seen: Seen) -> Reason | None:
+    """Return the reason in `sketch_headline`, where a person can remove it."""
     if seen.is_close or seen.place is None or not seen.causes:
         return None
     first = seen.causes[0]
@@ -250,7 +254,7 @@ def helped(seen: Seen) -> Reason | None:
 
 def advice(seen: Seen) -> Advice | None:
     """Return the same for a page, whose button it is: what to let go of, and what that brings."""
-    if (cause := helped(seen)) is None:
+    if (cause := removable_reason(seen)) is None:
         return None
     kind, names = cause.kind, tuple(cause.names)
     if kind != "hold":
@@ -265,7 +269,7 @@ def _closeness(analysis: Analysis) -> Closeness:
     """Return how close one view is, and why not closer."""
     seen = analysis.seen
     return Closeness(
-        headline=sketched(seen),
+        headline=sketch_headline(seen),
         help=advice(seen),
         delta_e=seen.delta_e,
         delta_e_asked=seen.asked,
@@ -273,21 +277,21 @@ def _closeness(analysis: Analysis) -> Closeness:
     )
 
 
-def foreseen(
+def preview_text(
     closes: float, rest: Elsewhere | None, *, delta_e: tuple[float, float], is_at_cost: bool
 ) -> tuple[str, bool]:
-    """Say what a change would bring, before it is made, and whether it changes more than that.
+    """Say what a change would bring, before it is made, and whether it changes more than it gains.
 
-    closes: share of what is missed that it takes away. rest: what it changes where nobody painted.
-    delta_e: over the paint, now and then. is_at_cost: whether it changes more than it brings.
+    closes: share of the miss that it takes away. rest: its change where nobody painted. delta_e:
+    over the paint, now and then. is_at_cost: whether it changes the rest by more than it gains.
     """
     now, then = map(spoken_amount, delta_e)
     if closes >= 0.005:
-        said = f"Closes {spoken_percent(closes)} of what is missed (ΔE {now} becomes {then})"
+        text = f"Closes {spoken_percent(closes)} of what is missed (ΔE {now} becomes {then})"
     else:
-        said = "Brings the answer no closer"
+        text = "Brings the answer no closer"
     if rest is None or rest.worst < UNSEEN:
-        return f"{said}.", False
-    told = f"{said}, and changes {spoken_changed(rest)}."
+        return f"{text}.", False
+    text = f"{text}, and changes {spoken_changed(rest)}."
     more = " That is more than it brings." if is_at_cost else ""
-    return told + more, is_at_cost
+    return text + more, is_at_cost

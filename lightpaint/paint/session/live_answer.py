@@ -1,4 +1,4 @@
-"""What is asked in a session beside the paint, and the answer that follows both under the hand."""
+"""The requests of a session, and the answer that follows them and the paint under the hand."""
 
 from collections.abc import Sequence
 
@@ -10,109 +10,108 @@ from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.linear_problem import reduced_by
 from lightpaint.lighting.live.live import Live
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.paint.store.light_requests import Wishes
+from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.pipeline.settings import Settings
 
 
-class Answering:
-    """Wishes, and the weights that come closest under them. Updated in place.
+class LiveAnswer:
+    """Requests, and the weights that come closest under them. Updated in place.
 
-    settings, constraints: what was asked before the session began. transform: what is painted
-    through.
+    settings, constraints: those before the session began. transform: the one to paint through.
 
     Attributes:
-        wishes: What is asked now, also by a slider that still moves.
-        kept: What was asked before it moved; None where none moves.
+        requests: In effect now, including those of a slider that still moves.
+        before_slider: Those before the slider moved; None while none moves.
         weights: (n, 3), the last answer.
     """
 
     def __init__(
         self,
         views: Sequence[LiveView],
-        wishes: Wishes,
+        requests: LightRequests,
         *,
         settings: Settings,
         constraints: Constraints,
         transform: ViewTransform,
     ) -> None:
-        self.wishes = wishes
-        self.kept: Wishes | None = None
+        self.requests = requests
+        self.before_slider: LightRequests | None = None
         self.weights = views[0].basis.present_weights
-        self._settings, self._given, self._transform = settings, constraints, transform
-        self.begin(views)
+        self._settings, self._base_constraints, self._transform = settings, constraints, transform
+        self.set_views(views)
 
-    def begin(self, views: Sequence[LiveView]) -> None:
-        """Go on with these views."""
+    def set_views(self, views: Sequence[LiveView]) -> None:
+        """Continue with these views."""
         self._basis = views[0].basis
-        self._live = Live(views, fit=self.fit, constraints=self._constraints(self.wishes))
+        self._live = Live(views, fit=self.fit, constraints=self._constraints(self.requests))
         self._live.prepare()
 
     @property
-    def at_rest(self) -> Wishes:
-        """What is asked but for a slider that still moves."""
-        return self.kept or self.wishes
+    def requests_at_rest(self) -> LightRequests:
+        """The requests without those of a slider that still moves."""
+        return self.before_slider or self.requests
 
     @property
     def mode(self) -> str:
-        """In which space answers are found."""
+        """Space in which answers are found."""
         return self._live.mode
 
     @property
     def fit(self) -> Settings:
-        """What it is to be close, with nothing left open."""
-        return self._fit(self.wishes)
+        """Settings of the fit, with all defaults resolved."""
+        return self._fit(self.requests)
 
-    def settings(self, wishes: Wishes | None = None) -> Settings:
-        """The same of `wishes`, of those there are by default, with all that follows from the
-        painting left open.
+    def settings(self, requests: LightRequests | None = None) -> Settings:
+        """Return the settings of `requests`, by default those in effect, with defaults
+        unresolved.
         """
-        return (wishes or self.wishes).settings(self._settings)
+        return (requests or self.requests).settings(self._settings)
 
-    def constraints(self, wishes: Wishes | None = None) -> Constraints:
-        """What these ask of the lights, beside what their scene asks."""
-        return self._given.and_then((wishes or self.wishes).constraints())
+    def constraints(self, requests: LightRequests | None = None) -> Constraints:
+        """Return the constraints of requests, beside those of the scene."""
+        return self._base_constraints.and_then((requests or self.requests).constraints())
 
     @property
     def basis(self) -> Basis:
-        """Whose lights are asked: those of all views."""
+        """Basis of the first view, whose lights are those of all views."""
         return self._basis
 
-    def check(self, wishes: Wishes) -> None:
+    def check(self, requests: LightRequests) -> None:
         """Raise LightpaintError for what cannot be asked, before anything is changed."""
-        reduced_by(self._constraints(wishes), self._basis.lights, self._fit(wishes))
+        reduced_by(self._constraints(requests), self._basis.lights, self._fit(requests))
 
-    def ask(self, wishes: Wishes) -> None:
-        """This from now on; a slider that moved has come to rest."""
-        self._ask(wishes)
-        self.kept = None
+    def set_requests(self, requests: LightRequests) -> None:
+        """Set the requests; a moving slider has come to rest."""
+        self._apply(requests)
+        self.before_slider = None
 
-    def _ask(self, wishes: Wishes) -> None:
-        self.wishes = wishes
-        self._live.asks(self.fit, self._constraints(wishes))
+    def _apply(self, requests: LightRequests) -> None:
+        self.requests = requests
+        self._live.asks(self.fit, self._constraints(requests))
 
-    def move(self, wishes: Wishes) -> None:
-        """This, as long as a slider moves. Raises LightpaintError, and changes nothing then."""
-        self.check(wishes)
-        self.kept = self.at_rest
-        self._ask(wishes)
+    def move_slider(self, requests: LightRequests) -> None:
+        """Set requests while a slider moves. Raises LightpaintError, and changes nothing then."""
+        self.check(requests)
+        self.before_slider = self.requests_at_rest
+        self._apply(requests)
 
-    def move_back(self) -> bool:
-        """Whether there was a slider that somebody has left; what was asked before is asked."""
-        if self.kept is None:
+    def reset_slider(self) -> bool:
+        """Restore the requests before an abandoned slider moved; return whether there was one."""
+        if self.before_slider is None:
             return False
-        self.ask(self.kept)
+        self.set_requests(self.before_slider)
         return True
 
     def solve(self) -> None:
-        """The weights, as the paint is now."""
+        """Solve for the weights, with the paint as it is."""
         self.weights = self._live.answer(self.weights)
 
-    def _fit(self, wishes: Wishes) -> Settings:
-        settings = wishes.settings(self._settings)
+    def _fit(self, requests: LightRequests) -> Settings:
+        settings = requests.settings(self._settings)
         return resolve_fit(
             settings, over_look=True, through_view=True, display=lambda: self._transform
         )
 
-    def _constraints(self, wishes: Wishes) -> Constraints:
-        asked = constraints_of(self._basis.requests).and_then(self._given)
-        return asked.and_then(wishes.constraints())
+    def _constraints(self, requests: LightRequests) -> Constraints:
+        asked = constraints_of(self._basis.requests).and_then(self._base_constraints)
+        return asked.and_then(requests.constraints())

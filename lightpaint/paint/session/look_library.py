@@ -1,4 +1,4 @@
-"""Looks of a session: a painting and its answer, kept under a name."""
+"""Looks of a session: paintings and answers, kept by name."""
 
 import math
 import time
@@ -23,41 +23,41 @@ from lightpaint.paint.protocol import (
     RenameLook,
     SaveLook,
 )
-from lightpaint.paint.session.picture_table import Pictures, small_picture
+from lightpaint.paint.session.picture_table import PictureTable, display_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.light_requests import Wishes
-from lightpaint.paint.store.steps import KeptLook, of_view
+from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.steps import StoredLook, name_in_view
 from lightpaint.screen import some_names
 
-#: Characters of a name, at most.
-LONGEST = 80
+#: Characters of a look's name, at most.
+MAX_NAME_LENGTH = 80
 
 #: Proposals of observers among the looks, at most: each keeps a painting of all views.
-MOST_PROPOSALS = 16
+MAX_PROPOSALS = 16
 
-#: What says where brighter is as good.
-MARKS = "at_least"
+#: Name of the array of "at least" marks.
+MARKS_ARRAY = "at_least"
 
-OfLooks = SaveLook | RenameLook | CopyLook | MixLooks | DropLook | Propose
+LookRequest = SaveLook | RenameLook | CopyLook | MixLooks | DropLook | Propose
 
 
-class Looks:
+class LookLibrary:
     """The looks of a session, in its store, and their thumbnails among its pictures."""
 
-    def __init__(self, session: Session, pictures: Pictures) -> None:
+    def __init__(self, session: Session, pictures: PictureTable) -> None:
         self._session, self._pictures = session, pictures
         try:
-            self.listed()
+            self.infos()
         except (LightpaintError, LookupError, TypeError, ValueError):
-            if not session.store.is_kept:
+            if not session.store.has_file:
                 raise
-            session.store.mend()
+            session.store.recover()
         for look in session.store.looks():
-            self._offer(look)
+            self._offer_thumbnails(look)
 
-    def listed(self) -> tuple[LookInfo, ...]:
-        """Return what clients are told of each."""
+    def infos(self) -> tuple[LookInfo, ...]:
+        """Return what clients show of each look."""
         return tuple(
             LookInfo(
                 id=look.id,
@@ -70,84 +70,90 @@ class Looks:
             for look in self._session.store.looks()
         )
 
-    def said(self, message: OfLooks) -> Message:
-        """What has come of a message. Raises PaintError for a look that there is none of."""
+    def handle(self, message: LookRequest) -> Message:
+        """Handle a request about looks. Raises PaintError for a look that does not exist."""
         store = self._session.store
         match message:
             case SaveLook(name):
-                self._put(self._now(self._named(name)))
+                self._store(self._current_look(self._clean_name(name)))
             case RenameLook(number, name):
-                look = self._look(number)
-                fields = {**look.fields, "name": self._named(name), "is_proposal": False}
-                self._put(KeptLook(look.id, fields, look.arrays))
+                look = self._find(number)
+                fields = {**look.fields, "name": self._clean_name(name), "is_proposal": False}
+                self._store(StoredLook(look.id, fields, look.arrays))
             case CopyLook(number):
-                look = self._look(number)
-                fields = {**look.fields, "name": f"{look.fields['name']} copy"[:LONGEST]}
+                look = self._find(number)
+                fields = {**look.fields, "name": f"{look.fields['name']} copy"[:MAX_NAME_LENGTH]}
                 fields["is_proposal"] = False
-                self._put(KeptLook(self._free(), fields, look.arrays))
+                self._store(StoredLook(self._next_id(), fields, look.arrays))
             case MixLooks():
-                self._put(self._between(message))
+                self._store(self._mixed_look(message))
             case Propose():
-                self._put(self._proposal(message))
+                self._store(self._proposed_look(message))
             case DropLook(number):
-                store.drop_look(self._look(number).id)
+                store.drop_look(self._find(number).id)
                 for k in range(len(self._session.views)):
-                    self._pictures.withdraw(of_view(f"look/{number}", k))
-        return LookList(looks=self.listed(), resources=self._pictures.named())
+                    self._pictures.withdraw(name_in_view(f"look/{number}", k))
+        return LookList(looks=self.infos(), resources=self._pictures.stable_generations())
 
     def load(self, message: LoadLook) -> list[Message]:
-        """Go on from a look."""
-        look = self._look(message.look)
+        """Continue from a look."""
+        look = self._find(message.look)
         paintings = dict(enumerate(self._paintings(look)))
-        wishes = Wishes.of(look.fields["wishes"])
+        requests = LightRequests.of(look.fields["wishes"])
         weights = np.asarray(look.arrays["weights"], np.float64)
-        return self._session.load(paintings, wishes, f"look {look.fields['name']}", weights)
+        return self._session.load(paintings, requests, f"look {look.fields['name']}", weights)
 
-    def _paintings(self, look: KeptLook) -> list[Pixels]:
-        """What is painted in each view; of one that came later as before it was painted."""
-        arrays, found = look.arrays, []
+    def _paintings(self, look: StoredLook) -> list[Pixels]:
+        """Return the paintings of all views; a view that was added later is unpainted."""
+        arrays, paintings = look.arrays, []
         names = set(arrays)
         for k, view in enumerate(self._session.views):
-            if of_view("image", k) in names:
-                image, importance = (arrays[of_view(x, k)] for x in ("image", "importance"))
-                marks = arrays[name] > 0 if (name := of_view(MARKS, k)) in names else None
-                found.append(Pixels(image, importance, marks))
+            if name_in_view("image", k) in names:
+                image, importance = (arrays[name_in_view(x, k)] for x in ("image", "importance"))
+                marks = (
+                    arrays[name] > 0 if (name := name_in_view(MARKS_ARRAY, k)) in names else None
+                )
+                paintings.append(Pixels(image, importance, marks))
             else:
-                found.append(Pixels.unpainted(view.present))
-        return found
+                paintings.append(Pixels.unpainted(view.present))
+        return paintings
 
-    def _now(self, name: str) -> KeptLook:
+    def _current_look(self, name: str) -> StoredLook:
         session = self._session
-        paintings = [view.pixels(view.whole) for view in session.views]
-        return self._made(name, paintings, session.wishes, session.weights.copy())
+        paintings = [view.pixels(view.full_region) for view in session.views]
+        return self._make_look(name, paintings, session.requests, session.weights.copy())
 
-    def _between(self, message: MixLooks) -> KeptLook:
-        """Both paintings, each as far as it counts, and the lights held between the answers."""
-        part, name = message.part, self._named(message.name)
+    def _mixed_look(self, message: MixLooks) -> StoredLook:
+        """Return a mix of two looks: both paintings, weighted, and the lights locked between the
+        answers.
+        """
+        part, name = message.part, self._clean_name(message.name)
         if not 0 <= part <= 1:
             raise PaintError(f"part is {part:g}: expected 0 for the first look to 1 for the second")
-        looks = [self._look(k) for k in (message.first, message.second)]
+        looks = [self._find(k) for k in (message.first, message.second)]
         shares = 1 - part, part
         weights = sum(
             s * np.asarray(x.arrays["weights"]) for s, x in zip(shares, looks, strict=True)
         )
         both = zip(*(self._paintings(look) for look in looks), strict=True)
-        paintings = [_mixed(pair, shares) for pair in both]
-        return self._made(name, paintings, self._held(np.asarray(weights)), np.asarray(weights))
+        paintings = [_mix_pixels(pair, shares) for pair in both]
+        return self._make_look(
+            name, paintings, self._lock_all(np.asarray(weights)), np.asarray(weights)
+        )
 
-    def _held(self, weights: npt.NDArray[Any]) -> Wishes:
-        """Return wishes that hold every light at a lighting, (n, 3)."""
+    def _lock_all(self, weights: npt.NDArray[Any]) -> LightRequests:
+        """Return requests that lock every light at a lighting, (n, 3)."""
         lights = self._session.basis.lights
-        held = {
+        locks = {
             light.name: {"lock": float(w[0]) if light.is_scalar else w.tolist()}
             for light, w in zip(lights, weights, strict=True)
             if not light.is_fixed
         }
-        return Wishes(held)
+        return LightRequests(locks)
 
-    def _proposal(self, message: Propose) -> KeptLook:
-        """Return the painting as it is with a lighting that somebody proposes."""
-        name, session = self._named(message.name), self._session
+    def _proposed_look(self, message: Propose) -> StoredLook:
+        """Return the painting as it is with a proposed lighting."""
+        name, session = self._clean_name(message.name), self._session
         weights, lights = session.weights.copy(), session.basis.lights
         names = list(session.basis.names)
         for light, emission in message.lights.items():
@@ -163,68 +169,76 @@ class Looks:
             if its.is_scalar and len(set(emission)) > 1:
                 raise PaintError(f"{light} has one number for all channels: give it three times")
             weights[names.index(light)] = emission
-        kept = [look for look in session.store.looks() if look.fields.get("is_proposal")]
-        same = [look for look in kept if look.fields["name"] == name]
-        if not same and len(kept) >= MOST_PROPOSALS:
-            raise PaintError(f"{len(kept)} proposals are there already: let who paints drop some")
-        paintings = [view.pixels(view.whole) for view in session.views]
-        made = self._made(name, paintings, self._held(weights), weights)
-        number = same[0].id if same else made.id
-        return KeptLook(number, {**made.fields, "is_proposal": True}, made.arrays)
+        proposals = [look for look in session.store.looks() if look.fields.get("is_proposal")]
+        same = [look for look in proposals if look.fields["name"] == name]
+        if not same and len(proposals) >= MAX_PROPOSALS:
+            raise PaintError(
+                f"{len(proposals)} proposals are there already: let who paints drop some"
+            )
+        paintings = [view.pixels(view.full_region) for view in session.views]
+        look_ = self._make_look(name, paintings, self._lock_all(weights), weights)
+        number = same[0].id if same else look_.id
+        return StoredLook(number, {**look_.fields, "is_proposal": True}, look_.arrays)
 
-    def _made(
-        self, name: str, paintings: Sequence[Pixels], wishes: Wishes, weights: npt.NDArray[Any]
-    ) -> KeptLook:
-        fields = {"name": name, "stamp": time.time(), "wishes": wishes.as_json()}
+    def _make_look(
+        self,
+        name: str,
+        paintings: Sequence[Pixels],
+        requests: LightRequests,
+        weights: npt.NDArray[Any],
+    ) -> StoredLook:
+        fields = {"name": name, "stamp": time.time(), "wishes": requests.as_json()}
         arrays: dict[str, npt.NDArray[Any]] = {"weights": weights}
         for view, (image, importance, marks) in zip(self._session.views, paintings, strict=True):
             its: dict[str, npt.NDArray[Any]] = {
                 "image": np.asarray(image, np.float32),
                 "importance": np.asarray(importance, np.float32),
-                "thumbnail": small_picture(view.basis.mix(weights), self._session.transform),
+                "thumbnail": display_thumbnail(view.basis.mix(weights), self._session.transform),
             }
             if marks is not None:
-                its[MARKS] = marks.view(np.uint8)
-            arrays |= {of_view(key, view.view): value for key, value in its.items()}
-        return KeptLook(self._free(), fields, arrays)
+                its[MARKS_ARRAY] = marks.view(np.uint8)
+            arrays |= {name_in_view(key, view.view): value for key, value in its.items()}
+        return StoredLook(self._next_id(), fields, arrays)
 
-    def _put(self, look: KeptLook) -> None:
+    def _store(self, look: StoredLook) -> None:
         self._session.store.put_look(look)
-        self._offer(look)
+        self._offer_thumbnails(look)
 
-    def _offer(self, look: KeptLook) -> None:
+    def _offer_thumbnails(self, look: StoredLook) -> None:
         views = len(self._session.views)
         for k in range(views):
             make = partial(self._thumbnail, look, k)
-            self._pictures.offer(of_view(f"look/{look.id}", k), make)
+            self._pictures.offer(name_in_view(f"look/{look.id}", k), make)
 
-    def _thumbnail(self, look: KeptLook, k: int) -> npt.NDArray[Any]:
-        """Return the small picture of a view: as kept, or made anew of the look's lights."""
+    def _thumbnail(self, look: StoredLook, k: int) -> npt.NDArray[Any]:
+        """Return the thumbnail of a view: the stored one, or a new one from the look's lights."""
         try:
-            return look.arrays[of_view("thumbnail", k)]
+            return look.arrays[name_in_view("thumbnail", k)]
         except (LightpaintError, LookupError):
             weights = np.asarray(look.arrays["weights"])
-            return small_picture(self._session.views[k].basis.mix(weights), self._session.transform)
+            return display_thumbnail(
+                self._session.views[k].basis.mix(weights), self._session.transform
+            )
 
-    def _free(self) -> int:
+    def _next_id(self) -> int:
         return 1 + max((look.id for look in self._session.store.looks()), default=0)
 
-    def _look(self, number: int) -> KeptLook:
+    def _find(self, number: int) -> StoredLook:
         for look in self._session.store.looks():
             if look.id == number:
                 return look
         raise PaintError(f"there is no look {number}")
 
     @staticmethod
-    def _named(name: str) -> str:
-        shown = " ".join(name.split())[:LONGEST]
-        if not shown:
+    def _clean_name(name: str) -> str:
+        cleaned = " ".join(name.split())[:MAX_NAME_LENGTH]
+        if not cleaned:
             raise PaintError("a look needs a name")
-        return shown
+        return cleaned
 
 
-def _mixed(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pixels:
-    """Two paintings of a view, each as far as it counts."""
+def _mix_pixels(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pixels:
+    """Mix two paintings of a view, each weighted by its share and its importance."""
     counts = [share * its.importance for share, its in zip(shares, pair, strict=True)]
     total = counts[0] + counts[1]
     whole = np.where(total > 0, total, 1)[..., None]

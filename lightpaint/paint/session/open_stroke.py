@@ -1,4 +1,4 @@
-"""The stroke that is not done yet: where it is, and what there was before it."""
+"""The open stroke: its region, and the pixels before it."""
 
 from collections.abc import Iterator
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 
-#: Side of the squares that are kept from the first time that a stroke touches them.
-SIDE = 64
+#: Side, in pixels, of the squares that are saved when a stroke first touches them.
+SQUARE_SIDE = 64
 
 
 class OpenStroke:
-    """What a stroke has painted over, once, however often it goes over it. Updated in place.
+    """The pixels under a stroke, saved once however often it passes. Updated in place.
 
     Attributes:
-        region: The smallest that holds all of it.
+        region: The smallest that holds the whole stroke.
     """
 
     def __init__(self) -> None:
@@ -22,28 +22,31 @@ class OpenStroke:
         self._before: dict[Region, Pixels] = {}
 
     def __bool__(self) -> bool:
-        """Whether it has touched anything."""
+        """Return whether the stroke has touched anything."""
         return bool(self._before)
 
-    def touches(self, region: Region, painting: Pixels) -> None:
-        """`painting` is about to change there."""
+    def touch(self, region: Region, painting: Pixels) -> None:
+        """Save the pixels of a region of `painting`, which is about to change there."""
         if _is_empty(region):
             return
         for square in _squares(region, painting.importance.shape):
             if square not in self._before:
                 self._before[square] = painting.part(square).copy()
-        self.region = _around(self.region, region)
+        self.region = _union(self.region, region)
 
-    def before(self, painting: Pixels) -> Pixels:
-        """What there was in `region`, now that `painting` is there; arrays of their own."""
+    def pixels_before(self, painting: Pixels) -> Pixels:
+        """Return copies of the pixels in `region` before the stroke. painting: as it is now."""
         image, importance, at_least = painting.part(self.region).copy()
         if painting.at_least is not None and at_least is None:
             at_least = np.zeros(image.shape, bool)
         for square, pixels in self._before.items():
-            shared = _shared(square, self.region)
+            shared = _intersection(square, self.region)
             if _is_empty(shared):
                 continue
-            to, kept = slices(_moved(shared, self.region)), pixels.part(_moved(shared, square))
+            to, kept = (
+                slices(_relative_to(shared, self.region)),
+                pixels.part(_relative_to(shared, square)),
+            )
             image[to], importance[to] = kept.image, kept.importance
             if at_least is not None:
                 at_least[to] = False if kept.at_least is None else kept.at_least
@@ -52,11 +55,11 @@ class OpenStroke:
 
 
 def _squares(region: Region, size: tuple[int, ...]) -> Iterator[Region]:
-    """Those of a fixed grid that a region touches, within the picture."""
+    """Yield the squares of a fixed grid that a region touches, within the picture."""
     top, bottom, left, right = region
-    for y in range(top - top % SIDE, bottom, SIDE):
-        for x in range(left - left % SIDE, right, SIDE):
-            yield y, min(y + SIDE, size[0]), x, min(x + SIDE, size[1])
+    for y in range(top - top % SQUARE_SIDE, bottom, SQUARE_SIDE):
+        for x in range(left - left % SQUARE_SIDE, right, SQUARE_SIDE):
+            yield y, min(y + SQUARE_SIDE, size[0]), x, min(x + SQUARE_SIDE, size[1])
 
 
 def _is_empty(region: Region) -> bool:
@@ -64,20 +67,20 @@ def _is_empty(region: Region) -> bool:
     return top >= bottom or left >= right
 
 
-def _around(one: Region, other: Region) -> Region:
-    """The smallest region that holds both, of which the first may be empty."""
+def _union(one: Region, other: Region) -> Region:
+    """Return the smallest region that holds both, of which the first may be empty."""
     if _is_empty(one):
         return other
     (a, b, c, d), (e, f, g, h) = one, other
     return min(a, e), max(b, f), min(c, g), max(d, h)
 
 
-def _shared(one: Region, other: Region) -> Region:
+def _intersection(one: Region, other: Region) -> Region:
     (a, b, c, d), (e, f, g, h) = one, other
     return max(a, e), min(b, f), max(c, g), min(d, h)
 
 
-def _moved(region: Region, origin: Region) -> Region:
-    """As seen from the corner of another."""
+def _relative_to(region: Region, origin: Region) -> Region:
+    """Return a region in coordinates that begin at the corner of another."""
     top, bottom, left, right = region
     return top - origin[0], bottom - origin[0], left - origin[2], right - origin[2]

@@ -1,4 +1,4 @@
-"""The pictures that a page fetches: planes of the lights, and what helps to see and to paint."""
+"""The pictures that a page fetches: planes of the lights, previews, and aids for painting."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,10 +13,10 @@ from lightpaint.errors import PaintError
 from lightpaint.report.page.figures import resized, thumbnail
 
 #: Pixels of a thumbnail's longer side, about.
-THUMBNAIL = 192
+THUMBNAIL_SIDE = 192
 
 #: Points along each side of a lookup table, and the light, in stops, that its ends stand for.
-SIDE, LOW, HIGH = 64, -13.0, 7.0
+LUT_SIDE, LUT_LOW, LUT_HIGH = 64, -13.0, 7.0
 
 #: Built-in transforms that a page may show through.
 TRANSFORMS = ("srgb", "filmic", "agx", "linear")
@@ -24,8 +24,8 @@ TRANSFORMS = ("srgb", "filmic", "agx", "linear")
 Picture = npt.NDArray[Any]
 
 
-class Pictures:
-    """Pictures by name, each with the number of its generation; made when they are first asked for.
+class PictureTable:
+    """Pictures by name, each with a generation number, made when they are first fetched.
 
     Updated in place. Names are those of the protocol: `plane/3`, `lut/agx`, `painting`, and of a
     view that is not the first `painting@1`.
@@ -38,63 +38,64 @@ class Pictures:
         self._makers: dict[str, Callable[[], Picture]] = {}
 
     def offer(self, name: str, make: Callable[[], Picture]) -> None:
-        """From now on there is this picture; what it was before is gone."""
+        """Add a picture that `make` makes, replacing an earlier one of that name."""
         self.generations[name] = self._counts[name] = self._counts.get(name, 0) + 1
         self._makers[name] = make
         self._made.pop(name, None)
 
     def put(self, name: str, picture: Picture) -> None:
-        """The same, of one that is made already."""
+        """Add a picture that is already made."""
         self.offer(name, lambda: picture)
 
     def withdraw(self, name: str) -> None:
-        """There is none from now on."""
+        """Remove a picture."""
         self.generations.pop(name, None)
         self._makers.pop(name, None)
         self._made.pop(name, None)
 
     def __getitem__(self, name: str) -> Picture:
-        """The picture of that name. Raises PaintError if there is none."""
+        """Return a picture by name. Raises PaintError if there is none."""
         make = self._makers.get(name)
         if make is None:
             raise PaintError(f"there is no picture {name[:40]!r}")
-        if is_changing(name):
+        if changes_under_brush(name):
             return make()
         if name not in self._made:
             self._made[name] = make()
         return self._made[name]
 
-    def named(self) -> dict[str, int]:
-        """Generation of each, by name; of what changes under the brush there are none."""
-        return {name: k for name, k in self.generations.items() if not is_changing(name)}
+    def stable_generations(self) -> dict[str, int]:
+        """Return the generations by name, without pictures that change under the brush."""
+        return {name: k for name, k in self.generations.items() if not changes_under_brush(name)}
 
 
-def is_changing(name: str) -> bool:
-    """Whether it is a picture that changes under the brush."""
+def changes_under_brush(name: str) -> bool:
+    """Return whether a picture changes under the brush."""
     return name.partition("@")[0] in ("painting", "importance")
 
 
-def small(basis: Basis, k: int) -> Picture:
-    """A thumbnail of what light k does, as a display shows it."""
+def light_thumbnail(basis: Basis, k: int) -> Picture:
+    """Return a thumbnail of light k alone, in display values."""
     picture, _ = thumbnail(basis.planes.plane(k), basis.emitters_seen)
     return np.round(picture * 255).astype(np.uint8)
 
 
-def small_picture(light: Floats, transform: ViewTransform) -> Picture:
-    """A thumbnail of a picture (h, w, 3), as a display shows it."""
-    factor = min(1, THUMBNAIL / max(light.shape[:2]))
+def display_thumbnail(light: Floats, transform: ViewTransform) -> Picture:
+    """Return a thumbnail of a linear picture (h, w, 3), in display values."""
+    factor = min(1, THUMBNAIL_SIDE / max(light.shape[:2]))
     shown = transform.encode(resized(light, factor) if factor < 1 else light)
     return np.round(shown * 255).astype(np.uint8)
 
 
-def table_of(transform: ViewTransform) -> Picture:
-    """(SIDE, SIDE, SIDE, 3), display values over the logarithm of light, from LOW to HIGH stops.
+def lookup_table(transform: ViewTransform) -> Picture:
+    """Return display values over the logarithm of light, (LUT_SIDE, LUT_SIDE, LUT_SIDE, 3).
 
-    The first point of each axis is black, the next stands for LOW + (HIGH - LOW) / (SIDE - 1).
+    The first point of each axis is black; the others span LUT_LOW to LUT_HIGH stops, whose step is
+    (LUT_HIGH - LUT_LOW) / (LUT_SIDE - 1).
     """
-    axis = 2.0 ** np.linspace(LOW, HIGH, SIDE)
+    axis = 2.0 ** np.linspace(LUT_LOW, LUT_HIGH, LUT_SIDE)
     axis[0] = 0.0
     r, g, b = np.meshgrid(axis, axis, axis, indexing="ij")
     light = np.stack([r, g, b], axis=-1).reshape(1, -1, 3)
-    shown = transform.encode(light).reshape(SIDE, SIDE, SIDE, 3)
+    shown = transform.encode(light).reshape(LUT_SIDE, LUT_SIDE, LUT_SIDE, 3)
     return np.asarray(shown, np.float16)

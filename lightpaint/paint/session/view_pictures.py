@@ -1,4 +1,4 @@
-"""The pictures of a session's views that pages fetch, and what they are told of them."""
+"""The pictures of a session's views for its pages, and their descriptions."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -10,41 +10,43 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.paint.protocol import ViewInfo
-from lightpaint.paint.session import picture_table as pictures
+from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.canvas import Canvas
-from lightpaint.paint.session.picture_table import Picture, Pictures
-from lightpaint.paint.store.steps import of_view
+from lightpaint.paint.session.picture_table import Picture, PictureTable
+from lightpaint.paint.store.steps import name_in_view
 
 
-def offer_transforms(shelf: Pictures, transforms: Sequence[ViewTransform]) -> None:
-    """Tables of these from now on."""
+def offer_transforms(table: PictureTable, transforms: Sequence[ViewTransform]) -> None:
+    """Offer the lookup tables of these transforms."""
     for transform in transforms:
-        shelf.offer(f"lut/{transform.name}", partial(pictures.table_of, transform))
+        table.offer(f"lut/{transform.name}", partial(picture_table.lookup_table, transform))
 
 
 def offer_view(
-    shelf: Pictures, view: Canvas, transform: ViewTransform, clean: CleanPlanes | None
+    table: PictureTable, view: Canvas, transform: ViewTransform, clean: CleanPlanes | None
 ) -> None:
-    """Pictures of a view from now on; clean planes, unless they are there, are rough at first."""
+    """Offer the pictures of a view; rough planes stand in for denoised ones that are not
+    made yet.
+    """
     basis = view.basis
 
     def offer(name: str, make: Any) -> None:
-        shelf.offer(of_view(name, view.view), make)
+        table.offer(name_in_view(name, view.view), make)
 
     rough = RoughPlanes(basis, view.present)
     is_lit = bool(view.present.any())
     for k in range(len(basis.lights)):
         offer(f"plane/{k}", partial(_plane, basis, k))
-        offer(f"thumb/{k}", partial(pictures.small, basis, k))
-        name = of_view(f"clean/{k}", view.view)
+        offer(f"thumb/{k}", partial(picture_table.light_thumbnail, basis, k))
+        name = name_in_view(f"clean/{k}", view.view)
         if clean is not None:
-            shelf.put(name, clean.halves[k])
+            table.put(name, clean.halves[k])
         elif is_lit:
-            shelf.offer(name, partial(_rough, rough, k))
+            table.offer(name, partial(_rough_plane, rough, k))
         else:
-            shelf.withdraw(name)
+            table.withdraw(name)
     offer("present", lambda: as_halves(view.present))
-    offer("look", lambda: pictures.small_picture(view.present, transform))
+    offer("look", lambda: picture_table.display_thumbnail(view.present, transform))
     offer("painting", lambda: view.image.copy())
     offer("importance", lambda: view.importance.copy())
     if basis.features is not None:
@@ -60,12 +62,12 @@ def _plane(basis: Basis, k: int) -> Picture:
     return as_halves(plane, scale_of(plane))
 
 
-def _rough(planes: RoughPlanes, k: int) -> Picture:
+def _rough_plane(planes: RoughPlanes, k: int) -> Picture:
     return as_halves(planes.plane(k), scale_of(planes.basis.planes.plane(k)))
 
 
 def view_info(view: Canvas) -> ViewInfo:
-    """Return what clients are told of a view."""
+    """Return the description of a view for clients."""
     objects, (height, width) = view.basis.objects, view.size
     return ViewInfo(
         name=view.name,

@@ -1,4 +1,4 @@
-"""Pixels of a painting, as they go between canvas, steps, looks and files."""
+"""Pixels of a painting, as canvas, steps, looks and files exchange them."""
 
 from typing import NamedTuple
 
@@ -12,10 +12,10 @@ Region = tuple[int, int, int, int]
 
 
 class Pixels(NamedTuple):
-    """What is painted at one place.
+    """Paint in a region.
 
-    image: (rows, columns, 3) float32, linear. importance: (rows, columns) float32. at_least:
-    (rows, columns, 3), where brighter is as good, as of `Target`; None for nowhere.
+    image: (rows, columns, 3) float32, linear. importance: (rows, columns) float32. at_least: (rows,
+    columns, 3), where brighter is as good, as of `Target`; None for nowhere.
     """
 
     image: npt.NDArray[np.float32]
@@ -24,37 +24,37 @@ class Pixels(NamedTuple):
 
     @classmethod
     def unpainted(cls, image: Floats) -> "Pixels":
-        """This light, of which nothing is painted."""
+        """Return this light with nothing painted on it."""
         return cls(np.asarray(image, np.float32), np.zeros(image.shape[:2], np.float32))
 
     def part(self, region: Region) -> "Pixels":
-        """Those of a region, in the same arrays."""
+        """Return the pixels of a region, as views of the same arrays."""
         here = slices(region)
         at_least = None if self.at_least is None else self.at_least[here]
         return Pixels(self.image[here], self.importance[here], at_least)
 
     def copy(self) -> "Pixels":
-        """The same, in arrays of their own; `at_least` is None where it is so nowhere."""
+        """Return a copy; `at_least` is None where no mark is set."""
         at_least = self.at_least
         if at_least is not None:
             at_least = at_least.copy() if at_least.any() else None
         return Pixels(self.image.copy(), self.importance.copy(), at_least)
 
-    def same(self, other: "Pixels") -> bool:
-        """Whether these are the others, to the last bit."""
+    def equals(self, other: "Pixels") -> bool:
+        """Return whether both are equal, to the last bit."""
         if not all(np.array_equal(a, b) for a, b in zip(self[:2], other[:2], strict=True)):
             return False
-        return same_marks(self.at_least, other.at_least)
+        return equal_marks(self.at_least, other.at_least)
 
 
-def same_marks(one: Bools | None, other: Bools | None) -> bool:
-    """Whether brighter is as good at the same places of two paintings; None for nowhere."""
+def equal_marks(one: Bools | None, other: Bools | None) -> bool:
+    """Return whether two paintings have the same "at least" marks; None for none."""
     if one is None or other is None:
         return not any(marks is not None and marks.any() for marks in (one, other))
     return np.array_equal(one, other)
 
 
 def slices(region: Region) -> tuple[slice, slice]:
-    """Rows and columns, to index an array with."""
+    """Return row and column slices, to index an array with."""
     top, bottom, left, right = region
     return slice(top, bottom), slice(left, right)

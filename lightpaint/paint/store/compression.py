@@ -15,19 +15,19 @@ from lightpaint.errors import PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.steps import Patch
 
-#: Of zlib: quick, which is what counts under the hand.
-LEVEL = 1
+#: Fast, which is what counts under the hand.
+ZLIB_LEVEL = 1
 
 
-def packed(array: npt.NDArray[np.generic]) -> bytes:
-    """The values of `array`, little endian; shape and type are kept elsewhere."""
+def pack(array: npt.NDArray[np.generic]) -> bytes:
+    """Return the values of `array` as compressed bytes, without shape and type."""
     plain = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
     rows = plain.reshape(-1).view(np.uint8).reshape(-1, plain.itemsize)
-    return zlib.compress(np.ascontiguousarray(rows.T).data, LEVEL)
+    return zlib.compress(np.ascontiguousarray(rows.T).data, ZLIB_LEVEL)
 
 
-def unpacked(data: bytes, dtype: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
-    """What `packed` made bytes of. Raises PaintError for bytes of anything else.
+def unpack(data: bytes, dtype: str, shape: tuple[int, ...]) -> npt.NDArray[np.generic]:
+    """Return the array that `pack` compressed. Raises PaintError for bytes of anything else.
 
     No more is unpacked than such an array has.
     """
@@ -45,34 +45,36 @@ def unpacked(data: bytes, dtype: str, shape: tuple[int, ...]) -> npt.NDArray[np.
 
 
 def is_marked(patch: Patch) -> bool:
-    """Whether brighter is as good somewhere in a patch, before or after: its bytes say where."""
+    """Return whether a patch has "at least" marks, before or after: its bytes then hold them."""
     return patch.before.at_least is not None or patch.after.at_least is not None
 
 
-def packed_patches(patches: Sequence[Patch]) -> tuple[bytes, bytes]:
-    """Pixels before a step, and how those after it differ: not at all where it left them."""
+def pack_patches(patches: Sequence[Patch]) -> tuple[bytes, bytes]:
+    """Return the pixels before a step, and their XOR with those after it: zero where it
+    left them.
+    """
     places = [(patch.region, is_marked(patch)) for patch in patches]
     before, after = (
-        np.concatenate([_bits(one, *place) for one, place in zip(pixels, places, strict=True)])
+        np.concatenate([_to_bits(one, *place) for one, place in zip(pixels, places, strict=True)])
         for pixels in ([x.before for x in patches], [x.after for x in patches])
     )
-    return packed(before), packed(before ^ after)
+    return pack(before), pack(before ^ after)
 
 
-def unpacked_patch(
+def unpack_patch(
     places: Sequence[tuple[Region, bool]], k: int, before: bytes, change: bytes
 ) -> tuple[Pixels, Pixels]:
-    """Pixels before and after of patch k, to the last bit.
+    """Return the pixels before and after of patch k, to the last bit.
 
     places: region of each patch of the step, and whether it is marked. Raises PaintError for a
     damaged file.
     """
-    ends = np.cumsum([0, *(_values(*place) for place in places)]).tolist()
+    ends = np.cumsum([0, *(_value_count(*place) for place in places)]).tolist()
     was, is_other = (
-        np.asarray(unpacked(x, "uint32", (ends[-1],)))[ends[k] : ends[k + 1]]
+        np.asarray(unpack(x, "uint32", (ends[-1],)))[ends[k] : ends[k + 1]]
         for x in (before, change)
     )
-    return _pixels(was, *places[k]), _pixels(was ^ is_other, *places[k])
+    return _from_bits(was, *places[k]), _from_bits(was ^ is_other, *places[k])
 
 
 def _size(region: Region) -> tuple[int, int]:
@@ -80,13 +82,13 @@ def _size(region: Region) -> tuple[int, int]:
     return bottom - top, right - left
 
 
-def _values(region: Region, marked: bool) -> int:
-    """How many numbers a region has: light, importance, and 32 marks in each."""
+def _value_count(region: Region, marked: bool) -> int:
+    """Return how many numbers a region has: light, importance, and 32 marks in each."""
     pixels = math.prod(_size(region))
     return 4 * pixels + marked * -(-3 * pixels // 32)
 
 
-def _bits(pixels: Pixels, region: Region, marked: bool) -> npt.NDArray[np.uint32]:
+def _to_bits(pixels: Pixels, region: Region, marked: bool) -> npt.NDArray[np.uint32]:
     image, importance, at_least = pixels
     size = _size(region)
     marks = at_least if at_least is not None else np.zeros((*size, 3), bool)
@@ -101,7 +103,7 @@ def _bits(pixels: Pixels, region: Region, marked: bool) -> npt.NDArray[np.uint32
     return np.concatenate(flat)
 
 
-def _pixels(bits: npt.NDArray[np.generic], region: Region, marked: bool) -> Pixels:
+def _from_bits(bits: npt.NDArray[np.generic], region: Region, marked: bool) -> Pixels:
     size = _size(region)
     light, end = 3 * math.prod(size), 4 * math.prod(size)
     values = np.ascontiguousarray(bits).view(np.float32)

@@ -14,17 +14,17 @@ from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line, flush
-from lightpaint.paint.store.steps import Identity, SeenFrom
+from lightpaint.paint.store.steps import Identity, ViewIdentity
 from lightpaint.screen import some_names
 from lightpaint.storage.json_records import read_record, strict_json
 
-#: "lpnt", by which files know what they are, and which tables there are.
+#: "lpnt", which marks a file as a session, and the version of its tables.
 APPLICATION, VERSION = 0x6C706E74, 2
 
-#: Pages (of 16 KiB) of what was thrown away that are given back at a start: 64 MB, a moment.
-GIVEN_BACK = 4096
+#: Free pages (of 16 KiB) returned to the disk at a start: 64 MB, in a moment.
+VACUUM_PAGES = 4096
 
-#: FULL: what is written is there when the current ends, too.
+#: FULL: what is written survives a power failure.
 SYNCHRONOUS = "FULL"
 
 TABLES = """
@@ -38,13 +38,14 @@ CREATE TABLE look_array (look INTEGER, name TEXT, dtype TEXT, shape TEXT, data B
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 
-def opened(path: Path | None, identity: Identity | None) -> sqlite3.Connection:
-    """The database at `path`, made if there is none, for this process alone; None: in memory.
+def open_database(path: Path | None, identity: Identity | None) -> sqlite3.Connection:
+    """Return the database at `path`, made if there is none, for this process alone; None: in
+    memory.
 
     Raises PaintError for one that is in use, damaged, or of other lights or another size than
     `identity`; OutputError for a place that cannot be written.
     """
-    with _told(path):
+    with _translated_errors(path):
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
         database = sqlite3.connect(
@@ -78,47 +79,47 @@ def _prepare(database: sqlite3.Connection, path: Path | None, identity: Identity
             database.execute(f"PRAGMA application_id = {APPLICATION}")
             database.execute(f"PRAGMA user_version = {VERSION}")
         elif application != APPLICATION:
-            raise PaintError(f"{path} is no session of the painter: {AFRESH}")
+            raise PaintError(f"{path} is no session of the painter: {START_AFRESH}")
         elif version != VERSION:
             raise PaintError(
                 f"{path} was written by another version of lightpaint (format {version}, not "
-                f"{VERSION}): {AFRESH}"
+                f"{VERSION}): {START_AFRESH}"
             )
         if identity is not None:
-            _check(database, path, identity)
-            _keep(database, json.dumps(asdict(identity)))
+            _check_identity(database, path, identity)
+            _store_identity(database, json.dumps(asdict(identity)))
     with suppress(sqlite3.OperationalError):  # on a full disk
         # A row for each page, which only a script takes all of.
-        database.executescript(f"PRAGMA incremental_vacuum({GIVEN_BACK})")
+        database.executescript(f"PRAGMA incremental_vacuum({VACUUM_PAGES})")
 
 
 def identify(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
-    """That an open database is of this. Raises PaintError for one of something else."""
-    with _told(path), transaction(database):
-        _check(database, path, identity)
-        _keep(database, json.dumps(asdict(identity)))
+    """Store the identity of an open database. Raises PaintError for one of something else."""
+    with _translated_errors(path), transaction(database):
+        _check_identity(database, path, identity)
+        _store_identity(database, json.dumps(asdict(identity)))
 
 
-def _keep(database: sqlite3.Connection, identity: str) -> None:
-    """That it is of this; nothing is written if it is already, as the disk may be full."""
+def _store_identity(database: sqlite3.Connection, identity: str) -> None:
+    """Store the identity; nothing is written if it is there already, as the disk may be full."""
     if (identity,) not in database.execute("SELECT value FROM about WHERE name = 'identity'"):
         database.execute("INSERT OR REPLACE INTO about VALUES ('identity', ?)", (identity,))
 
 
-#: How a session that another process has is told, and what can be done instead.
+#: Parts of errors: a session that another process has, and what to do instead.
 IN_USE = "is in use"
-ELSEWHERE = "choose another folder (folder=...)"
-AFRESH = f"{ELSEWHERE}, or start afresh, which keeps it under another name (new=True)"
+OTHER_FOLDER = "choose another folder (folder=...)"
+START_AFRESH = f"{OTHER_FOLDER}, or start afresh, which keeps it under another name (new=True)"
 
 
-def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
+def _check_identity(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
     """Raise PaintError for a session of something else."""
     for (said,) in database.execute("SELECT value FROM about WHERE name = 'identity'"):
         its = read_record(Identity, strict_json(said))
         if len(its.views) > len(identity.views):
             raise PaintError(
                 f"{path} is a session of {len(its.views)} views, and this is of "
-                f"{len(identity.views)}: {AFRESH}"
+                f"{len(identity.views)}: {START_AFRESH}"
             )
         # Views may have come after those that it has.
         for old, new in zip(its.views, identity.views, strict=False):
@@ -126,26 +127,26 @@ def _check(database: sqlite3.Connection, path: Path | None, identity: Identity) 
         if its.lights != identity.lights:
             raise PaintError(
                 f"{path} is a session of the lights {some_names(its.lights)}, and "
-                f"{identity.scene} has {some_names(identity.lights)}: {AFRESH}"
+                f"{identity.scene} has {some_names(identity.lights)}: {START_AFRESH}"
             )
 
 
-def _check_view(path: Path | None, scene: str, its: SeenFrom, now: SeenFrom) -> None:
+def _check_view(path: Path | None, scene: str, its: ViewIdentity, now: ViewIdentity) -> None:
     if its.size != now.size:
         raise PaintError(
             f"{path} is a session of {its.size[1]}x{its.size[0]} pixels, and {scene} has "
-            f"{now.size[1]}x{now.size[0]}: {AFRESH}"
+            f"{now.size[1]}x{now.size[0]}: {START_AFRESH}"
         )
     if its.sensor and now.sensor and its.sensor != now.sensor:
         raise PaintError(
             f"{path} is a session of the view through {its.sensor}, and this is through "
-            f"{now.sensor}: {AFRESH}"
+            f"{now.sensor}: {START_AFRESH}"
         )
 
 
 @contextmanager
 def transaction(database: sqlite3.Connection) -> Iterator[None]:
-    """All of the block is written, for good, or nothing."""
+    """Write all of the block durably, or nothing."""
     database.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -157,40 +158,40 @@ def transaction(database: sqlite3.Connection) -> Iterator[None]:
 
 
 @contextmanager
-def _told(path: Path | None) -> Iterator[None]:
-    """Whatever prevents the opening, in one line."""
+def _translated_errors(path: Path | None) -> Iterator[None]:
+    """Translate whatever prevents the opening into one line."""
     try:
         yield
     except sqlite3.Error as error:
-        raise _spoken(path, error) from None
+        raise _sqlite_error(path, error) from None
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
     except (ArithmeticError, KeyError, TypeError, ValueError) as error:
-        raise damaged(path, error) from None
+        raise damaged_error(path, error) from None
 
 
 class DamagedError(PaintError):
-    """A session file that is not as it was written."""
+    """An error of a session file that is not as it was written."""
 
 
-def damaged(path: Path | None, error: Exception) -> DamagedError:
-    """A session that cannot be read, as it is said."""
-    return DamagedError(f"{path} is damaged ({first_line(error)}): {AFRESH}")
+def damaged_error(path: Path | None, error: Exception) -> DamagedError:
+    """Return the error for a session that cannot be read."""
+    return DamagedError(f"{path} is damaged ({first_line(error)}): {START_AFRESH}")
 
 
-def _spoken(path: Path | None, error: sqlite3.Error) -> LightpaintError:
+def _sqlite_error(path: Path | None, error: sqlite3.Error) -> LightpaintError:
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
     if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
         return PaintError(
-            f"{path} {IN_USE}: another lightpaint paints there; end that one, or {ELSEWHERE}"
+            f"{path} {IN_USE}: another lightpaint paints there; end that one, or {OTHER_FOLDER}"
         )
     if code in _DAMAGED or not isinstance(error, sqlite3.OperationalError):
-        return damaged(path, error)
+        return damaged_error(path, error)
     return OutputError(f"cannot write {path}: {first_line(error)}")
 
 
-def place_of(path: Path | None) -> tuple[int, int] | None:
-    """Which file is there, by the system's own name for it; None if there is none."""
+def file_id(path: Path | None) -> tuple[int, int] | None:
+    """Return the system's own identity of a file; None if there is none."""
     try:
         about = None if path is None else path.stat()
     except OSError:
@@ -198,16 +199,16 @@ def place_of(path: Path | None) -> tuple[int, int] | None:
     return None if about is None else (about.st_dev, about.st_ino)
 
 
-def rewritten(
+def rewrite(
     database: sqlite3.Connection, path: Path, identity: Identity | None
 ) -> sqlite3.Connection:
-    """All of an open database whose file was removed, at `path` again; the old one is closed.
+    """Write an open database whose file was removed to `path` again; the old one is closed.
 
     The system keeps a file that somebody has open. Raises LightpaintError where it cannot be
     written; the old one is open then.
     """
     beside = path.with_name(f".{path.name}.new")
-    with _told(path):
+    with _translated_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         beside.unlink(missing_ok=True)
         try:
@@ -218,7 +219,7 @@ def rewritten(
             beside.unlink(missing_ok=True)
             raise
     database.close()  # before its place is taken: it removes what is called like its own log
-    return opened(path, identity)
+    return open_database(path, identity)
 
 
 def free_name(path: Path) -> Path:
@@ -244,7 +245,7 @@ def set_aside(path: Path) -> Path | None:
     if not path.exists():
         return None
     try:
-        opened(path, None).close()  # what its last process left beside it goes into it
+        open_database(path, None).close()  # what its last process left beside it goes into it
     except PaintError as error:
         if IN_USE in str(error):
             raise

@@ -1,4 +1,6 @@
-"""What a session file holds and is read when somebody asks for it: pixels of steps and of looks."""
+"""Contents of a session file that are read when they are first used: pixels of steps and of
+looks.
+"""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
@@ -10,11 +12,11 @@ import numpy.typing as npt
 from lightpaint.errors import PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.compression import packed, unpacked
+from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.steps import Patch
 from lightpaint.storage.json_records import strict_json
 
-#: What looks are made of.
+#: Element types of a look's arrays.
 DTYPES = ("float32", "float64", "float16", "uint8", "int16")
 
 #: An array of a look: dtype, shape as JSON, data; and all of them by name.
@@ -22,8 +24,8 @@ PackedArray = tuple[str, str, bytes]
 PackedArrays = dict[str, PackedArray]
 
 
-class KeptPatch(Patch):
-    """A patch that is in a file. read: its pixels before and after."""
+class StoredPatch(Patch):
+    """A patch in a file. read: returns its pixels before and after."""
 
     def __init__(
         self, view: int, region: Region, read: Callable[[], tuple[Pixels, Pixels]]
@@ -44,23 +46,23 @@ class KeptPatch(Patch):
 
 
 class LookFile(Protocol):
-    """What a file of looks is asked for."""
+    """A file of looks, as `LookArrays` reads it."""
 
     def look_names(self, number: int) -> list[str]:
-        """Names of the arrays of a look, in order."""
+        """Return the names of a look's arrays, in order."""
 
     def look_array(self, number: int, name: str) -> PackedArray:
-        """One of them. Raises KeyError if there is none."""
+        """Return one of its arrays. Raises KeyError if there is none."""
 
 
 class LookArrays(Mapping[str, npt.NDArray[Any]]):
-    """Arrays of the look of a number that are in a file."""
+    """Arrays of one look in a file, by name."""
 
     def __init__(self, file: LookFile, number: int) -> None:
         self._file, self._number = file, number
 
-    def is_of(self, file: LookFile, number: int) -> bool:
-        """Whether these are of that look in that file."""
+    def matches(self, file: LookFile, number: int) -> bool:
+        """Return whether these are the arrays of that look in that file."""
         return (self._file, self._number) == (file, number)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
@@ -68,7 +70,7 @@ class LookArrays(Mapping[str, npt.NDArray[Any]]):
         if dtype not in DTYPES:
             raise PaintError(f"a damaged look: {dtype}")
         try:
-            return np.asarray(unpacked(data, dtype, tuple(map(int, strict_json(shape)))))
+            return np.asarray(unpack(data, dtype, tuple(map(int, strict_json(shape)))))
         except (TypeError, ValueError) as error:
             raise PaintError(f"a damaged look: {first_line(error)}") from None
 
@@ -79,11 +81,11 @@ class LookArrays(Mapping[str, npt.NDArray[Any]]):
         return len(self._file.look_names(self._number))
 
 
-def packed_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> PackedArrays:
-    """Arrays of a look, packed. Raises PaintError for a type that none has."""
+def pack_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> PackedArrays:
+    """Return the arrays of a look, packed. Raises PaintError for an unexpected type."""
     found = {}
     for name, array in arrays.items():
         if array.dtype.name not in DTYPES:
             raise PaintError(f"a look of {array.dtype.name}: expected {', '.join(DTYPES)}")
-        found[name] = (array.dtype.name, json.dumps(array.shape), packed(array))
+        found[name] = (array.dtype.name, json.dumps(array.shape), pack(array))
     return found

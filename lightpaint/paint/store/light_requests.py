@@ -1,4 +1,4 @@
-"""What is asked in a session beside the paint: of single lights, of dimmers, of the answer."""
+"""Requests beside the paint: constraints on lights, dimmers, settings of the answer."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,13 +10,13 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
 from lightpaint.pipeline.settings import Settings
 
-#: What may be asked of the answer: of its fit, and of all lights together.
-OF_FIT, OF_ALL = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")
+#: Settings of the answer: those of its fit, and those of all lights together.
+FIT_KEYS, ALL_LIGHTS_KEYS = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")
 
-#: What holds a light at a level.
-HOLDS = ("lock", "off")
+#: Keys that hold a light at a level.
+HOLD_KEYS = ("lock", "off")
 
-#: What people know them by: the titles that the page's settings have.
+#: Titles of these settings on the page.
 TITLES = {
     "hold": "What you did not paint",
     "space": "What counts as close",
@@ -28,11 +28,11 @@ TITLES = {
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """Plain values all, as JSON has them.
+class LightRequests:
+    """Requests of a session, as plain JSON values.
 
-    lights: by name of light, keys and values as of a lights file. ties: names that are on one
-    dimmer. values: of OF_FIT and OF_ALL, what is not as it follows from the painting.
+    lights: by name of light, keys and values as of a lights file. ties: names that share a dimmer.
+    values: of FIT_KEYS and ALL_LIGHTS_KEYS, those that differ from the painting's defaults.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -40,35 +40,35 @@ class Wishes:
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, data: Mapping[str, Any]) -> "Wishes":
-        """From what `as_json` made."""
+    def of(cls, data: Mapping[str, Any]) -> "LightRequests":
+        """Return the requests that `as_json` wrote."""
         ties = tuple(tuple(names) for names in data.get("ties", ()))
         return cls(dict(data.get("lights", {})), ties, dict(data.get("values", {})))
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values."""
         lights = {name: dict(asked) for name, asked in self.lights.items()}
         return {"lights": lights, "ties": [list(x) for x in self.ties], "values": dict(self.values)}
 
-    def of_light(self, name: str, asked: Mapping[str, Any]) -> "Wishes":
-        """With this asked of one light, and nothing else of it.
+    def with_light(self, name: str, asked: Mapping[str, Any]) -> "LightRequests":
+        """Return these requests with all those on one light replaced.
 
-        Who holds a light holds all on its dimmer, and what was held of these before no more.
+        Holding a light holds all on its dimmer; earlier holds of these are dropped.
         """
         tied = next((names for names in self.ties if name in names), ())
         lights = {**self.lights, name: asked}
-        return replace(self, lights=_one_level(lights, (name, *tied)))
+        return replace(self, lights=_hold_once(lights, (name, *tied)))
 
-    def of_ties(self, ties: Sequence[Sequence[str]]) -> "Wishes":
-        """With these on one dimmer each; of those that are held the first one holds it."""
+    def with_ties(self, ties: Sequence[Sequence[str]]) -> "LightRequests":
+        """Return these requests with these dimmers; the first held light of each holds it."""
         lights = dict(self.lights)
         for names in ties:
-            lights = _one_level(lights, names)
+            lights = _hold_once(lights, names)
         return replace(self, lights=lights, ties=tuple(map(tuple, ties)))
 
-    def of_answer(self, values: Mapping[str, Any]) -> "Wishes":
-        """With these values, None for what follows from the painting. Raises PaintError."""
-        if unknown := [key for key in values if key not in (*OF_FIT, *OF_ALL)]:
+    def with_values(self, values: Mapping[str, Any]) -> "LightRequests":
+        """Return these requests with these values, None for defaults. Raises PaintError."""
+        if unknown := [key for key in values if key not in (*FIT_KEYS, *ALL_LIGHTS_KEYS)]:
             raise PaintError(f"nothing is called {unknown[0]!r} in what can be set")
         # Not by `in`: 0 lets go of what is held, and equals False.
         both = {**self.values, **values}
@@ -76,13 +76,13 @@ class Wishes:
         return replace(self, values=kept)
 
     @classmethod
-    def asking(
+    def from_constraints(
         cls, constraints: Constraints, lights: Sequence[BasisLight], values: Mapping[str, Any]
-    ) -> "Wishes":
-        """What constraints ask of these lights, patterns spelled out; of `values` what is OF_FIT.
+    ) -> "LightRequests":
+        """Return requests equal to constraints on these lights, and those of `values` in FIT_KEYS.
 
-        Raises ConstraintError for lights that there are none of, PaintError for what a session has
-        no place for.
+        Raises ConstraintError for lights that do not exist, PaintError for what a session cannot
+        express.
         """
         each = zip(lights, tables_by_light(constraints, lights), strict=True)
         asked = {light.name: its for light, (its, _) in each if its}
@@ -91,34 +91,36 @@ class Wishes:
             if tie.color is not None:
                 raise PaintError(f"{tie.where}: ask for the colour of each light; ties have none")
         names = tuple(tuple(lights[k].name for k in its) for _, its in ties.values())
-        kept = {key: value for key, value in values.items() if key in OF_FIT}
-        together = {key: getattr(constraints, key) for key in OF_ALL}
-        return cls(asked, names, kept).of_answer({k: v for k, v in together.items() if v})
+        kept = {key: value for key, value in values.items() if key in FIT_KEYS}
+        joint_progress = {key: getattr(constraints, key) for key in ALL_LIGHTS_KEYS}
+        return cls(asked, names, kept).with_values({k: v for k, v in joint_progress.items() if v})
 
     def constraints(self) -> Constraints:
-        """What is asked of the lights. Raises ConstraintError for what means nothing."""
-        together = {key: self.values[key] for key in OF_ALL if key in self.values}
-        return Constraints.of(self.lights, tie=self.ties, **together)
+        """Return the constraints on the lights. Raises ConstraintError for invalid ones."""
+        joint_progress = {key: self.values[key] for key in ALL_LIGHTS_KEYS if key in self.values}
+        return Constraints.of(self.lights, tie=self.ties, **joint_progress)
 
-    def settings(self, given: Settings) -> Settings:
-        """`given`, of whose answer this is asked. Raises LightpaintError for what is no value."""
-        asked = {key: self.values[key] for key in OF_FIT if key in self.values}
-        if "hold" in asked and given.unpainted:
+    def settings(self, base: Settings) -> Settings:
+        """Return `base` with the requested settings. Raises LightpaintError for an invalid
+        value.
+        """
+        asked = {key: self.values[key] for key in FIT_KEYS if key in self.values}
+        if "hold" in asked and base.unpainted:
             asked["unpainted"] = 0.0
-        return replace(given, **asked)
+        return replace(base, **asked)
 
 
-def _one_level(
+def _hold_once(
     lights: Mapping[str, Mapping[str, Any]], names: Sequence[str]
 ) -> dict[str, Mapping[str, Any]]:
-    """`lights`, of which of `names` only the first that is held still is."""
+    """Return `lights` in which only the first held light of `names` is still held."""
     made, is_held = dict(lights), False
     for name in dict.fromkeys(names):
         asked = dict(made.get(name, {}))
         if is_held:
-            asked = {key: value for key, value in asked.items() if key not in HOLDS}
+            asked = {key: value for key, value in asked.items() if key not in HOLD_KEYS}
         # Not by `in`: 0 is a level, and equals False.
-        values = (asked.get(key) for key in HOLDS)
+        values = (asked.get(key) for key in HOLD_KEYS)
         is_held = is_held or any(value is not None and value is not False for value in values)
         made[name] = asked
     return {name: asked for name, asked in made.items() if asked}

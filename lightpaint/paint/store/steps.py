@@ -1,9 +1,9 @@
-"""What is done in a session, step by step: paint, what is asked of lights, looks.
+"""The history of a session: steps of paint, requests and looks.
 
-A step has what was before it and what is after it, so that it can be taken back and done again
-without asking how it came about. The canvas is what the steps have made of the present look:
-`painted_by` finds it from the last step backwards, since a pixel is as the last patch on it left
-it, so that a long history costs no more than the patches that are still to be seen.
+A step has the state before it and after it, so that it can be undone and redone without knowing how
+it came about. The canvas is the present look with all steps applied: `replay` works from the last
+step backwards, since a pixel is as the last patch on it left it, so that a long history costs no
+more than the patches that still show.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,8 +22,7 @@ from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 class Patch:
     """The pixels of one region of a view, before a step and after it.
 
-    region: (top, bottom, left, right). before, after: its pixels. view: by its place in the
-    session.
+    region: (top, bottom, left, right). before, after: its pixels. view: index in the session.
     """
 
     region: Region
@@ -34,11 +33,10 @@ class Patch:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One thing that was done, and can be taken back.
+    """A change that can be undone.
 
-    kind: "stroke", "asked" (of lights, ties, settings) or "look_loaded". label: what undo
-    calls it. fields: plain values before and after, as JSON has them. patches: the pixels that it
-    changed, of one view or several.
+    kind: "stroke", "asked" (of lights, ties, settings) or "look_loaded". label: shown by undo.
+    fields: plain JSON values before and after. patches: the changed pixels, of one view or several.
     """
 
     kind: str
@@ -48,12 +46,12 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class KeptLook:
-    """A look under a name. id: a number that no other look of the session has.
+class StoredLook:
+    """A named look. id: a number that no other look of the session has.
 
-    fields: its name, when it was kept (`stamp`, seconds since 1970) and the wishes, as JSON
-    has them. arrays: weights, and of each view image, importance, `at_least` (uint8, where it is so
-    anywhere) and thumbnail, called as `of_view` says.
+    fields: its name, when it was kept (`stamp`, seconds since 1970) and the requests, as JSON.
+    arrays: weights, and of each view image, importance, `at_least` (uint8, if any mark is set) and
+    thumbnail, named by `name_in_view`.
     """
 
     id: int
@@ -61,16 +59,14 @@ class KeptLook:
     arrays: Mapping[str, npt.NDArray[Any]]
 
 
-def of_view(name: str, view: int) -> str:
-    """What something of a view is called: by its name alone of the first, `name@1` of the next."""
+def name_in_view(name: str, view: int) -> str:
+    """Return the name of a view's item: plain for the first view, `name@1` for the next."""
     return name if view == 0 else f"{name}@{view}"
 
 
 @dataclass(frozen=True)
-class SeenFrom:
-    """What a view is. sensor: that it is seen through, "" where nobody knows. size: (height, width)
-    of its picture.
-    """
+class ViewIdentity:
+    """Identity of a view. sensor: its name, "" if unknown. size: (height, width) of its picture."""
 
     sensor: str
     size: tuple[int, int]
@@ -78,34 +74,34 @@ class SeenFrom:
 
 @dataclass(frozen=True)
 class Identity:
-    """What a session is of: steps speak of pixels of its views, and of its lights by their names.
+    """Identity of a session: steps refer to pixels of its views, and to its lights by name.
 
-    scene: name of the scene or basis, for people. basis: what the basis says it was made of, which
-    may change, as a scene does in which something was moved.
+    scene: name of the scene or basis, for people. basis: identity of the scene that the basis was
+    made of; it may change, as when something in the scene moves.
     """
 
     scene: str
     basis: str
     lights: tuple[str, ...]
-    views: tuple[SeenFrom, ...]
+    views: tuple[ViewIdentity, ...]
 
     @classmethod
     def of(cls, bases: Sequence[Basis]) -> "Identity":
-        """That of a session which paints on `bases`, of one view each."""
+        """Return the identity of a session on `bases`, of one view each."""
         origin, names = bases[0].origin, bases[0].names
-        views = tuple(SeenFrom(basis.origin.sensor, basis.size) for basis in bases)
+        views = tuple(ViewIdentity(basis.origin.sensor, basis.size) for basis in bases)
         return cls(origin.scene, f"{origin.scene_identity} {origin.sensor}", names, views)
 
     @property
-    def largest(self) -> int:
+    def max_pixels(self) -> int:
         """Pixels of its largest view."""
         return max(prod(view.size) for view in self.views)
 
 
-def painted_by(steps: Sequence[Step], start: Pixels, view: int = 0) -> Pixels:
-    """The canvas of a view after `steps`, which began at `start`.
+def replay(steps: Sequence[Step], start: Pixels, view: int = 0) -> Pixels:
+    """Return the canvas of a view after `steps`, which began at `start`.
 
-    The same as every patch put down in order; looks only at those that show.
+    The result equals every patch put down in order; only patches that show are read.
     """
     image, importance, at_least = start.copy()
     is_open = np.ones(importance.shape, dtype=bool)

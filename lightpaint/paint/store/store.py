@@ -1,16 +1,16 @@
 """The session file: each step is in it when `append` returns, whatever happens next.
 
-It is a SQLite database in WAL mode, and no journal of our own. What ends a process, or the
-current, in the middle of a write leaves the last whole step; SQLite has been tried at that far more
-than a file format of ours would be. Undo cuts the tail off in one transaction with the step that
-takes its place; looks change their names and go, and the room they took is used again or given
-back; and of a long history only what is to be seen is read at a start, since labels and pixels
-stand in two tables. An append-only journal would need all of that built.
+It is a SQLite database in WAL mode, and no journal of our own. A process or a machine that stops in
+the middle of a write leaves the last whole step; SQLite has been tested for that far more than a
+file format of ours would be. Undo cuts the tail off in one transaction with the step that replaces
+it; looks are renamed and deleted, and their room is used again or given back; and of a long history
+only labels are read at a start, since labels and pixels stand in two tables. An append-only journal
+would need all of that built.
 
-Pixels are kept packed (`compression.py`) and read when somebody asks for them, so that a history
-without limit takes no memory.
+Pixels are stored packed (`compression.py`) and read when they are needed, so that an unlimited
+history takes no memory.
 
-A file that somebody removes is written anew with the next step: the system keeps what is open. A
+A file that somebody deletes is written again with the next step: the system keeps an open file. A
 full disk ends nothing: what cannot be written stays in memory, in order, `unsaved` says so, and
 `flush` or the next step writes it.
 """
@@ -27,44 +27,44 @@ from typing import Any
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.compression import is_marked, packed_patches, unpacked_patch
+from lightpaint.paint.store.compression import is_marked, pack_patches, unpack_patch
 from lightpaint.paint.store.database import (
     DamagedError,
     check_pages,
-    damaged,
+    damaged_error,
+    file_id,
     identify,
-    opened,
-    place_of,
-    rewritten,
+    open_database,
+    rewrite,
     transaction,
 )
 from lightpaint.paint.store.lazy_arrays import (
-    KeptPatch,
     LookArrays,
     PackedArray,
     PackedArrays,
-    packed_arrays,
+    StoredPatch,
+    pack_arrays,
 )
-from lightpaint.paint.store.steps import Identity, KeptLook, Patch, Step
+from lightpaint.paint.store.steps import Identity, Patch, Step, StoredLook
 from lightpaint.storage.json_records import strict_json
 
-#: What comes of a value that is another than was written.
-DAMAGES = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+#: Errors that a value raises which is not as it was written.
+DAMAGE_ERRORS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
-_Write = Callable[[sqlite3.Connection], object]
+_WriteJob = Callable[[sqlite3.Connection], object]
 
 
 class Store:
-    """Steps and looks of one session, and a file that has them too.
+    """Steps and looks of one session, in memory and in a file.
 
     Attributes:
         path: The file; None for a session in memory only.
-        identity: What is painted on.
-        steps: All, in order, also those that were taken back; `append` cuts these off. Their
-            pixels are read from the file when they are asked for. To look at only.
+        identity: Identity of the painted views.
+        steps: All, in order, including undone ones; `append` cuts these off. Their pixels are read
+            from the file when they are needed. Read-only.
         position: How many of them are done.
         unsaved: Why the last steps are in memory only, in one line; None if all is written.
-        remarks: What was worth saying of the file: what of it could not be read.
+        remarks: On the file: what of it could not be read.
     """
 
     def __init__(self, path: Path | None, identity: Identity | None) -> None:
@@ -73,85 +73,90 @@ class Store:
         self.position = 0
         self.unsaved: str | None = None
         self._lock = RLock()
-        self._looks: dict[int, KeptLook] = {}
+        self._looks: dict[int, StoredLook] = {}
         self._ids: list[int] = []  # of the steps; they only grow
         self._last = 0  # id of the last step there ever was
-        self._waiting: list[_Write] = []  # what is still to be written, in order
+        self._pending: list[_WriteJob] = []  # what is still to be written, in order
         self._blobs: dict[int, tuple[bytes, bytes]] = {}  # pixels of steps that are not written
         self._arrays: dict[int, PackedArrays] = {}  # the same of looks
         self.remarks: list[str] = []
         try:
-            self._begin()
+            self._open_file()
         except DamagedError as error:
             if path is None or not path.is_file():
                 raise
-            self.remarks.append(_mended(path, identity, error))
-            self._begin()
+            self.remarks.append(_recover(path, identity, error))
+            self._open_file()
 
     @classmethod
     def open(cls, path: Path, identity: Identity | None) -> "Store":
-        """The session at `path`, as it was left, or a new one; for this process alone.
+        """Return the session at `path`, as it was left, or a new one; for this process alone.
 
-        identity: None where it is still to be known what is painted (`becomes`).
+        identity: None where it is still to be known (`set_identity`).
 
         Raises PaintError for one that another process has, that is damaged, or that is of other
         lights or another size; OutputError for a place that cannot be written.
         """
         return cls(path, identity)
 
-    def _begin(self) -> None:
+    def _open_file(self) -> None:
         """Open the file, and read all of it but pixels. Raises DamagedError, and others."""
-        self._database = opened(self.path, self.identity)
+        self._database = open_database(self.path, self.identity)
         self._file = None if self.path is None else self.path.absolute()  # also from elsewhere
-        self._place = place_of(self._file)
+        self._file_id = file_id(self._file)
         self.steps.clear()
         self._ids.clear()
         self._looks.clear()
         try:
             check_pages(self._database)
-            self._read()
-        except (sqlite3.Error, *DAMAGES) as error:
+            self._read_all()
+        except (sqlite3.Error, *DAMAGE_ERRORS) as error:
             self._database.close()
-            raise damaged(self.path, error) from None
+            raise damaged_error(self.path, error) from None
         except BaseException:
             self._database.close()
             raise
 
-    def mend(self) -> str:
-        """Go on with what can be read of the file, which turned out to be damaged.
+    def recover(self) -> str:
+        """Continue with what can be read of the file, which turned out to be damaged.
 
-        Returns what was lost, in one line, which is also among the remarks. Raises PaintError where
-        that cannot be done.
+        Returns the losses in one line, which is also among the remarks. Raises PaintError where
+        recovery is not possible.
         """
         with self._lock:
             if self.path is None or self.flush() is not None:
                 raise PaintError(f"{self.path} is damaged")
             self._database.close()
             try:
-                said = _mended(self.path, self.identity, None)
+                said = _recover(self.path, self.identity, None)
             finally:
-                self._begin()
+                self._open_file()
             self.remarks.append(said)
             return said
 
-    def becomes(self, identity: Identity) -> None:
-        """It is of this, which was not known when it was opened. Raises PaintError if it is not."""
+    def set_identity(self, identity: Identity) -> None:
+        """Set the identity, unknown when the file was opened. Raises PaintError if the file has
+        another.
+        """
         with self._lock:
             identify(self._database, self.path, identity)
             self.identity = identity
 
     def append(self, step: Step) -> None:
-        """Do `step`, after what is done; what was taken back is cut off."""
+        """Append `step` after those that are done; undone steps are cut off."""
         with self._lock:
             patches = step.patches
-            fields, places = _text(step.fields), json.dumps([_place(one) for one in patches])
-            blobs = packed_patches(patches) if patches else None
+            fields, places = (
+                _to_json(step.fields),
+                json.dumps([_place_json(one) for one in patches]),
+            )
+            blobs = pack_patches(patches) if patches else None
             del self.steps[self.position :], self._ids[self.position :]
             kept = self._ids[-1] if self._ids else 0
             self._last = number = self._last + 1
             if blobs is not None:
                 self._blobs[number] = blobs
-            self.steps.append(self._step(number, step.kind, step.label, fields, places))
+            self.steps.append(self._make_step(number, step.kind, step.label, fields, places))
             self._ids.append(number)
             self.position += 1
 
@@ -163,35 +168,35 @@ class Store:
                 if blobs is not None:
                     database.execute("INSERT INTO pixels VALUES (?, ?, ?)", (number, *blobs))
 
-            self._write(write)
+            self._enqueue(write)
 
     def move_to(self, position: int) -> None:
-        """Take steps back, or do them again: `position` of them are done."""
+        """Undo or redo steps: `position` of them are done."""
         with self._lock:
             if not 0 <= position <= len(self.steps):
                 raise PaintError(f"no step {position}: there are {len(self.steps)}")
             self.position = position
-            self._write(lambda _: None)
+            self._enqueue(lambda _: None)
 
     @property
-    def is_kept(self) -> bool:
-        """Return whether there is a file."""
+    def has_file(self) -> bool:
+        """True if there is a file."""
         return self.path is not None
 
-    def looks(self) -> list[KeptLook]:
-        """All looks, the oldest first; their arrays are read when they are asked for."""
+    def looks(self) -> list[StoredLook]:
+        """Return all looks, the oldest first; their arrays are read when they are needed."""
         with self._lock:
             return list(self._looks.values())
 
-    def put_look(self, look: KeptLook) -> None:
-        """Keep a look, in the place of the one of its number if there is one."""
+    def put_look(self, look: StoredLook) -> None:
+        """Keep a look, replacing the one of its number if there is one."""
         with self._lock:
-            fields, arrays = _text(look.fields), look.arrays
+            fields, arrays = _to_json(look.fields), look.arrays
             number, blobs = look.id, None
-            if not (isinstance(arrays, LookArrays) and arrays.is_of(self, number)):
-                blobs = packed_arrays(arrays)
+            if not (isinstance(arrays, LookArrays) and arrays.matches(self, number)):
+                blobs = pack_arrays(arrays)
                 self._arrays[number] = blobs
-            self._looks[number] = self._look(number, fields)
+            self._looks[number] = self._make_look(number, fields)
 
             def write(database: sqlite3.Connection) -> None:
                 said = (number, fields)
@@ -201,7 +206,7 @@ class Store:
                     rows = [(number, name, *row) for name, row in blobs.items()]
                     database.executemany("INSERT INTO look_array VALUES (?, ?, ?, ?, ?)", rows)
 
-            self._write(write)
+            self._enqueue(write)
 
     def drop_look(self, number: int) -> None:
         """Forget a look. Raises PaintError if there is none of that number."""
@@ -214,17 +219,17 @@ class Store:
                 database.execute("DELETE FROM look WHERE id = ?", (number,))
                 database.execute("DELETE FROM look_array WHERE look = ?", (number,))
 
-            self._write(write)
+            self._enqueue(write)
 
     def flush(self) -> str | None:
         """Write what is in memory only. Returns why that is not possible, or None."""
         with self._lock:
-            if not self._waiting and self._is_there():
+            if not self._pending and self._is_file_there():
                 return self.unsaved
             try:
-                self._come_back()
+                self._restore_file()
                 with transaction(self._database):
-                    for write in self._waiting:
+                    for write in self._pending:
                         write(self._database)
                     about = ("position", self.position)
                     self._database.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", about)
@@ -237,7 +242,7 @@ class Store:
                     f"({first_line(error)}): it is written as soon as there is room"
                 )
                 return self.unsaved
-            self._waiting, self.unsaved = [], None
+            self._pending, self.unsaved = [], None
             self._blobs.clear()
             self._arrays.clear()
             return None
@@ -249,8 +254,8 @@ class Store:
         """
         with self._lock:
             unsaved = self.flush()
-            self._waiting, self.unsaved = [], None  # closed again, there is nothing left to say
-            self._file = self._place = None
+            self._pending, self.unsaved = [], None  # closed again, there is nothing left to say
+            self._file = self._file_id = None
             try:
                 self._database.close()
             except sqlite3.Error as error:  # what is beside the file goes into it next time
@@ -264,92 +269,96 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _is_there(self) -> bool:
-        return place_of(self._file) == self._place
+    def _is_file_there(self) -> bool:
+        return file_id(self._file) == self._file_id
 
-    def _come_back(self) -> None:
-        """Write it anew where somebody has removed it. Raises LightpaintError if that fails."""
-        if self._file is None or self._is_there():
+    def _restore_file(self) -> None:
+        """Write the file again where somebody has deleted it. Raises LightpaintError if
+        that fails.
+        """
+        if self._file is None or self._is_file_there():
             return
-        if place_of(self._file) is not None:
+        if file_id(self._file) is not None:
             raise PaintError(f"{self.path} is another file now: move that one away")
-        self._database = rewritten(self._database, self._file, self.identity)
-        self._place = place_of(self._file)
+        self._database = rewrite(self._database, self._file, self.identity)
+        self._file_id = file_id(self._file)
 
-    def _write(self, write: _Write) -> None:
-        self._waiting.append(write)
+    def _enqueue(self, write: _WriteJob) -> None:
+        self._pending.append(write)
         self.flush()
 
-    def _read(self) -> None:
-        """All but pixels, of the file."""
+    def _read_all(self) -> None:
+        """Read all of the file but pixels."""
         ask = self._database.execute
         rows = ask("SELECT id, kind, label, fields, places FROM step ORDER BY id").fetchall()
         for row in rows:
-            self.steps.append(self._step(*row))
+            self.steps.append(self._make_step(*row))
             self._ids.append(row[0])
         self._last = self._ids[-1] if self._ids else 0
         self.position = len(self.steps)
         for (position,) in ask("SELECT value FROM about WHERE name = 'position'"):
             self.position = min(int(position), len(self.steps))
         for number, fields in ask("SELECT id, fields FROM look ORDER BY id").fetchall():
-            self._looks[number] = its = self._look(number, fields)
+            self._looks[number] = its = self._make_look(number, fields)
             if not isinstance(its.fields["name"], str):
                 raise TypeError("a look without a name")
 
-    def _step(self, number: int, kind: str, label: str, fields: str, where: str) -> Step:
+    def _make_step(self, number: int, kind: str, label: str, fields: str, where: str) -> Step:
         views, places = list[int](), list[tuple[Region, bool]]()
         for view, top, bottom, left, right, *marked in strict_json(where):
             region = int(top), int(bottom), int(left), int(right)
             views.append(int(view))
             places.append((region, bool(marked)))
         patches = tuple(
-            KeptPatch(view, region, partial(self._pixels, number, places, k))
+            StoredPatch(view, region, partial(self._read_pixels, number, places, k))
             for k, (view, (region, _)) in enumerate(zip(views, places, strict=True))
         )
         return Step(str(kind), str(label), strict_json(fields), patches)
 
-    def _pixels(
+    def _read_pixels(
         self, number: int, places: list[tuple[Region, bool]], k: int
     ) -> tuple[Pixels, Pixels]:
-        """Before and after step `number`, at its place k. Raises PaintError for a damaged file."""
+        """Return pixels before and after step `number`, at its place k. Raises PaintError if
+        damaged.
+        """
         with self._lock:
             blobs = self._blobs.get(number)
             if blobs is None:
-                with self._readable():
+                with self._as_damage():
                     found = "SELECT before, change FROM pixels WHERE step = ?"
                     blobs = self._database.execute(found, (number,)).fetchone()
         if blobs is None:
             raise PaintError(f"a step that was cut off: {number}")
-        with self._readable():
-            return unpacked_patch(places, k, *blobs)
+        with self._as_damage():
+            return unpack_patch(places, k, *blobs)
 
     @contextmanager
-    def _readable(self) -> Iterator[None]:
-        """Say what cannot be read as a DamagedError."""
+    def _as_damage(self) -> Iterator[None]:
+        """Raise errors of reading as DamagedError."""
         try:
             yield
-        except (sqlite3.Error, PaintError, *DAMAGES) as error:
-            raise damaged(self.path, error) from None
+        except (sqlite3.Error, PaintError, *DAMAGE_ERRORS) as error:
+            raise damaged_error(self.path, error) from None
 
-    def _look(self, number: int, fields: str) -> KeptLook:
-        return KeptLook(number, strict_json(fields), LookArrays(self, number))
+    def _make_look(self, number: int, fields: str) -> StoredLook:
+        return StoredLook(number, strict_json(fields), LookArrays(self, number))
 
     def look_names(self, number: int) -> list[str]:
-        """Names of the arrays of a look, in order."""
+        """Return the names of a look's arrays, in order."""
         with self._lock:
             if number in self._arrays:
                 return list(self._arrays[number])
             found = "SELECT name FROM look_array WHERE look = ? ORDER BY rowid"
-            with self._readable():
+            with self._as_damage():
                 return [name for (name,) in self._database.execute(found, (number,))]
 
     def look_array(self, number: int, name: str) -> PackedArray:
-        """One of them, and no other is read. Raises KeyError if there is none."""
+        """Return one array of a look, and read no other. Raises KeyError if there is none."""
         with self._lock:
             if number in self._arrays:
                 return self._arrays[number][name]
             found = "SELECT dtype, shape, data FROM look_array WHERE look = ? AND name = ?"
-            with self._readable():
+            with self._as_damage():
                 row = self._database.execute(found, (number, name)).fetchone()
         if row is None:
             raise KeyError(name)
@@ -357,30 +366,30 @@ class Store:
         return dtype, shape, data
 
 
-def _mended(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
-    from lightpaint.paint.store.recovery import mended
+def _recover(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
+    from lightpaint.paint.store.recovery import recover
 
     try:
-        return mended(path, identity)
+        return recover(path, identity)
     except OSError as reason:
         said = f"cannot write beside {path}: {reason.strerror or reason}"
         raise error or OutputError(said) from None
 
 
 class MemoryStore(Store):
-    """The same without a file, for notebooks and tests."""
+    """A session without a file, for notebooks and tests."""
 
     def __init__(self, identity: Identity | None = None) -> None:
         super().__init__(None, identity)
 
 
-def _place(patch: Patch) -> list[int]:
-    """View and region, as they are kept, and a 1 if it is marked."""
+def _place_json(patch: Patch) -> list[int]:
+    """Return view and region of a patch as they are stored, with a 1 if it is marked."""
     return [*map(int, (patch.view, *patch.region)), *([1] if is_marked(patch) else [])]
 
 
-def _text(fields: Mapping[str, Any]) -> str:
-    """Fields as JSON. Raises PaintError for what JSON has no word for."""
+def _to_json(fields: Mapping[str, Any]) -> str:
+    """Return fields as JSON. Raises PaintError for values that JSON cannot express."""
     try:
         return json.dumps(dict(fields), ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError) as error:

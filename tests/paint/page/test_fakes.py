@@ -5,7 +5,7 @@ from typing import Any, get_origin, get_type_hints
 
 import numpy as np
 
-from lightpaint.paint.protocol import EVENTS, KINDS
+from lightpaint.paint.protocol import EVENTS, REQUESTS
 from lightpaint.storage.json_records import read_record
 
 #: One request of each kind that the page sends.
@@ -47,7 +47,7 @@ def check(told: dict[str, Any]) -> None:
 
 
 def test_a_made_up_session_says_what_a_real_one_could(painter: Any) -> None:
-    assert set(ASKED) == set(KINDS) - {"hello", "fetch", "observe", "propose"}
+    assert set(ASKED) == set(REQUESTS) - {"hello", "fetch", "observe", "propose"}
     told = painter.page.evaluate(
         """async (asked) => {
             const told = [];

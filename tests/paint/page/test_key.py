@@ -17,7 +17,7 @@ from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 
-UNKNOWN = "does not know this page: open the address that its terminal shows"
+NO_KEY_TEXT = "does not know this page: open the address that its terminal shows"
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ def test_a_page_that_is_loaded_anew_goes_on_and_so_does_a_second_tab(
     # The address alone opens nothing, and says what does.
     third = tab()
     third.goto(server.address.url)
-    third.get_by_text(UNKNOWN).wait_for()
+    third.get_by_text(NO_KEY_TEXT).wait_for()
     third.goto(server.url)  # in the same tab, where no more than its fragment changes
     third.get_by_role("button", name="Take over").click()
     has_painter(third)
@@ -108,11 +108,11 @@ def test_a_page_that_is_loaded_anew_goes_on_and_so_does_a_second_tab(
 
 
 def test_the_address_that_a_browser_was_started_with_is_good_once(server: Server, tab: Any) -> None:
-    url = server.url_once()
+    url = server.one_time_url()
     first, second = tab(), tab()
     first.goto(url)
     has_painter(first)
     second.goto(url)
-    second.get_by_text(UNKNOWN).wait_for()
+    second.get_by_text(NO_KEY_TEXT).wait_for()
     first.reload()
     has_painter(first)

@@ -23,9 +23,9 @@ from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
-from lightpaint.paint.launch import subject_of
+from lightpaint.paint.launch import make_subject
 from lightpaint.paint.server.server import Server
-from lightpaint.paint.store.steps import of_view
+from lightpaint.paint.store.steps import name_in_view
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -182,7 +182,7 @@ class Person:
         """Codes of the answer at a pixel, from the planes that the page is given."""
         studio = self.served.studio
         planes = [
-            studio.resource(of_view(f"clean/{k}", view))[y, x].astype(float) * scale
+            studio.resource(name_in_view(f"clean/{k}", view))[y, x].astype(float) * scale
             for k, scale in enumerate(studio.state().fields["views"][view]["scales"])
         ]
         return self.code((studio.session.weights * planes).sum(axis=0))
@@ -213,10 +213,10 @@ def subject(basis: lp.Basis, tmp_path: Path) -> Subject:
     """A basis that was saved."""
     path = tmp_path / "room.basis.exr"
     lp.write_basis(path, basis)
-    return subject_of(
+    return make_subject(
         BasisFile(str(path)),
         tmp_path / "room",
-        command=lambda paintings, wishes: solve_command(str(path), paintings, (), wishes),
+        command=lambda paintings, requests: solve_command(str(path), paintings, (), requests),
     )
 
 
@@ -328,7 +328,7 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     np.testing.assert_allclose(me.seen(40, 10, 1), me.answered(40, 10), atol=1)
     me.press("Control+z", "Control+z", "Control+z")  # as fast as fingers are
     me.still()
-    assert not session.wishes.lights
+    assert not session.requests.lights
     # A page that goes in the middle of it leaves nothing. Rows that need two lines have had theirs.
     box = slider.bounding_box()
     y = box["y"] + box["height"] / 2
@@ -337,20 +337,20 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     me.page.reload()
     me.ready()
     assert not session.is_open
-    assert not session.wishes.lights
+    assert not session.requests.lights
 
 
 def test_a_stroke_is_kept_though_the_page_is_closed_at_once(
     served: Served, opened: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     me = opened(served).ready().press("0")
-    said = served.studio.said
+    said = served.studio.handle
 
     def slowly(*given: Any) -> Any:
         time.sleep(0.3)
         return said(*given)
 
-    monkeypatch.setattr(served.studio, "said", slowly)
+    monkeypatch.setattr(served.studio, "handle", slowly)
     me.stroke((60, 30), (80, 30))  # its end waits for the answer to what was said while it went on
     me.page.goto("about:blank")
     until(lambda: served.steps == ["brush"], "the stroke is lost")
@@ -688,7 +688,7 @@ def test_what_comes_at_rest_is_drawn_sharply_at_once(served: Served, opened: Any
         "const draw = screen.view.draw.bind(screen.view); window.drawn = [];"
         "screen.view.draw = (params) => { window.drawn.push(params.live); draw(params); }"
     )
-    served.studio._settling.ring()
+    served.studio._solve_loop.notify()
     until(lambda: me.page.evaluate("() => window.drawn.length"), "nothing is drawn")
     me.still("brush")
     assert not any(me.page.evaluate("() => window.drawn"))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from raw_message import RawMessage
 
-from lightpaint.paint.frames import of_frame, said_of, to_frame
+from lightpaint.paint.frames import from_frame, parse_request, to_frame
 from lightpaint.paint.protocol import VERSION
 
 
@@ -230,8 +230,8 @@ def test_frames_are_those_of_the_library(page: Any):
             return Array.from(new Uint8Array(frame(fields, { image, importance })));
         }"""
     )
-    content, buffers = of_frame(bytes(frame))
-    seq, said, arrays = said_of(content, buffers)
+    content, buffers = from_frame(bytes(frame))
+    seq, said, arrays = parse_request(content, buffers)
     assert (seq, said.stroke, said.region, said.done) == (7, 3, (1, 3, 2, 6), True)
     assert said.label == "Pinsel – größer"
     np.testing.assert_array_equal(arrays["image"], image)

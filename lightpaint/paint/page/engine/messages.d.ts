@@ -10,12 +10,12 @@ export type RGB = [number, number, number];
 export type Region = [top: number, bottom: number, left: number, right: number];
 
 /**
- * What does not change of a light.
+ * The constant properties of a light.
  *
- * present: its emission before anything was painted. parameter, plugin: where the scene has it.
- * form: how the scene writes its emission. members: emitters that it is a group of. group: name
- * of that group; null for a single emitter. is_fixed: whether it is kept as it is. is_scalar:
- * whether it has one number for all channels. scale: what its stored plane is multiplied by.
+ * present: its emission before anything was painted. parameter, plugin: where the scene defines
+ * it. form: how the scene writes its emission. members: emitters of the group that it is. group:
+ * name of that group; null for a single emitter. is_fixed: whether it is not adjusted. is_scalar:
+ * whether one number stands for all channels. scale: factor of its stored plane.
  */
 export interface LightInfo {
   name: string;
@@ -33,10 +33,10 @@ export interface LightInfo {
 }
 
 /**
- * One picture that is painted.
+ * A view that is painted.
  *
- * size: height and width in pixels. objects: names, in the order of the picture `objects`.
- * scales: what the stored plane of each light is multiplied by.
+ * size: height and width in pixels. objects: names, in the order of the picture `objects`. scales:
+ * factor of the stored plane of each light.
  */
 export interface ViewInfo {
   name: string;
@@ -46,7 +46,7 @@ export interface ViewInfo {
 }
 
 /**
- * A look that is kept. stamp: when, in seconds since 1970. thumbnail: name of its picture.
+ * A kept look. stamp: when, in seconds since 1970. thumbnail: name of its picture.
  */
 export interface LookInfo {
   id: number;
@@ -75,7 +75,7 @@ export interface TableInfo {
 }
 
 /**
- * Samples per pixel that have been rendered, and that are wanted.
+ * Samples per pixel that are rendered, and that are wanted.
  */
 export interface SampleCount {
   spp: number;
@@ -84,7 +84,7 @@ export interface SampleCount {
 }
 
 /**
- * Labels of the last steps that can be taken back and done again; count: of all steps.
+ * Labels of the last steps that can be undone and redone; count: of all steps.
  */
 export interface HistoryInfo {
   undo: string[];
@@ -93,7 +93,7 @@ export interface HistoryInfo {
 }
 
 /**
- * How the painting is answered where nobody has set it, as of `lightpaint.Fit`.
+ * The values in effect for settings that nobody has set, as of `lightpaint.Fit`.
  */
 export interface ResolvedFit {
   space: string | null;
@@ -102,10 +102,10 @@ export interface ResolvedFit {
 }
 
 /**
- * What keeps the lights from the paint and can be let go of.
+ * A constraint that keeps the lights from the paint and can be loosened.
  *
- * kind: of the constraint. names: lights of which it was asked. closes: share of what is missed
- * that goes without it; null where it takes more than that. hold: the weaker hold to set.
+ * kind: of the constraint. names: its lights. closes: share of the miss that goes without it; null
+ * where it takes more than that. hold: the weaker hold to set.
  */
 export interface Advice {
   kind: string;
@@ -115,7 +115,7 @@ export interface Advice {
 }
 
 /**
- * How close an answer is in one view. delta_e_asked: ΔE of the present look.
+ * Closeness of an answer in one view. delta_e_asked: ΔE of the present look.
  */
 export interface Closeness {
   headline: string;
@@ -128,9 +128,9 @@ export interface Closeness {
 /**
  * The answer for one light.
  *
- * stops: against its present emission; null where it is, or was, off. kelvin: null for what is no
- * white. share: of the light in the picture. error: how sure it is, in words. held: whether a
- * constraint holds it. unreached: whether no paint asks for it.
+ * stops: against its present emission; null where it is, or was, off. kelvin: null for a colour
+ * that is not white. share: of the light in the picture. error: how sure it is, in words. held:
+ * whether a constraint holds it. unreached: whether no paint depends on it.
  */
 export interface LightAnswer {
   emission: RGB;
@@ -145,10 +145,10 @@ export interface LightAnswer {
 }
 
 /**
- * What is known of an exact answer; the sentences come later than the lights.
+ * Properties of an answer; the sentences follow later than the lights.
  *
  * lights: in the order of the state. shares: of each light, by view, where there are several.
- * of_views: how close each view is; null for views that are not painted.
+ * of_views: closeness of each view; null for views that are not painted.
  */
 export interface Findings {
   lights?: LightAnswer[];
@@ -162,12 +162,12 @@ export interface Findings {
 }
 
 /**
- * What can be undone, and what is asked of the lights and of the answer.
+ * The steps that can be undone, and the requests in effect.
  *
- * asked: by name of light, keys and values as in a lights file. ties: names on one dimmer.
- * settings: what somebody has set. meant: what that comes to.
+ * asked: constraints by name of light, keys and values as in a lights file. ties: names on one
+ * dimmer. settings: set by somebody. meant: the values in effect.
  */
-export interface Standing {
+export interface EditState {
   history?: HistoryInfo;
   asked?: Record<string, Record<string, any>>;
   ties?: string[][];
@@ -176,15 +176,15 @@ export interface Standing {
 }
 
 /**
- * All there is: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
- * gets better. All lists of lights are in the order of `lights`.
+ * The whole state: the answer to `hello`, `take_over` and `observe`, and unasked when the basis
+ * improves. All lists of lights are in the order of `lights`.
  *
  * version: of this protocol. size: height and width of the first view, and `objects` its names.
  * lut: the grid of the tables `lut/NAME` of all `transforms`. resources: pictures, with a number
- * that grows when one is made anew. verified: the last render of each view. first: whether nothing
- * was ever done. stroke: number of the last stroke that was heard of. command: that answers the
- * exported paintings. is_back: the client had the session before, and nobody since, as whoever is
- * told unasked. weights: (lights, 3) float64, the last answer.
+ * that grows when one is replaced. verified: the last verification of each view. first: whether
+ * the session has no step yet. stroke: number of the last stroke that arrived. command: solves for
+ * the exported paintings. is_back: the client had the session before, and nobody since; true for
+ * whoever receives it unasked. weights: (lights, 3) float64, the last answer.
  */
 export interface SessionState {
   kind: 'state';
@@ -219,7 +219,7 @@ export interface SessionState {
 }
 
 /**
- * There is no picture yet; `state` follows. text: why, if something went wrong.
+ * The state while there is no picture yet; `state` follows. text: an error, if one occurred.
  */
 export interface SessionPending {
   kind: 'waiting';
@@ -236,12 +236,12 @@ export interface SessionPending {
 }
 
 /**
- * The lights as they are now: the answer to what is painted or asked, and unasked once the
- * exact answer is there, and again when more is known of it.
+ * The lights as they are now: the answer to paint and requests, and unasked once the exact
+ * answer is found, and again with its analysis.
  *
- * version: grows with every change of the session. stroke: the last one that was heard of. exact:
- * whether it is what `lightpaint solve` finds. mode: how it was found under the brush. weights:
- * (lights, 3) float64.
+ * version: grows with every change of the session. stroke: number of the last stroke that arrived.
+ * exact: whether it is what `lightpaint solve` finds. mode: how it was found under the brush.
+ * weights: (lights, 3) float64.
  */
 export interface AnswerUpdate {
   kind: 'answer';
@@ -267,8 +267,8 @@ export interface AnswerUpdate {
 }
 
 /**
- * What a canvas holds now, after undo and the like: one for each view that has changed, which
- * `views` lists.
+ * New pixels of a canvas, after undo and the like: one message for each view that has changed,
+ * all of which `views` lists.
  *
  * image: (rows, columns, 3) float32. importance: (rows, columns) float32. weights: (lights, 3)
  * float64.
@@ -292,7 +292,7 @@ export interface CanvasPatch {
 }
 
 /**
- * Pictures that are there anew, and their numbers. Unasked.
+ * New or replaced pictures, and their numbers. Unasked.
  */
 export interface PictureUpdate {
   kind: 'renewed';
@@ -312,8 +312,8 @@ export interface PictureData {
 }
 
 /**
- * The looks that are kept, and all pictures: the answer to what changes looks, and unasked when
- * an observer has proposed one.
+ * The kept looks, and all pictures: the answer to requests about looks, and unasked when an
+ * observer has proposed one.
  */
 export interface LookList {
   kind: 'looks';
@@ -324,9 +324,9 @@ export interface LookList {
 }
 
 /**
- * How far something is that takes long. Unasked.
+ * The progress of a long task. Unasked.
  *
- * what: `export`, `basis`, or what the renderer calls it.
+ * what: `export`, `basis`, or the renderer's name for it.
  */
 export interface ProgressReport {
   kind: 'progress';
@@ -339,7 +339,7 @@ export interface ProgressReport {
 }
 
 /**
- * Something that takes long has begun. what: the request, or `stop`.
+ * Notice that a long task has started. what: the request, or `stop`.
  */
 export interface TaskStarted {
   kind: 'started';
@@ -349,7 +349,7 @@ export interface TaskStarted {
 }
 
 /**
- * Something that was stopped has come to its end. Unasked.
+ * Notice that a stopped task has ended. Unasked.
  */
 export interface TaskStopped {
   kind: 'stopped';
@@ -361,8 +361,9 @@ export interface TaskStopped {
 /**
  * Files that were written. Unasked.
  *
- * command: answers the exported paintings; "" where there is none. is_stopped: whether more were
- * to come. is_unpainted: whether what needs a painting was left out.
+ * command: solves for the exported paintings; "" where there is none. is_stopped: whether the
+ * export was stopped before its end. is_unpainted: whether files that need a painting were left
+ * out.
  */
 export interface ExportResult {
   kind: 'exported';
@@ -375,9 +376,9 @@ export interface ExportResult {
 }
 
 /**
- * The render of the answer in a view has come: the picture `verified`. Unasked.
+ * The result of a verification; its render is the picture `verified`. Unasked.
  *
- * is_old: whether somebody has painted on since.
+ * is_old: whether the session has changed since.
  */
 export interface VerificationResult {
   kind: 'verified';
@@ -390,7 +391,8 @@ export interface VerificationResult {
 }
 
 /**
- * Why a view is not closer; the picture `beyond` shows where. Unasked.
+ * The reasons why a view is not closer to its painting; the picture `beyond` shows where.
+ * Unasked.
  */
 export interface Explanation {
   kind: 'explained';
@@ -402,8 +404,8 @@ export interface Explanation {
 }
 
 /**
- * What a change would do. Unasked. number: of the preview. is_at_cost: whether it changes more
- * than it brings. before, after: (h, w, 3) uint8.
+ * The effect of a change, before it is made. Unasked. number: of the preview. is_at_cost:
+ * whether it changes the unpainted part by more than it gains. before, after: (h, w, 3) uint8.
  */
 export interface PreviewResult {
   kind: 'previewed';
@@ -429,7 +431,7 @@ export interface Notice {
 }
 
 /**
- * Why a request was not done; nothing has changed.
+ * The reason why a request was refused; nothing has changed.
  */
 export interface Failure {
   kind: 'failed';
@@ -440,8 +442,8 @@ export interface Failure {
 }
 
 /**
- * The client does not have the session, or no more: another has `taken` it, the painter has
- * `ended`, or the client speaks another `version` of this protocol.
+ * Notice that the client does not have the session, or has lost it: another client has `taken`
+ * it, the painter has `ended`, or the client speaks another `version` of this protocol.
  */
 export interface Closing {
   kind: 'closed';
@@ -452,7 +454,7 @@ export interface Closing {
 }
 
 /**
- * A request was done, and there is nothing to say of it.
+ * Confirmation of a request that has no other answer.
  */
 export interface Acknowledgement {
   kind: 'done';
@@ -492,22 +494,22 @@ export interface Drop {
 }
 
 /**
- * Take the last step back, of paint or of what is asked. Answered by `patch`.
+ * Take back the last step, of paint or of constraints and settings. Answered by `patch`.
  */
 export interface Undo {
 }
 
 /**
- * Do again what was taken back. Answered by `patch`.
+ * Repeat a step that was taken back. Answered by `patch`.
  */
 export interface Redo {
 }
 
 /**
- * What is asked of one light from now on; nothing frees it. Answered by `answer`.
+ * The constraints on one light from now on; an empty object frees it. Answered by `answer`.
  *
  * asked: keys and values as in a lights file: lock, off, limits, color, kelvin, duv, primaries.
- * done: whether it is kept; false while a slider moves.
+ * done: whether it becomes a step; false while a slider moves.
  */
 export interface Ask {
   light: number;
@@ -516,7 +518,7 @@ export interface Ask {
 }
 
 /**
- * What is asked of several lights from now on, by name, as of `Ask`: one step. Answered by
+ * The constraints on several lights from now on, by name, as of `Ask`: one step. Answered by
  * `answer`.
  */
 export interface AskAll {
@@ -524,28 +526,29 @@ export interface AskAll {
 }
 
 /**
- * Which lights are on one dimmer: all such groups, of names. Answered by `answer`.
+ * The lights that share a dimmer: all such groups, of names. Answered by `answer`.
  */
-export interface Tie {
+export interface TieLights {
   ties: string[][];
 }
 
 /**
- * How the painting is answered, as of `Fit`. Answered by `answer`.
+ * Settings of the answer, as of `Fit`. Answered by `answer`.
  *
- * values: of hold, space, colors, literal, prefer_current, sparse; null for what follows from
- * the painting.
+ * values: of hold, space, colors, literal, prefer_current, sparse; null for the default that
+ * follows from the painting.
  */
 export interface Set {
   values: Record<string, any>;
 }
 
 /**
- * What a change would do, before it is made. Answered by `started`, later by `previewed`, with
- * small pictures of the answer now and then, `before` and `after` (h, w, 3) uint8.
+ * A request to show what a change would do, before it is made. Answered by `started`, later by
+ * `previewed`, with small pictures of the answer now and after the change, `before` and `after`
+ * (h, w, 3) uint8.
  *
- * number: of the preview, which the page counts; `previewed` gives it back. values, asked, ties:
- * as of `Set`, `AskAll` and `Tie`; null for ties as they are. view: whose pictures they are.
+ * number: of the preview, which the page counts; `previewed` returns it. values, asked, ties: as
+ * of `Set`, `AskAll` and `TieLights`; null for ties as they are. view: whose pictures they are.
  */
 export interface Preview {
   number: number;
@@ -563,14 +566,14 @@ export interface SaveLook {
 }
 
 /**
- * Go on from a look; a step that can be undone. Answered by `patch`.
+ * Continue from a look; a step that can be undone. Answered by `patch`.
  */
 export interface LoadLook {
   look: number;
 }
 
 /**
- * Answered by `looks`.
+ * Give a look another name. Answered by `looks`.
  */
 export interface RenameLook {
   look: number;
@@ -578,15 +581,15 @@ export interface RenameLook {
 }
 
 /**
- * Answered by `looks`.
+ * Keep a copy of a look. Answered by `looks`.
  */
 export interface CopyLook {
   look: number;
 }
 
 /**
- * Keep what lies between two looks: a look whose lights are held at the share `part` of the way
- * from the first to the second. Answered by `looks`.
+ * Keep a mix of two looks: its lights are locked at the share `part` of the way from the first
+ * to the second. Answered by `looks`.
  */
 export interface MixLooks {
   first: number;
@@ -596,7 +599,7 @@ export interface MixLooks {
 }
 
 /**
- * Answered by `looks`.
+ * Delete a look. Answered by `looks`.
  */
 export interface DropLook {
   look: number;
@@ -623,28 +626,29 @@ export interface Verify {
 }
 
 /**
- * Why a view is not closer. Answered by `started`, later by `explained` and the picture
- * `beyond`.
+ * A request for the reasons why a view is not closer to its painting. Answered by `started`,
+ * later by `explained` and the picture `beyond`.
  */
 export interface Explain {
   view?: number;
 }
 
 /**
- * Go on here, and not on the page that has the session. Answered by `state`.
+ * Take the session over from the page that has it. Answered by `state`.
  */
 export interface TakeOver {
 }
 
 /**
- * Where there is no HTTP: answered by `fetched`, with the picture as its array.
+ * A request for a picture, where there is no HTTP. Answered by `fetched`, with the picture as
+ * its array.
  */
 export interface Fetch {
   name: string;
 }
 
 /**
- * The first message of an observer: a client that is told lighting, looks and progress, and
+ * The first message of an observer: a client that receives lighting, looks and progress, and
  * never has the session. It may then send `fetch`, `export` and `propose`, and nothing else.
  * Answered by `state` or `waiting`.
  */
@@ -663,7 +667,7 @@ export interface Propose {
   lights: Record<string, RGB>;
 }
 
-/** What clients are told, by kind. */
+/** Events from the session, by kind. */
 export interface Events {
   state: SessionState;
   waiting: SessionPending;
@@ -685,7 +689,7 @@ export interface Events {
   done: Acknowledgement;
 }
 
-/** Fields of what clients send, by kind. */
+/** Fields of clients' requests, by kind. */
 export interface Requests {
   hello: Hello;
   paint: Paint;
@@ -694,7 +698,7 @@ export interface Requests {
   redo: Redo;
   ask: Ask;
   ask_all: AskAll;
-  tie: Tie;
+  tie: TieLights;
   set: Set;
   preview: Preview;
   save_look: SaveLook;
