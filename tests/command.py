@@ -55,9 +55,9 @@ def spawn(folder: Path, *arguments: object, **variables: str) -> CompletedProces
     )
 
 
-def succeed(folder: Path, *arguments: object, by: Runner = run) -> str:
+def succeed(folder: Path, *arguments: object, by: Runner = run, **variables: str) -> str:
     """What a command that must succeed prints to stdout."""
-    done = by(folder, *arguments)
+    done = by(folder, *arguments, **variables)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

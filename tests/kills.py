@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from command import succeed
 from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
@@ -91,13 +92,7 @@ class Stage:
         write_rgb(folder / "groups" / "look.exr", pictures()[0])
         self.environment = {**os.environ, "LIGHTPAINT_CACHE": str(folder / "cache")}
         for command in before:
-            subprocess.run(
-                [sys.executable, "-m", "lightpaint", *command],
-                cwd=folder,
-                env=self.environment,
-                check=True,
-                capture_output=True,
-            )
+            succeed(folder, *command, LIGHTPAINT_CACHE=self.environment["LIGHTPAINT_CACHE"])
         (self.look / "notes.txt").write_text("mine", encoding="utf-8")
         shutil.copytree(self.look, folder / "earlier")
         self.earlier = contents(self.look)

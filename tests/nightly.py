@@ -1,4 +1,4 @@
-"""Which tests only `./check --all` runs: more seeds of what every check tries with some."""
+"""Which tests only `./check --all` runs: more of what every check tries with some."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -12,3 +12,8 @@ def seeds(few: int, many: int) -> Iterable[Any]:
         *range(few),
         *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(few, many)),
     ]
+
+
+def at_night(*values: Any) -> Any:
+    """Return a parameter, or several for one test, that only `./check --all` tries."""
+    return pytest.param(*values, marks=pytest.mark.nightly)

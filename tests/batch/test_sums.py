@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import BasisFactory
+from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
@@ -179,3 +180,31 @@ def test_what_does_not_go_with_it_is_said_before_anything_is_rendered(
     (here / "wrong.toml").write_text(text, encoding="utf-8")
     with pytest.raises(BatchError, match=said):
         plan(here / "wrong.toml", here / "wrong")
+
+
+def test_light_groups_are_lit_without_a_picture_too(tmp_path: Path) -> None:
+    """Their noise is not known, so that rounding is told from their pixels."""
+    images = pictures()
+    layers = {f"RGBA_{name}": x for name, x in zip("abc", images, strict=True)}
+    interleaved(tmp_path / "groups.exr", layers)
+    write_rgb(tmp_path / "bright.exr", 2 * images[0] + images[2])
+    write_rgb(tmp_path / "dark.exr", np.maximum(images.sum(axis=0) / 4 - 0.05, 0))
+    found, left = {}, {}
+    for want in ("lights", "solve"):
+        text = LOOKS.replace('scene = "room.xml"', 'light_groups = "groups.exr"')
+        text = text.replace("spp = 16, ", "").replace("WANT", want)
+        (tmp_path / "looks.toml").write_text(text, encoding="utf-8")
+        outcome = run_batch(plan(tmp_path / "looks.toml", tmp_path / want))
+        assert (outcome.done, outcome.failed) == (["bright", "dark"], {})
+        assert run_batch(plan(tmp_path / "looks.toml", tmp_path / want)).done == []
+        for name in outcome.done:
+            folder = tmp_path / want / name
+            found[want, name] = read_lighting(folder / "lighting.json")
+            left[want, name] = {file.name for file in folder.iterdir()}
+    for name in ("bright", "dark"):
+        assert found["lights", name].emission == found["solve", name].emission
+        assert left["lights", name] == {"lighting.json", "result.json"}
+        assert left["solve", name] > left["lights", name]
+    bright = np.array(list(found["lights", "bright"].emission.values()))
+    # float32 pixels.
+    np.testing.assert_allclose(bright, [[2.0] * 3, [0.0] * 3, [1.0] * 3], atol=1e-6)

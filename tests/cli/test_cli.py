@@ -625,19 +625,21 @@ def test_a_basis_for_a_time(tmp_path: Path) -> None:
     def spp_of(output: str) -> int:
         return int(output.split(" lights, ")[1].split()[0])
 
-    arguments = ("basis", CORNELL, "--time", "0.2", "--resolution", "1/4", "--seed", 9)
+    room = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"])
+    write_rgb(tmp_path / "warm.exr", np.full((20, 24, 3), 0.3, np.float32))
+    arguments = ("basis", room, "--time", "0.05", "--resolution", "1/2", "--seed", 9)
     done = run(tmp_path, *arguments)
     assert done.stderr == "basis: 1 seconds\n"
     first = spp_of(done.stdout)
     assert spp_of(succeed(tmp_path, *arguments)) > first
-    # The verification has as many samples as the basis: a sixteenth in each pixel, or a quarter in
+    # The verification has as many samples as the basis: a quarter in each pixel, or the fewer in
     # each of a smaller film.
-    solved = ("solve", CORNELL, WARM, *arguments[2:], "--quality", "final")
+    solved = ("solve", room, "warm.exr", *arguments[2:], "--quality", "final")
     assert "A render confirms it." in succeed(tmp_path, *solved)
     [part] = read_parts(tmp_path / "warm" / "predicted.exr")
-    has = spp_of(succeed(tmp_path, "basis", CORNELL, *arguments[4:], "--spp", 2))
+    has = spp_of(succeed(tmp_path, "basis", room, *arguments[4:], "--spp", 2))
     seen = json.loads(part.attributes["lightpaint.view"])
-    assert seen["spp"] * seen["width"] * seen["height"] == pytest.approx(has * 32 * 32, rel=0.1)
+    assert seen["spp"] * seen["width"] * seen["height"] == pytest.approx(has * 12 * 10, rel=0.1)
 
 
 def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import as_from_a_terminal
+from nightly import at_night
 from renderer import CORNELL, LIGHTS, PATH, SAME_SAMPLES, write_room
 
 from lightpaint.basis.basis import Basis
@@ -56,6 +57,11 @@ def kept(folder: Path, cache: str) -> list[Path]:
     return list((folder / cache).glob("*.basis.exr"))
 
 
+def writings(folder: Path, cache: str) -> list[int]:
+    """When the basis that is kept was written last; nothing where there is none."""
+    return [path.stat().st_mtime_ns for path in kept(folder, cache)]
+
+
 def samples(basis: Basis) -> int:
     """Samples per pixel of all lights together."""
     each = basis.origin.each_light or ((*basis.origin.halves, 0, 0),) * len(basis.lights)
@@ -75,21 +81,31 @@ def never_stopped(
     return method, room, read_basis(folder / "whole.exr")
 
 
-@pytest.mark.parametrize("signals", [(signal.SIGINT,), (signal.SIGKILL,), (signal.SIGINT,) * 2])
+@pytest.mark.parametrize(
+    "signals",
+    [
+        (signal.SIGINT, signal.SIGKILL),
+        at_night((signal.SIGKILL,)),
+        at_night((signal.SIGKILL, signal.SIGINT)),
+        at_night((signal.SIGINT,) * 2),
+    ],
+)
 def test_stopped_and_gone_on_is_as_if_never_stopped(
     tmp_path: Path, never_stopped: tuple[str, Path, Basis], signals: tuple[signal.Signals, ...]
 ) -> None:
     method, room, whole = never_stopped
     spp, done = SPP[method], 0
     for number in signals:
+        before = writings(tmp_path, "stopped")
         with start(tmp_path, room, spp, "stopped", SLOWLY="yes") as process:
             assert process.stderr is not None
             while not process.stderr.readline().startswith("basis"):
                 assert process.poll() is None
-            while not kept(tmp_path, "stopped"):
+            # Something new is kept, and more is on its way.
+            while writings(tmp_path, "stopped") in ([], before):
                 assert process.poll() is None
                 time.sleep(0.01)
-            time.sleep(0.7)
+            time.sleep(0.3)
             assert process.poll() is None
             stopped_s = time.monotonic()
             process.send_signal(number)
@@ -126,8 +142,18 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
 
 
 @pytest.mark.parametrize(
-    ("number", "delay_s"),
-    [(signal.SIGINT, 0), (signal.SIGINT, 0.1), (signal.SIGTERM, 0.1), (signal.SIGHUP, 0.1)],
+    ("never_stopped", "number", "delay_s"),
+    [
+        ("one pass", signal.SIGINT, 0),
+        ("one pass", signal.SIGTERM, 0.1),
+        ("one pass", signal.SIGHUP, 0.1),
+        ("separate renders", signal.SIGINT, 0.1),
+        at_night("one pass", signal.SIGINT, 0.1),
+        at_night("separate renders", signal.SIGINT, 0),
+        at_night("separate renders", signal.SIGTERM, 0.1),
+        at_night("separate renders", signal.SIGHUP, 0.1),
+    ],
+    indirect=["never_stopped"],
 )
 def test_interrupted_before_much_is_done(
     tmp_path: Path,
@@ -216,7 +242,7 @@ def test_what_a_script_starts_in_its_background_hears_ctrl_c(tmp_path: Path) -> 
         assert process.wait(timeout=60) == 130
 
 
-@pytest.mark.parametrize("delay_s", [0.3, 0.7, 1.3])
+@pytest.mark.parametrize("delay_s", [at_night(0.3), 0.7, at_night(1.3)])
 def test_killed_at_any_moment_leaves_a_readable_basis(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float
 ) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import pytest
 from kills import Stage, after, when_staged, when_staging
+from nightly import at_night
 
 
 @pytest.fixture(scope="module", params=["solve", "relight"])
@@ -18,9 +19,9 @@ def stage(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 @pytest.mark.parametrize(
     ("until", "number"),
     [
-        (after(0.5), signal.SIGKILL),
+        at_night(after(0.5), signal.SIGKILL),
         (when_staging(0.0), signal.SIGTERM),
-        (when_staging(0.2), signal.SIGKILL),
+        at_night(when_staging(0.2), signal.SIGKILL),
         (when_staged, signal.SIGKILL),
     ],
 )

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nightly import at_night
 from renderer import CORNELL
 
 import lightpaint as lp
@@ -13,9 +14,8 @@ from lightpaint.lighting.solve import solve
 from lightpaint.relit.render_rounds import refine_by_rendering
 from lightpaint.scene.scene_render import Stream, pass_seed
 
-SEEDS = 40
-#: A refinement renders the scene once more, so fewer of them.
-REFINED = 12
+#: Seeds; of so many the first are refined, too, which renders the scene once more.
+FEW, MANY = (12, 6), (40, 12)
 
 
 @pytest.fixture(scope="module")
@@ -29,23 +29,27 @@ def target(scene: lp.Scene) -> lp.Target:
     return lp.read_target(path).fitted_to(scene.size, resize=True)
 
 
-def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.Target):
+@pytest.mark.parametrize(("seeds", "refined"), [FEW, at_night(*MANY)])
+def test_error_bars_hold_the_answer_of_many_samples(
+    scene: lp.Scene, target: lp.Target, seeds: int, refined: int
+):
     """The 95 % intervals, in 85 to 99 % of all lights, channels and seeds; and what improves does.
 
     The fifteen intervals of a seed err together. From one seed to another their share varies by
     11 points, so that over forty it is known to two: 93.5 ± 1.7 % as solved, 96.0 ± 1.2 %
-    corrected. What is refined holds the answer rather too often (99.0 ± 0.5 % over forty).
+    corrected. What is refined holds the answer rather too often (99.0 ± 0.5 % over forty). That
+    intervals are not too wide, either, is known of forty alone.
     """
     many = lp.render_basis(scene, spp=4096, seed=999)
     best = solve(many, target)
     truth = best.lighting.weights_for(many)
     held: dict[str, list[float]] = {}
     objective: dict[str, list[float]] = {}
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         basis = lp.render_basis(scene, spp=16, seed=seed)
         plain = solve(basis, target)
         found = {"plain": plain, "corrected": correct_noise(plain)}
-        if seed < REFINED:
+        if seed < refined:
             found["refined"] = refine_by_rendering([(scene, basis)], plain, rounds=1, seed=seed)
         for name, solution in found.items():
             low, high = error_bars(solution).interval
@@ -54,12 +58,12 @@ def test_error_bars_hold_the_answer_of_many_samples(scene: lp.Scene, target: lp.
             w = solution.lighting.weights_for(basis)
             objective.setdefault(name, []).append(float(best.equations.objective(w).sum()))
     for name in ("plain", "corrected"):
-        assert len(held[name]) == SEEDS
-        assert 0.85 <= np.mean(held[name]) <= 0.99, name
+        assert len(held[name]) == seeds
+        assert 0.85 <= np.mean(held[name]) <= (0.99 if seeds >= MANY[0] else 1), name
     assert np.mean(held["refined"]) >= 0.85
     least = sum(best.certificate.objective)
     # Of the same seeds.
-    excess = {name: np.mean(values[:REFINED]) - least for name, values in objective.items()}
+    excess = {name: np.mean(values[:refined]) - least for name, values in objective.items()}
     assert excess["refined"] < 0.9 * excess["plain"]
     assert excess["corrected"] < 0.9 * excess["plain"]
 
