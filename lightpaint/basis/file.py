@@ -4,54 +4,57 @@ Part k is named after light k and holds its image as R, G, B; docs/formats.md ha
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis, Origin, free_name
+from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
+from lightpaint.basis.file_parts import (
+    IMAGE,
+    LIGHT_KEY,
+    NAMES,
+    NOISE,
+    checked_text,
+    features_of,
+    learned_of,
+    light_channels,
+    light_texts,
+    objects_of,
+    other_parts,
+    scales_of,
+    stacked,
+)
 from lightpaint.basis.file_planes import FilePlanes
+from lightpaint.basis.half_floats import encodings_of
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.files import file_length, one_line
-from lightpaint.images.denoiser import Features
-from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import (
+    Channels,
     ExrPart,
     read_headers,
     read_parts,
-    rgb_channels,
-    write_parts,
 )
 from lightpaint.images.formats.exr_rows import NotByRowsError, PartLayout, RowFile
-from lightpaint.images.object_map import Objects
+from lightpaint.images.formats.exr_streams import PartHead, write_streamed
 from lightpaint.keywords import keywords
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 
-FORMAT = "lightpaint-basis 1"
+#: What is written, and what else is read: in which all planes are float32.
+FORMAT, BEFORE = "lightpaint-basis 2", "lightpaint-basis 1"
 FORMAT_KEY = "lightpaint.format"
 ORIGIN_KEY = "lightpaint.origin"
-LIGHT_KEY = "lightpaint.light"
-EMITTERS_SEEN = "emitters seen"
-LEARNED = "learned"
-FEATURES, FEATURES_KEY = "features", "lightpaint.features"
-OBJECTS, OBJECTS_KEY, NAMES_KEY = "objects", "lightpaint.objects", "lightpaint.names"
 
 #: Longest basis file that is read, in bytes.
 MAX_BYTES = 2**36
 
-#: Bytes of a file up to which its planes are brought into memory.
+#: Bytes of planes in float32 up to which they are brought into memory.
 IN_MEMORY = 2**31
-
-#: Channels that each light has.
-_NAMES = {*"RGB", *(f"{HALF_DIFFERENCE}.{c}" for c in "RGB")}
 
 #: What comes of a header that says something else than it should.
 _DAMAGES = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
@@ -70,38 +73,45 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         >>> lp.read_basis("again.basis.exr").names
         ('panel', 'bulb')
     """
-    parts, sums = [], {}
-    for light, image, half in zip(basis.lights, basis.planes, basis.noise, strict=True):
-        about = json.dumps(_light_fields(light), ensure_ascii=False)
-        channels = rgb_channels(image) | rgb_channels(half, HALF_DIFFERENCE)
-        parts.append(ExrPart(light.name, channels, {LIGHT_KEY: about}))
-        sums[light.name] = checksum(about, channels)
-    seen = {"Y": basis.emitters_seen.astype(np.float16)}
-    # The format's rule: a part name never repeats, so a light may not take this one.
-    parts.append(ExrPart(free_name(EMITTERS_SEEN, basis.names), seen))
-    learned = {}
+    # Light by light, twice: headers come before pixels, and say how these are stored.
+    heads, stored, sums = [], [], {}
+    for k, light in enumerate(basis.lights):
+        image, half = basis.planes.plane(k), basis.noise.plane(k)
+        stored.append(encodings_of(image, half))
+        texts = light_texts(light, stored[-1])
+        channels = light_channels(image, half, stored[-1])
+        heads.append(PartHead.of(light.name, channels, texts))
+        sums[light.name] = checksum(checked_text(texts), channels)
+    others = list(other_parts(basis))
+    heads += [PartHead.of(x.name, x.channels, x.attributes, display=x.display) for x in others]
+    seen, learned = others[0].channels, ""
     if basis.learned is not None:
-        learned = dict(zip(("received", "asked"), basis.learned, strict=True))
-        # A table and no picture; the format wants one display window for all parts.
-        parts.append(ExrPart(free_name(LEARNED, basis.names), learned, display=basis.size))
-    if basis.features is not None:
-        its = _feature_channels(basis.features)
-        about_them = {FEATURES_KEY: checksum("", its)}
-        parts.append(ExrPart(free_name(FEATURES, basis.names), its, about_them))
-    if basis.objects is not None:
-        named = json.dumps(basis.objects.names, ensure_ascii=False)
-        # Whole numbers that float32 holds.
-        index = {"index": basis.objects.index.astype(np.float32)}
-        about_it = {NAMES_KEY: named, OBJECTS_KEY: checksum(named, index)}
-        parts.append(ExrPart(free_name(OBJECTS, basis.names), index, about_it))
+        learned = checksum("", others[1].channels)
     # Without `each_light` and `integrator` as in files from before there was any.
     of_origin = json.dumps(fields_of(basis.origin, "each_light", "integrator"), ensure_ascii=False)
-    checksums = Checksums(
-        sums, checksum(of_origin, {}), checksum("", seen), checksum("", learned) if learned else ""
-    )
+    checksums = Checksums(sums, checksum(of_origin, {}), checksum("", seen), learned)
     head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
-    parts[0] = ExrPart(parts[0].name, parts[0].channels, {**head, **parts[0].attributes})
-    write_parts(Path(path), parts)
+    heads[0] = replace(heads[0], texts={**head, **heads[0].texts})
+
+    def pixels() -> Iterator[Channels]:
+        for k, encodings in enumerate(stored):
+            yield light_channels(basis.planes.plane(k), basis.noise.plane(k), encodings)
+        yield from (part.channels for part in others)
+
+    write_streamed(Path(path), heads, pixels())
+
+
+def as_stored(basis: Basis) -> Basis:
+    """Return `basis` with the planes that come back of what `write_basis` writes of it.
+
+    So that who solves what was just rendered finds what who reads it from its file finds. It is
+    rounded in the memory of the planes that are given, which must be in memory.
+    """
+    for image, half in zip(basis.planes, basis.noise, strict=True):
+        its = encodings_of(image, half)
+        image[...] = its[0].rounded(image)
+        half[...] = its[1].rounded(half)
+    return replace(basis)  # which knows nothing of what was computed before
 
 
 @keywords()
@@ -120,9 +130,9 @@ def read_basis(path: str | Path) -> Basis:
         Basis(2 lights, 16x16, 4 spp, of room.xml: panel, bulb)
     """
     path = Path(path)
-    length = file_length(path, "image file", ImageError, limit=MAX_BYTES)
+    file_length(path, "image file", ImageError, limit=MAX_BYTES)
     try:
-        if length > IN_MEMORY and (large := _large(path)) is not None:
+        if (large := _large(path)) is not None:
             return replace(large, source=str(path))
         parts = read_parts(path)
         head = _head(p.attributes for p in parts)
@@ -135,11 +145,22 @@ def read_basis(path: str | Path) -> Basis:
         raise ImageError(f"{path} takes more memory than there is") from None
 
 
+def is_large(lights: int, size: tuple[int, int]) -> bool:
+    """Return whether planes of so many lights stay in their file when it is read."""
+    return 4 * len(NAMES) * lights * size[0] * size[1] > IN_MEMORY
+
+
 def _large(path: Path) -> Basis | None:
-    """Return a basis whose rows are read when they are asked for; None if that cannot be done."""
+    """Return a basis whose rows are read when they are asked for.
+
+    None of one that memory has room for, and where the file is not read so.
+    """
     try:
         file = RowFile(path)
-    except NotByRowsError:
+    except (NotByRowsError, OSError):
+        return None
+    lit = [p for p in file.parts if LIGHT_KEY in p.texts]
+    if not lit or not is_large(len(lit), lit[0].size):
         return None
     return _of_rows(file, _head(p.texts for p in file.parts))
 
@@ -147,7 +168,7 @@ def _large(path: Path) -> Basis | None:
 def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
     """Return the attributes of the first part. Raises BasisError for another format."""
     head: Mapping[str, str] = next((its for its in texts if FORMAT_KEY in its), {})
-    if head.get(FORMAT_KEY) != FORMAT:
+    if head.get(FORMAT_KEY) not in (FORMAT, BEFORE):
         found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
         raise BasisError(
             f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
@@ -160,15 +181,17 @@ def _of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     """Raises BasisError, without naming the file, or one of _DAMAGES."""
     lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
+    scales = [scales_of(p.attributes) for p in lit]
 
     def planes(order: Sequence[int]) -> tuple[Planes, Planes]:
-        its = [lit[k] for k in order]
-        return as_planes(_stacked(its)), as_planes(_stacked(its, HALF_DIFFERENCE))
+        its = [(lit[k], *scales[k]) for k in order]
+        return (
+            as_planes(stacked([(part, scale) for part, scale, _ in its], IMAGE)),
+            as_planes(stacked([(part, scale) for part, _, scale in its], NOISE)),
+        )
 
-    stored = [p.channels.__getitem__ for p in lit]
-    names = [tuple(p.channels) for p in lit]
-    about = [p.attributes[LIGHT_KEY] for p in lit]
-    return _assembled(about, names, stored, others, head, planes)
+    stored = [partial(getattr, part, "channels") for part in lit]
+    return _assembled([p.attributes for p in lit], stored, others, head, planes)
 
 
 def _of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
@@ -177,51 +200,47 @@ def _of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
     Raises as `_of_parts` does.
     """
     lit = [p for p in file.parts if LIGHT_KEY in p.texts]
-    if any(
-        p.size != p.display or p.size != lit[0].size or not {*p.channels} >= _NAMES for p in lit
-    ):
+    if any(p.size != p.display or p.size != lit[0].size or not {*p.channels} >= NAMES for p in lit):
         return None
+    scales = [scales_of(p.texts) for p in lit]
 
     def part(layout: PartLayout) -> ExrPart:
-        channels = {name: file.channel(layout, name) for name in layout.channels}
-        return ExrPart("", channels, layout.texts, layout.display)
+        return ExrPart("", file.channels(layout), layout.texts, layout.display)
 
     def planes(order: Sequence[int]) -> tuple[Planes, Planes]:
         its = [lit[k] for k in order]
-        noise = [f"{HALF_DIFFERENCE}.{c}" for c in "RGB"]
-        return FilePlanes(file, its, "RGB"), FilePlanes(file, its, noise)
+        images, noise = zip(*(scales[k] for k in order), strict=True)
+        return FilePlanes(file, its, IMAGE, images), FilePlanes(file, its, NOISE, noise)
 
-    stored = [partial(file.channel, p) for p in lit]
-    names = [tuple(p.channels) for p in lit]
+    stored = [partial(file.channels, p) for p in lit]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
-    return _assembled([p.texts[LIGHT_KEY] for p in lit], names, stored, others, head, planes)
+    return _assembled([p.texts for p in lit], stored, others, head, planes)
 
 
 def _assembled(
-    about: Sequence[str],
-    names: Sequence[Sequence[str]],
-    stored: Sequence[Callable[[str], npt.NDArray[Any]]],
+    texts: Sequence[Mapping[str, str]],
+    stored: Sequence[Callable[[], Channels]],
     others: Sequence[ExrPart],
     head: Mapping[str, str],
     planes: Callable[[Sequence[int]], tuple[Planes, Planes]],
 ) -> Basis:
     """Return the basis of a file, checked.
 
-    about, names, stored: of the part of each light what is said of it, its channels, and what reads
-    one. planes: makes images and noise of the parts in an order.
+    texts, stored: of the part of each light its attributes, and what reads its channels. planes:
+    makes images and noise of the parts in an order.
     """
     seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
-    if not about or not seen:
+    if not texts or not seen:
         raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
     try:
-        lights = [read_record(BasisLight, strict_json(text)) for text in about]
+        lights = [read_record(BasisLight, strict_json(its[LIGHT_KEY])) for its in texts]
         origin = read_record(Origin, strict_json(head[ORIGIN_KEY]))
         checksums = None
         if CHECKSUMS_KEY in head:
             checksums = Checksums.of_text(head[CHECKSUMS_KEY])
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
-    order = list(range(len(about)))
+    order = list(range(len(texts)))
     if checksums is not None:
         order = checksums.in_order([light.name for light in lights])
         check(checksums.origin, "origin", head[ORIGIN_KEY], {})
@@ -233,75 +252,23 @@ def _assembled(
             noise=noise,
             emitters_seen=seen[0] > 0,
             origin=origin,
-            learned=_learned(others, checksums),
-            features=_features(others, images.size),
-            objects=_objects(others, images.size),
+            learned=learned_of(others, checksums),
+            features=features_of(others, images.size),
+            objects=objects_of(others, images.size),
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
-    for k, light in enumerate(lights):  # one at a time: they may be larger than memory
-        channels = {name: stored[k](name) for name in names[k]}
-        if not all(np.isfinite(channels[name]).all() for name in _NAMES):
+    for light, its, read in zip(lights, texts, stored, strict=True):
+        channels = read()  # one light at a time: they may be larger than memory
+        if not all(np.isfinite(channels[name]).all() for name in NAMES):
             raise BasisError("holds values that are not finite: make it again")
         if checksums is not None:
-            check(checksums.lights[light.name], f"light {light.name!r}", about[k], channels)
+            check(
+                checksums.lights[light.name], f"light {light.name!r}", checked_text(its), channels
+            )
     if checksums is not None:
         check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
     return basis
-
-
-def _stacked(parts: Sequence[ExrPart], layer: str = "") -> Floats:
-    """(n, h, w, 3), without the copies that np.stack of np.stack would make."""
-    stacked = np.empty((len(parts), *parts[0].size, 3), np.float32)
-    for image, part in zip(stacked, parts, strict=True):
-        if part.size != parts[0].size:
-            raise BasisError(f"parts {parts[0].name!r} and {part.name!r} differ in size")
-        prefix = f"{layer}." if layer else ""
-        for k, c in enumerate("RGB"):
-            if prefix + c not in part.channels:
-                raise BasisError(f"no channel {prefix}{c} in part {part.name!r}")
-            image[..., k] = part.channels[prefix + c]
-    return stacked
-
-
-def _learned(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
-    """The table of what was learned; None for one that is not as it was, which nothing needs."""
-    for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
-        if checksums is not None and checksum("", channels) != checksums.learned:
-            return None
-        return np.stack([channels["received"], channels["asked"]])
-    return None
-
-
-def _feature_channels(features: Features) -> dict[str, Floats]:
-    """In half floats, which is what they were rendered to."""
-    albedo = rgb_channels(features.albedo, "albedo")
-    normal = {f"normal.{c}": features.normal[..., k] for k, c in enumerate("XYZ")}
-    return {name: plane.astype(np.float16) for name, plane in (albedo | normal).items()}
-
-
-def _features(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | None:
-    """Albedo and normals; None if there are none or not as they were, which nothing needs."""
-    for part in (p.in_display_window() for p in others if FEATURES_KEY in p.attributes):
-        channels = part.channels
-        if checksum("", channels) != part.attributes[FEATURES_KEY] or part.size != size:
-            return None
-        normal = np.stack([channels[f"normal.{c}"] for c in "XYZ"], axis=-1)
-        return Features(part.rgb("albedo"), normal.astype(np.float32))
-    return None
-
-
-def _objects(others: Sequence[ExrPart], size: tuple[int, int]) -> Objects | None:
-    """Whose surfaces are seen; None if nothing says so or not as it was, which nothing needs."""
-    for part in (p.in_display_window() for p in others if OBJECTS_KEY in p.attributes):
-        named = part.attributes.get(NAMES_KEY, "")
-        if checksum(named, part.channels) != part.attributes[OBJECTS_KEY] or part.size != size:
-            return None
-        names = strict_json(named)
-        if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
-            return None
-        return Objects(part.channels["index"].astype(np.int32), tuple(names))
-    return None
 
 
 def read_origin(path: Path) -> tuple[Origin, tuple[int, int], int]:
@@ -320,11 +287,3 @@ def read_origin(path: Path) -> tuple[Origin, tuple[int, int], int]:
 def is_basis_file(path: Path) -> bool:
     """Whether the name says so: a basis is an EXR, a scene is XML."""
     return path.suffix.lower() == ".exr"
-
-
-def _light_fields(light: BasisLight) -> dict[str, Any]:
-    """What the file says of a light; what goes without saying for one emitter is left out."""
-    data = fields_of(light, "is_fixed", "unit_flux")
-    if light.members == (light.name,):
-        del data["members"]
-    return data

@@ -1,6 +1,11 @@
 """Planes in a basis file, whose rows are read when they are asked for: larger than memory."""
 
-from collections.abc import Mapping, Sequence
+import os
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from functools import cached_property
+from threading import Lock
 
 import numpy as np
 import numpy.typing as npt
@@ -9,38 +14,58 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, mix
 from lightpaint.images.formats.exr_rows import PartLayout, RowFile
 
-#: Bytes of the rows of all planes that are mixed at a time, and of picked pixels that are kept.
-STRIP, PICKED = 2**26, 2**28
+#: Bytes of strips of rows that are kept, of all planes together; and how many strips these are, so
+#: that each thread may walk along one of its own.
+STRIPS, KEPT = 2**27, (os.cpu_count() or 1) + 2
 
-#: Rows among which scattered pixels are looked for at a time.
-SEARCHED = 32
+#: Bytes of picked pixels that are kept in memory.
+PICKED = 2**27
 
 
 class RowPlanes(PlanesBase):
-    """Planes that are read by their rows, by whoever says how (`rows`)."""
+    """Planes that are read by their rows, by whoever says how (`rows`).
+
+    Walks over pixels come by the same rows again and again, so that a few strips of rows are kept.
+    """
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Some rows of all, (n, bottom - top, w, 3)."""
         raise NotImplementedError
 
+    @cached_property
+    def _strips(self) -> "_Strips":
+        height, width = self.size
+        step = max(1, STRIPS // (KEPT * 12 * self.count * width))
+        return _Strips(step, lambda k: self.rows(k * step, min((k + 1) * step, height)))
+
+    def strips(self) -> Iterator[Floats]:
+        """All rows, a few after the other."""
+        height, step = self.size[0], self._strips.step
+        return (self.rows(top, min(top + step, height)) for top in range(0, height, step))
+
     def pixels(self, where: slice | Indices) -> Floats:
         """Some pixels of all, (n, p, 3)."""
         height, width = self.size
+        length = self._strips.step * width
         if isinstance(where, slice):
             start, stop, step = where.indices(height * width)
-            top, bottom = start // width, max(-(-stop // width), start // width)
-            lit = self.rows(top, bottom).reshape(self.count, -1, 3)
-            return lit[:, start - top * width : stop - top * width : step]
-        made = np.empty((self.count, len(where), 3), np.float32)
-        of_row = where // width
-        for top in range(0, height, SEARCHED):
-            its = np.flatnonzero((of_row >= top) & (of_row < top + SEARCHED))
-            if not its.size:
-                continue
-            first, last = int(of_row[its].min()), int(of_row[its].max()) + 1
-            lit = self.rows(first, last).reshape(self.count, -1, 3)
-            made[:, its] = lit[:, where[its] - first * width]
+            if step != 1:
+                return self.pixels(np.arange(start, stop, step))
+            parts = [
+                self._strip(k)[:, max(start - k * length, 0) : stop - k * length]
+                for k in range(start // length, max(-(-stop // length), start // length + 1))
+            ]
+            return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+        made = np.empty((3, self.count, len(where)), np.float32).transpose(1, 2, 0)
+        of_strip = where // length
+        for k in np.unique(of_strip):
+            its = np.flatnonzero(of_strip == k)
+            made[:, its] = self._strip(int(k))[:, where[its] - k * length]
         return made
+
+    def _strip(self, k: int) -> Floats:
+        """The pixels of a strip, (n, p, 3)."""
+        return self._strips[k].reshape(self.count, -1, 3)
 
     def picked(self, where: slice | Indices) -> Planes:
         """The same pixels as planes of one row; kept in memory where they are few."""
@@ -48,16 +73,12 @@ class RowPlanes(PlanesBase):
         if isinstance(where, slice):
             where = np.arange(height * width)[where]
         if self.count * len(where) * 12 <= PICKED:
-            return MemoryPlanes(self.pixels(where)[:, None])
+            return MemoryPlanes(np.ascontiguousarray(self.pixels(where)[:, None]))
         return PickedPlanes(self, where)
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Σ w_i Φ_i, (h, w, 3)."""
-        height, width = self.size
-        step = max(1, STRIP // (12 * self.count * width))
-        tops = range(0, height, step)
-        strips = [mix(self.rows(top, min(top + step, height)), weights) for top in tops]
-        return np.concatenate(strips)
+        return np.concatenate([mix(strip, weights) for strip in self.strips()])
 
     def replaced(self, planes: Mapping[int, Floats]) -> Planes:
         """These planes with others, (h, w, 3), for some of the lights."""
@@ -65,17 +86,53 @@ class RowPlanes(PlanesBase):
 
     def array(self) -> Floats:
         """All of them, (n, h, w, 3): as much memory as that takes."""
-        return self.rows(0, self.size[0])
+        return np.ascontiguousarray(self.rows(0, self.size[0]))
+
+
+class _Strips:
+    """Strips of rows that were read last. step: rows of one. read: makes the k-th."""
+
+    def __init__(self, step: int, read: Callable[[int], Floats]) -> None:
+        self.step, self._read = step, read
+        self._kept: OrderedDict[int, Future[Floats]] = OrderedDict()
+        self._lock = Lock()
+
+    def __getitem__(self, k: int) -> Floats:
+        """Return the k-th strip; who asks while another thread reads it waits for that."""
+        with self._lock:
+            made = self._kept.get(k)
+            is_mine = made is None
+            if made is None:
+                made = self._kept[k] = Future()
+            self._kept.move_to_end(k)
+            while len(self._kept) > KEPT:
+                self._kept.popitem(last=False)
+        if is_mine:
+            try:
+                made.set_result(self._read(k))
+            except BaseException as error:
+                with self._lock:
+                    self._kept.pop(k, None)
+                made.set_exception(error)
+        return made.result()
 
 
 class FilePlanes(RowPlanes):
     """Planes in parts of an OpenEXR file.
 
-    parts: one for each light, all of one size. names: the channels of red, green and blue.
+    parts: one for each light, all of one size. names: the channels of red, green and blue. scales:
+    what the numbers of each part are to be multiplied by.
     """
 
-    def __init__(self, file: RowFile, parts: Sequence[PartLayout], names: Sequence[str]) -> None:
+    def __init__(
+        self,
+        file: RowFile,
+        parts: Sequence[PartLayout],
+        names: Sequence[str],
+        scales: Sequence[float] | None = None,
+    ) -> None:
         self._file, self._parts, self._names = file, tuple(parts), tuple(names)
+        self._scales = tuple(scales or (1.0 for _ in parts))
 
     @property
     def count(self) -> int:
@@ -89,15 +146,25 @@ class FilePlanes(RowPlanes):
 
     def plane(self, i: int) -> Floats:
         """That of light i, (h, w, 3)."""
-        return self._file.rows(self._parts[i], 0, self.size[0], self._names)
+        height, width = self.size
+        made = np.empty((height, width, 3), np.float32)
+        self._read(i, 0, height, made.transpose(2, 0, 1))
+        return made
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Some rows of all, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self.size[0])
-        made = np.empty((self.count, max(bottom - top, 0), self.size[1], 3), np.float32)
-        for rows, part in zip(made, self._parts, strict=True):
-            rows[...] = self._file.rows(part, top, bottom, self._names)
-        return made
+        # Channel by channel, as they are stored and as sums go over them.
+        made = np.empty((self.count, 3, max(bottom - top, 0), self.size[1]), np.float32)
+        for i, rows in enumerate(made):
+            self._read(i, top, bottom, rows)
+        return made.transpose(0, 2, 3, 1)
+
+    def _read(self, i: int, top: int, bottom: int, into: Floats) -> None:
+        """Read rows of light i into (3, bottom - top, w)."""
+        self._file.read_rows(self._parts[i], top, bottom, self._names, into)
+        if self._scales[i] != 1:
+            into *= np.float32(self._scales[i])
 
 
 class PickedPlanes(RowPlanes):

@@ -205,9 +205,13 @@ def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
     images: (n, h, w, 3) float32; weights: (n, 3), one per light and channel. Returns (h, w, 3).
     """
     n, height, width, _ = images.shape
+    weights = np.asarray(weights, np.float32)
+    if images.strides[-1] != images.itemsize:  # channel by channel
+        apart = [np.einsum("nhw,n->hw", images[..., c], weights[:, c]) for c in range(3)]
+        return np.stack(apart, axis=-1)
     # With a weight for every value of a row the innermost sums run along whole rows, not
     # over three channels at a time.
-    along_row = np.tile(np.asarray(weights, np.float32), (1, width))
+    along_row = np.tile(weights, (1, width))
     rows = images.reshape(n, height, width * 3)
     mixed = np.einsum("nhk,nk->hk", rows, along_row)
     return np.asarray(mixed.reshape(height, width, 3), np.float32)

@@ -14,15 +14,14 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.checksums import CHECKSUMS_KEY
 from lightpaint.basis.file import (
     FORMAT_KEY,
-    LIGHT_KEY,
-    NAMES_KEY,
-    OBJECTS_KEY,
     ORIGIN_KEY,
+    as_stored,
     is_basis_file,
     read_basis,
     read_origin,
     write_basis,
 )
+from lightpaint.basis.file_parts import LIGHT_KEY, NAMES_KEY, OBJECTS_KEY
 from lightpaint.errors import BasisError, ImageError, SizeError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
@@ -34,7 +33,7 @@ SIZE = (6, 5)
 @pytest.fixture
 def basis(make_basis: Any) -> Basis:
     rng = np.random.default_rng(3)
-    return make_basis(
+    made = make_basis(
         3,
         SIZE,
         names=["key", "Fülllicht 灯 №2", "back/rim.left"],
@@ -43,6 +42,7 @@ def basis(make_basis: Any) -> Basis:
         half_differences=rng.normal(size=(3, *SIZE, 3)),
         seen=rng.random(SIZE) < 0.3,
     )
+    return as_stored(made)
 
 
 @pytest.fixture
@@ -166,7 +166,7 @@ def test_rewriting_alone_damages_nothing(path: Path, basis: Basis):
     _assert_equal(read_basis(path), basis)
 
 
-@pytest.mark.parametrize("mark", [None, "lightpaint-basis 2", ""])
+@pytest.mark.parametrize("mark", [None, "lightpaint-basis 3", ""])
 def test_a_file_of_another_format(path: Path, mark: str | None):
     _rewrite(path, 0, **{FORMAT_KEY: mark})
     with pytest.raises(BasisError, match=r"a\.basis\.exr is not a basis this version can read"):

@@ -13,12 +13,13 @@ import pytest
 from command import run
 from renderer import LIGHTS, same_basis, write_room
 
-from lightpaint.basis import cache, cache_folder
+from lightpaint.basis import cache, cache_folder, file
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache_folder import SUFFIX, TAG
 from lightpaint.basis.file import read_basis, write_basis
+from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.render import is_on_the_way
+from lightpaint.basis.render.render import is_on_the_way, render_basis
 from lightpaint.errors import LightpaintError, OutputError, SceneError
 from lightpaint.pipeline.pipeline import obtain
 from lightpaint.pipeline.settings import Settings
@@ -60,6 +61,32 @@ def test_more_samples_are_added(scene: Scene) -> None:
     assert obtain_basis(scene, spp=20).origin.spp == 20
     assert obtain_basis(scene, spp=20).origin.passes == (2, 2)
     assert [entry.origin.spp for entry in cache.entries() if entry.origin] == [20]
+
+
+@pytest.mark.parametrize("use_cache", [True, False])
+def test_what_was_just_rendered_is_as_from_its_file(scene: Scene, use_cache: bool) -> None:
+    """The same command gives the same files to the bit, whether it renders or not."""
+    fresh = obtain_basis(scene, spp=16, use_cache=use_cache)
+    rendered = render_basis(scene, spp=16)
+    assert (fresh.images != rendered.images).any()  # rounded
+    if not use_cache:
+        obtain_basis(scene, spp=16)
+    again = _kept()[0]
+    for name in ("images", "half_differences"):
+        assert getattr(again, name).tobytes() == getattr(fresh, name).tobytes()
+
+
+def test_what_is_large_is_read_from_its_file_as_soon_as_it_is_kept(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = obtain_basis(scene, spp=16)
+    cache.drop(cache.entries())
+    monkeypatch.setattr(file, "IN_MEMORY", 0)
+    large = obtain_basis(scene, spp=16)
+    assert isinstance(large.planes, FilePlanes)
+    assert isinstance(large.noise, FilePlanes)
+    assert large.lights == expected.lights
+    assert large.images.tobytes() == expected.images.tobytes()
 
 
 def _said(scene: Scene, **settings: object) -> tuple[Basis, list[str]]:
@@ -131,7 +158,8 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
             obtain_basis(scene, spp=64, exact_spp=True, progress=press_ctrl_c)
         assert is_on_the_way(scene, *_kept(), 64)
         log: list[int] = []
-        same_basis(obtain_basis(scene, spp=64, exact_spp=True, progress=passes(log)), fresh)
+        gone_on = obtain_basis(scene, spp=64, exact_spp=True, progress=passes(log))
+        same_basis(gone_on, fresh, of_file=True)
         assert 0 < sum(now > 0 for now in log) < max(whole)
         cache.drop(cache.entries())
     # One that fewer samples ended has other passes.

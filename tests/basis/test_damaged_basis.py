@@ -14,7 +14,8 @@ from damage import Case, cut_and_read, damaged, outcomes, turned, wrong
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.checksums import CHECKSUMS_KEY
-from lightpaint.basis.file import LIGHT_KEY, ORIGIN_KEY, read_basis, read_origin, write_basis
+from lightpaint.basis.file import ORIGIN_KEY, as_stored, read_basis, read_origin, write_basis
+from lightpaint.basis.file_parts import LIGHT_KEY
 from lightpaint.basis.lightgroups.folder import MAX_FILES, is_light_groups
 from lightpaint.basis.lightgroups.read import read_light_groups
 from lightpaint.errors import BasisError, ImageError
@@ -27,7 +28,7 @@ SIZE = (6, 5)
 def basis(make_basis: Any) -> Basis:
     made = make_basis(3, SIZE, names=["key", "fill", "rim"], seen=np.eye(*SIZE, dtype=bool))
     halves = np.random.default_rng(1).normal(size=made.images.shape).astype(np.float32)
-    return replace(made, noise=halves, learned=np.ones((2, 4, 3), np.float32))
+    return as_stored(replace(made, noise=halves, learned=np.ones((2, 4, 3), np.float32)))
 
 
 @pytest.fixture
@@ -93,9 +94,9 @@ def _edited(name: str) -> Callable[[list[ExrPart]], list[ExrPart]]:
                 replace(two, channels=one.channels),
                 *parts[3:],
             ]
-        if name == "half":
+        if name == "float":
             return [
-                replace(p, channels={k: c.astype(np.float16) for k, c in p.channels.items()})
+                replace(p, channels={k: c.astype(np.float32) for k, c in p.channels.items()})
                 for p in parts
             ]
         if name == "smaller":
@@ -125,7 +126,7 @@ def _edited(name: str) -> Callable[[list[ExrPart]], list[ExrPart]]:
         ("one twice", "'fill' more than once"),
         ("a pixel", "changed light 'fill'"),
         ("exchanged", "changed light 'fill'"),
-        ("half", "in half instead of float"),
+        ("float", "changed light 'key'"),
         ("smaller", "changed light 'key'"),
         ("one smaller", "changed light 'fill'"),
         ("no attributes", "is not a basis"),

@@ -13,6 +13,7 @@ from lightpaint.basis import file, file_planes
 from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.formats.exr_rows import RowFile
 
 PACKAGE = Path(lightpaint.__file__).parent
 N, SIZE = 3, (7, 5)
@@ -87,35 +88,48 @@ def test_planes_of_several_views_lie_behind_each_other(images: np.ndarray) -> No
     check_alike(first, images)
 
 
-def written(path: Path, make_basis: Any, *, smooth: bool) -> lp.Basis:
+def written(
+    path: Path, make_basis: Any, *, smooth: bool = False, size: tuple[int, int] = (67, 90)
+) -> lp.Basis:
     rng = np.random.default_rng(5)
-    images = rng.random((N, 67, 90, 3), np.float32)
+    images = rng.random((N, *size, 3), np.float32)
     if smooth:  # which ZIP packs well, where noise is left as it is
-        images[...] = np.linspace(0, 1, 90, dtype=np.float32)[:, None]
+        images[...] = np.linspace(0, 1, size[1], dtype=np.float32)[:, None]
         images[1] *= 2
-    basis: lp.Basis = make_basis(images=images, half_differences=images / 8)
+    basis: lp.Basis = file.as_stored(make_basis(images=images, half_differences=images / 8))
     lp.write_basis(path, basis)
     return basis
 
 
-@pytest.mark.parametrize("smooth", [False, True])
+#: Pictures from this size on are stored as they are where ZIP does not pack them well.
+PLAIN = 300, 320
+
+
+@pytest.mark.parametrize("room", [1, 2**27])
+@pytest.mark.parametrize(("smooth", "size"), [(False, PLAIN), (False, (67, 90)), (True, PLAIN)])
 def test_planes_of_a_file_are_those_in_memory(
-    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, smooth: bool
+    tmp_path: Path,
+    make_basis: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    smooth: bool,
+    size: tuple[int, int],
+    room: int,
 ) -> None:
     path = tmp_path / "it.basis.exr"
-    basis = written(path, make_basis, smooth=smooth)
+    basis = written(path, make_basis, smooth=smooth, size=size)
     monkeypatch.setattr(file, "IN_MEMORY", 0)
-    monkeypatch.setattr(file_planes, "STRIP", 1)
+    monkeypatch.setattr(file_planes, "STRIPS", room)
     found = lp.read_basis(path)
     assert isinstance(found.planes, FilePlanes)
+    assert RowFile(path).parts[0].is_packed == (smooth or size != PLAIN)
     check_alike(found.planes, basis.images)
     check_alike(found.noise, basis.half_differences)
-    some = np.sort(np.random.default_rng(6).permutation(67 * 90)[:500])
+    some = np.sort(np.random.default_rng(6).permutation(size[0] * size[1])[:500])
     monkeypatch.setattr(file_planes, "PICKED", 0)
     picked = found.planes.picked(some)
     assert isinstance(picked, file_planes.PickedPlanes)
     check_alike(picked, basis.images.reshape(N, 1, -1, 3)[:, :, some])
-    other = found.planes.replaced({0: np.zeros((67, 90, 3), np.float32)})
+    other = found.planes.replaced({0: np.zeros((*size, 3), np.float32)})
     assert not other.rows(3, 5)[0].any()
     assert other.rows(3, 5)[1].any()
 
@@ -125,7 +139,7 @@ def test_a_basis_in_a_file_is_solved_as_one_in_memory(
     tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, how: dict[str, Any]
 ) -> None:
     path = tmp_path / "it.basis.exr"
-    basis = written(path, make_basis, smooth=False)
+    basis = written(path, make_basis)
     image = basis.mix(np.full((N, 3), 0.7)) + np.float32(0.1)
     target = lp.Target.of(image, (np.arange(67) > 20)[:, None] * np.ones((67, 90), np.float32))
     expected = lp.solve(basis, target, **how)
@@ -146,7 +160,7 @@ def test_a_large_file_that_was_changed_says_so(
     tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "it.basis.exr"
-    written(path, make_basis, smooth=False)
+    written(path, make_basis, size=PLAIN)
     monkeypatch.setattr(file, "IN_MEMORY", 0)
     data = bytearray(path.read_bytes())
     data[len(data) // 3] ^= 1

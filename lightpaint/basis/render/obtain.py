@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import as_stored, is_large
 from lightpaint.basis.render.render import basis_lights, is_of, is_on_the_way, render_basis
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.pixel_blocks import whole_factor
@@ -40,7 +41,7 @@ def obtain_basis(
     if exact_spp and time_s is not None:
         raise SceneError("exact_spp=True goes with a number of samples, not with time_s=...")
     if not use_cache:
-        return render(scene, spp=spp, time_s=time_s, seed=seed, progress=progress)
+        return as_stored(render(scene, spp=spp, time_s=time_s, seed=seed, progress=progress))
     kept = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     if kept is not None and not is_of(scene, kept, seed):
         kept = None
@@ -67,9 +68,14 @@ def obtain_basis(
         keep=keep,
         progress=progress,
     )
-    if basis is not start:
-        keep(basis)
-    return basis
+    if basis is start:
+        return basis
+    if keep(basis) and is_large(len(basis.lights), basis.size):
+        of_file = cache.find(scene.identity, basis.origin.sensor, seed, basis.size)
+        if of_file is not None and of_file.origin == basis.origin:
+            return replace(basis, planes=of_file.planes, noise=of_file.noise)
+    # As from its file, so that the next run finds the same.
+    return as_stored(basis)
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:

@@ -31,8 +31,11 @@ LINES = {0: 1, 2: 1, 3: 16}
 
 TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 
-#: Longest header that is looked at, in bytes.
-MAX_HEADER = 2**26
+#: Bytes in which most headers are, and the longest that is looked at.
+FIRST_LOOK, MAX_HEADER = 2**18, 2**26
+
+#: Bytes of a part that are read at a time where all of it is.
+AT_A_TIME = 2**23
 
 #: Bytes before the pixels of a chunk: its part, its first line, how many bytes follow.
 HEAD = struct.Struct("<iii")
@@ -78,8 +81,8 @@ class RowFile:
         self._lock = threading.Lock()
         self.length = os.fstat(self._file).st_size
         try:
-            self.parts = self._layouts(self._read(0, min(MAX_HEADER, self.length)))
-        except (IndexError, KeyError, UnicodeDecodeError, ValueError, struct.error) as error:
+            self.parts = self._all_layouts()
+        except (IndexError, KeyError, ValueError, OverflowError, struct.error) as error:
             raise NotByRowsError(str(error)) from error
 
     def _read(self, start: int, count: int) -> bytes:
@@ -92,6 +95,17 @@ class RowFile:
         with self._lock, os.fdopen(os.dup(self._file), "rb") as file:  # Windows has no pread
             file.seek(start)
             return file.read(count)
+
+    def _all_layouts(self) -> tuple[PartLayout, ...]:
+        """Return where all parts lie, from as much of the beginning as that takes."""
+        most = min(MAX_HEADER, self.length)
+        for length in (FIRST_LOOK, most):
+            try:
+                return self._layouts(self._read(0, min(length, most)))
+            except (IndexError, ValueError, struct.error):
+                if length >= most:
+                    raise
+        raise NotByRowsError("no header")
 
     def _layouts(self, head: bytes) -> tuple[PartLayout, ...]:
         magic, version = struct.unpack_from("<iI", head)
@@ -108,32 +122,30 @@ class RowFile:
             at += 8 * len(parts[-1].offsets)
         return tuple(parts)
 
-    def rows(self, part: PartLayout, top: int, bottom: int, names: Sequence[str]) -> Floats:
-        """Rows of some channels of a part, (bottom - top, w, channels) float32.
+    def read_rows(
+        self, part: PartLayout, top: int, bottom: int, names: Sequence[str], into: Floats
+    ) -> None:
+        """Read rows of some channels of a part into (channels, bottom - top, w) float32.
 
         Raises ImageError for a file that is cut off or damaged.
         """
-        width = part.size[1]
-        made = np.empty((max(bottom - top, 0), width, len(names)), np.float32)
         starts = dict(zip(part.channels, _starts(part), strict=True))
         first = top // part.lines
         for lines, begin in self._lines(part, first, -(-bottom // part.lines)):
             its = slice(max(top, begin), min(bottom, begin + len(lines)))
             inner = lines[its.start - begin : its.stop - begin]
-            for c, name in enumerate(names):
-                kind, start = part.channels[name], starts[name]
-                values = inner[:, start : start + width * kind.itemsize]
-                pixels = np.ascontiguousarray(values).view(kind)
-                made[its.start - top : its.stop - top, :, c] = pixels
-        return made
+            for made, name in zip(into, names, strict=True):
+                made[its.start - top : its.stop - top] = _values(part, inner, starts, name)
 
-    def channel(self, part: PartLayout, name: str) -> npt.NDArray[Any]:
-        """A whole channel as it is stored, (h, w)."""
-        kind, start = part.channels[name], _starts(part)[list(part.channels).index(name)]
-        made = np.empty(part.size, kind)
-        for lines, begin in self._lines(part, 0, len(part.offsets)):
-            values = lines[:, start : start + part.size[1] * kind.itemsize]
-            made[begin : begin + len(lines)] = np.ascontiguousarray(values).view(kind)
+    def channels(self, part: PartLayout) -> dict[str, npt.NDArray[Any]]:
+        """Read all channels of a part as they are stored, (h, w) each."""
+        starts = dict(zip(part.channels, _starts(part), strict=True))
+        made = {name: np.empty(part.size, kind) for name, kind in part.channels.items()}
+        step = max(1, AT_A_TIME // (part.line_bytes * part.lines))
+        for first in range(0, len(part.offsets), step):
+            for lines, begin in self._lines(part, first, first + step):
+                for name, its in made.items():
+                    its[begin : begin + len(lines)] = _values(part, lines, starts, name)
         return made
 
     def _lines(
@@ -222,14 +234,33 @@ def _layout(
     return PartLayout(number, size, shown, channels, texts, lines, is_packed, where)
 
 
+def _values(
+    part: PartLayout, lines: npt.NDArray[np.uint8], starts: Mapping[str, int], name: str
+) -> npt.NDArray[Any]:
+    """Return the numbers of a channel in the bytes of some rows, (rows, w)."""
+    kind, start = part.channels[name], starts[name]
+    return np.ascontiguousarray(lines[:, start : start + part.size[1] * kind.itemsize]).view(kind)
+
+
 def _starts(part: PartLayout) -> list[int]:
     """Where the channels begin in the bytes of a row."""
     sizes = [part.size[1] * kind.itemsize for kind in part.channels.values()]
     return [sum(sizes[:k]) for k in range(len(sizes))]
 
 
+def zip_filtered(data: bytes) -> bytes:
+    """Return bytes as ZIP packs them best: as differences, every other byte before the rest."""
+    values = np.frombuffer(data, np.uint8)
+    apart = np.concatenate([values[0::2], values[1::2]])
+    steps = np.empty_like(apart)
+    steps[:1] = apart[:1]
+    np.subtract(apart[1:], apart[:-1], out=steps[1:])
+    steps[1:] += np.uint8(128)
+    return steps.tobytes()
+
+
 def _unpacked(data: bytes, size: int) -> bytes:
-    """Return bytes that ZIP has packed: as differences, every other byte before the rest."""
+    """Return bytes that ZIP has packed, as they were before `zip_filtered`."""
     try:
         packed = np.frombuffer(zlib.decompress(data, bufsize=size), np.uint8)
     except zlib.error:

@@ -90,7 +90,8 @@ def test_interrupted_and_gone_on_is_as_if_never_interrupted(
         write_basis(tmp_path / "part.exr", part)
         part = read_basis(tmp_path / "part.exr")
         assert part.origin == kept[-1].origin
-    same_basis(render_basis(scene, spp=16, start=part), render_basis(scene, spp=16))
+    gone_on, whole = render_basis(scene, spp=16, start=part), render_basis(scene, spp=16)
+    same_basis(gone_on, whole, of_file=through_a_file)
 
 
 def test_more_samples_add_only_what_is_missing(scene: Scene) -> None:
@@ -154,7 +155,7 @@ def test_a_time_is_kept_and_adds_samples(
     more = obtain_basis(scene, time_s=0.1)
     assert more.origin.spp > first.origin.spp
     if integrator is SEPARATELY:  # whose passes are as short for a number of samples
-        same_basis(more, render_basis(scene, spp=more.origin.spp))
+        same_basis(more, render_basis(scene, spp=more.origin.spp), of_file=True)
 
 
 def test_a_time_goes_on_from_unequal_lights(scene: Scene) -> None:

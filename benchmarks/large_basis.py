@@ -1,0 +1,174 @@
+"""How much memory a large basis takes: written, solved, predicted and reported.
+
+    python benchmarks/large_basis.py [--size 3840x2160] [--lights 100] [--noise 0.02] [--folder F]
+
+A basis of made-up lights is written plane by plane, none of which is kept, and a picture that other
+emissions of them make as a painting. Then `lightpaint solve` answers it from the file, report and
+all, in a process of its own, whose largest resident memory and time are printed. `--keep` leaves
+the files in the folder, where the next call finds the basis.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import lightpaint as lp
+from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.file_planes import RowPlanes
+from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.images.denoiser import Features
+from lightpaint.images.formats.png import png_bytes
+
+#: Values of noise that are drawn; each plane begins at another of them.
+DRAWN = 2**22 + 3
+
+#: Bytes of a GB, in which memory is told here, as in docs/benchmarks.md.
+GB = 1e9
+
+
+class MadePlanes(RowPlanes):
+    """Pools of light that are made when they are asked for.
+
+    noise: standard deviation beside the light, of images, or of their half differences.
+    """
+
+    def __init__(
+        self, count: int, size: tuple[int, int], *, noise: float, is_noise: bool = False
+    ) -> None:
+        self._count, self._size, self._noise, self._is_noise = count, size, noise, is_noise
+        rng = np.random.default_rng(1)
+        self._centres = rng.uniform(0, 1, (count, 2))
+        self._widths, self._tints = rng.uniform(0.05, 0.3, count), rng.uniform(0.3, 1, (count, 3))
+
+    @property
+    def count(self) -> int:
+        """n."""
+        return self._count
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        return self._size
+
+    @cached_property
+    def _drawn(self) -> Any:
+        return np.random.default_rng(2).standard_normal(DRAWN, np.float32)
+
+    def plane(self, i: int) -> Any:
+        """That of light i, (h, w, 3)."""
+        return self._rows(i, 0, self._size[0])
+
+    def rows(self, top: int, bottom: int) -> Any:
+        """Some rows of all, (n, bottom - top, w, 3)."""
+        return np.stack([self._rows(i, top, bottom) for i in range(self._count)])
+
+    def _rows(self, i: int, top: int, bottom: int) -> Any:
+        height, width = self._size
+        (y, x), width_of = self._centres[i], self._widths[i]
+        down = np.exp(-(((np.arange(top, bottom) / height - y) / width_of) ** 2))
+        along = np.exp(-(((np.arange(width) - x * width) / height / width_of) ** 2))
+        shade = down.astype(np.float32)[:, None] * along.astype(np.float32) + np.float32(0.01)
+        light = shade[..., None] * self._tints[i].astype(np.float32)
+        # Another beginning for each light and kind, and the same value for a pixel in any strip.
+        begin = (7919 * (2 * i + self._is_noise) + 3 * width * top) % DRAWN
+        drawn = np.resize(np.concatenate([self._drawn[begin:], self._drawn[:begin]]), light.size)
+        grain = drawn.reshape(light.shape) * np.float32(self._noise)
+        return light * grain if self._is_noise else light * (1 + grain)
+
+
+def made_basis(count: int, size: tuple[int, int], noise: float) -> Basis:
+    """A basis whose planes are made when they are asked for."""
+    rng = np.random.default_rng(3)
+    lights = [
+        BasisLight(f"light_{k}", "area", "radiance", "W/(m² sr)", tuple(rng.uniform(0, 0.1, 3)))
+        for k in range(count)
+    ]
+    y, x = np.mgrid[: size[0], : size[1]]
+    flat = np.stack([x / size[1], y / size[0], 0 * x + 0.5], axis=-1).astype(np.float32)
+    return Basis(
+        lights=Lights(tuple(lights)),
+        planes=MadePlanes(count, size, noise=noise),
+        noise=MadePlanes(count, size, noise=noise, is_noise=True),
+        emitters_seen=np.zeros(size, dtype=bool),
+        origin=Origin("made.xml", "0" * 32, "sensor", 0, "made up", (32, 32), (1, 1)),
+        features=Features(0.2 + 0.6 * flat, flat / np.linalg.norm(flat, axis=-1)[..., None]),
+    )
+
+
+def write_files(folder: Path, count: int, size: tuple[int, int], noise: float) -> None:
+    """Write basis and painting into a folder."""
+    basis = made_basis(count, size, noise)
+    lp.write_basis(folder / "made.basis.exr", basis)
+    weights = basis.present_weights * np.random.default_rng(4).uniform(0, 2, (count, 3))
+    painting = np.clip(basis.mix(weights), 0, 1)
+    encoded = lp.ViewTransform("srgb").encode(painting)
+    (folder / "painting.png").write_bytes(png_bytes((255 * encoded + 0.5).astype(np.uint8), {}))
+
+
+def measured(command: list[str]) -> Iterator[str]:
+    """Run a command, and yield what it took."""
+    before = time.perf_counter()
+    code = f"""
+import resource, runpy, sys
+sys.argv = {command!r}
+try:
+    runpy.run_path(sys.argv[0], run_name="__main__")
+finally:
+    print("peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    took_s = time.perf_counter() - before
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    # Linux counts in units of 1024 bytes, macOS in bytes.
+    unit = 1 if sys.platform == "darwin" else 1024
+    peak = int(done.stderr.rsplit("peak", 1)[1]) * unit
+    yield f"{peak / GB:.2f} GB at most, {took_s:.0f} s"
+
+
+def main() -> None:
+    """Print memory and time of each step."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--size", default="3840x2160", metavar="WxH")
+    parser.add_argument("--lights", type=int, default=100)
+    parser.add_argument("--noise", type=float, default=0.02, help="beside the light of a pixel")
+    parser.add_argument("--folder", type=Path, help="for the files; one that is deleted by default")
+    parser.add_argument("--write", action="store_true", help=argparse.SUPPRESS)
+    options, more = parser.parse_known_args()
+    width, height = map(int, options.size.split("x"))
+    if options.write:
+        write_files(options.folder, options.lights, (height, width), options.noise)
+        return
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = options.folder or Path(temporary)
+        run(folder, options, more)
+
+
+def run(folder: Path, options: argparse.Namespace, more: list[str]) -> None:
+    """Write, and solve with more options of `lightpaint solve`."""
+    own = [str(Path(__file__).resolve()), "--write", "--folder", str(folder)]
+    own += ["--size", options.size, "--lights", str(options.lights), "--noise", str(options.noise)]
+    print(f"{options.lights} lights, {options.size}, noise {options.noise}", flush=True)
+    basis = folder / "made.basis.exr"
+    if not basis.exists():
+        for told in measured(own):
+            size = basis.stat().st_size / GB
+            print(f"    written: {told}, a file of {size:.2f} GB", flush=True)
+    lightpaint = str(Path(sys.executable).parent / "lightpaint")
+    results = ["-o", str(folder / "results"), "--force"]
+    solve = [lightpaint, "solve", str(basis), str(folder / "painting.png"), *results, *more]
+    for told in measured(solve):
+        print(f"    solved, predicted and reported: {told}", flush=True)
+    print(f"    results: {', '.join(sorted(x.name for x in (folder / 'results').iterdir()))}")
+
+
+if __name__ == "__main__":
+    main()

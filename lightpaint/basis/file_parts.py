@@ -1,0 +1,149 @@
+"""Parts of a basis file: those of its lights, emitters seen, what was learned, surfaces."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis, free_name
+from lightpaint.basis.checksums import Checksums, checksum
+from lightpaint.basis.half_floats import Encoding
+from lightpaint.basis.lights import BasisLight
+from lightpaint.errors import BasisError
+from lightpaint.files import one_line
+from lightpaint.images.denoiser import Features
+from lightpaint.images.estimate import HALF_DIFFERENCE
+from lightpaint.images.formats.exr import Channels, ExrPart, rgb_channels
+from lightpaint.images.object_map import Objects
+from lightpaint.storage.json_records import fields_of, strict_json
+
+EMITTERS_SEEN = "emitters seen"
+LEARNED = "learned"
+FEATURES, FEATURES_KEY = "features", "lightpaint.features"
+OBJECTS, OBJECTS_KEY, NAMES_KEY = "objects", "lightpaint.objects", "lightpaint.names"
+
+LIGHT_KEY, SCALE_KEY = "lightpaint.light", "lightpaint.scale"
+
+#: Channels that each light has: of its image, and of its noise.
+IMAGE, NOISE = (*"RGB",), (*(f"{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
+NAMES = {*IMAGE, *NOISE}
+
+#: What a plane may be multiplied by.
+LEAST_SCALE, LARGEST_SCALE = 2.0**-126, 2.0**126
+
+
+def light_texts(light: BasisLight, encodings: tuple[Encoding, Encoding]) -> dict[str, str]:
+    """Return the attributes of the part of a light."""
+    data = fields_of(light, "is_fixed", "unit_flux")
+    if light.members == (light.name,):
+        del data["members"]  # which goes without saying for one emitter
+    texts = {LIGHT_KEY: json.dumps(data, ensure_ascii=False)}
+    if any(its.scale != 1 for its in encodings):
+        texts[SCALE_KEY] = json.dumps([its.scale for its in encodings])
+    return texts
+
+
+def light_channels(image: Floats, half: Floats, encodings: tuple[Encoding, Encoding]) -> Channels:
+    """Return the channels of a light as they are stored."""
+    made: dict[str, Any] = {}
+    for plane, encoding, names in zip((image, half), encodings, (IMAGE, NOISE), strict=True):
+        stored = encoding.encoded(plane)
+        made |= {name: stored[..., k] for k, name in enumerate(names)}
+    return made
+
+
+def checked_text(texts: Mapping[str, str]) -> str:
+    """Return what the checksum of a light is of, beside its pixels."""
+    return texts[LIGHT_KEY] + texts.get(SCALE_KEY, "")
+
+
+def scales_of(texts: Mapping[str, str]) -> tuple[float, float]:
+    """Return what the stored image and noise of a light are to be multiplied by.
+
+    Raises BasisError for anything else than two numbers above 0.
+    """
+    scales = strict_json(texts.get(SCALE_KEY, "[1, 1]"))
+    if isinstance(scales, list) and [type(x) in (int, float) for x in scales] == [True, True]:
+        image, noise = scales
+        if all(LEAST_SCALE <= x <= LARGEST_SCALE for x in scales):
+            return float(image), float(noise)
+    raise BasisError(f"is damaged as a basis: {SCALE_KEY} is {one_line(repr(scales))}")
+
+
+def stacked(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Floats:
+    """Return some channels of parts times a scale each, (n, h, w, 3)."""
+    first = parts[0][0]
+    stacked = np.empty((len(parts), *first.size, 3), np.float32)
+    for image, (part, scale) in zip(stacked, parts, strict=True):
+        if part.size != first.size:
+            raise BasisError(f"parts {first.name!r} and {part.name!r} differ in size")
+        for k, name in enumerate(names):
+            if name not in part.channels:
+                raise BasisError(f"no channel {name} in part {part.name!r}")
+            image[..., k] = part.channels[name]
+        if scale != 1:
+            image *= np.float32(scale)
+    return stacked
+
+
+def other_parts(basis: Basis) -> Iterator[ExrPart]:
+    """Yield all parts but those of the lights, the emitters that are seen first."""
+    seen = {"Y": basis.emitters_seen.astype(np.float16)}
+    # The format's rule: a part name never repeats, so a light may not take this one.
+    yield ExrPart(free_name(EMITTERS_SEEN, basis.names), seen)
+    if basis.learned is not None:
+        learned = dict(zip(("received", "asked"), basis.learned, strict=True))
+        # A table and no picture; the format wants one display window for all parts.
+        yield ExrPart(free_name(LEARNED, basis.names), learned, display=basis.size)
+    if basis.features is not None:
+        its = _feature_channels(basis.features)
+        about_them = {FEATURES_KEY: checksum("", its)}
+        yield ExrPart(free_name(FEATURES, basis.names), its, about_them)
+    if basis.objects is not None:
+        named = json.dumps(basis.objects.names, ensure_ascii=False)
+        # Whole numbers that float32 holds.
+        index = {"index": basis.objects.index.astype(np.float32)}
+        about_it = {NAMES_KEY: named, OBJECTS_KEY: checksum(named, index)}
+        yield ExrPart(free_name(OBJECTS, basis.names), index, about_it)
+
+
+def learned_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
+    """The table of what was learned; None for one that is not as it was, which nothing needs."""
+    for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
+        if checksums is not None and checksum("", channels) != checksums.learned:
+            return None
+        return np.stack([channels["received"], channels["asked"]])
+    return None
+
+
+def _feature_channels(features: Features) -> Channels:
+    """In half floats, which is what they were rendered to."""
+    albedo = rgb_channels(features.albedo, "albedo")
+    normal = {f"normal.{c}": features.normal[..., k] for k, c in enumerate("XYZ")}
+    return {name: plane.astype(np.float16) for name, plane in (albedo | normal).items()}
+
+
+def features_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | None:
+    """Albedo and normals; None if there are none or not as they were, which nothing needs."""
+    for part in (p.in_display_window() for p in others if FEATURES_KEY in p.attributes):
+        channels = part.channels
+        if checksum("", channels) != part.attributes[FEATURES_KEY] or part.size != size:
+            return None
+        normal = np.stack([channels[f"normal.{c}"] for c in "XYZ"], axis=-1)
+        return Features(part.rgb("albedo"), normal.astype(np.float32))
+    return None
+
+
+def objects_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Objects | None:
+    """Whose surfaces are seen; None if nothing says so or not as it was, which nothing needs."""
+    for part in (p.in_display_window() for p in others if OBJECTS_KEY in p.attributes):
+        named = part.attributes.get(NAMES_KEY, "")
+        if checksum(named, part.channels) != part.attributes[OBJECTS_KEY] or part.size != size:
+            return None
+        names = strict_json(named)
+        if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
+            return None
+        return Objects(part.channels["index"].astype(np.int32), tuple(names))
+    return None

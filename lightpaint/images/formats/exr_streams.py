@@ -1,0 +1,160 @@
+"""Writing a multi-part OpenEXR file one part after the other, of which one is in memory at a time.
+
+The OpenEXR project's own module takes all pixels of a file at once. What is needed to write scan
+lines is little: headers, tables of offsets, and lines as they are or packed by ZIP.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.files import replacing
+from lightpaint.images.formats.exr import VERSION_KEY, Channels, is_worth_packing
+from lightpaint.images.formats.exr_rows import HEAD, LINES, MAGIC, MULTI_PART, TYPES, zip_filtered
+from lightpaint.version import __version__
+
+#: Flags of a file: its version, and that a name is longer than 31 characters.
+VERSION, LONG_NAMES, LONGEST_NAME = 2, 0x400, 31
+
+#: OpenEXR's numbers for lines as they are, and 16 of them packed by ZIP; and how hard it packs.
+PLAIN, ZIPPED, LEVEL = 0, 3, 4
+
+
+@dataclass(frozen=True)
+class PartHead:
+    """A part without its pixels.
+
+    size: (height, width). channels: name → type of its pixels. texts: its text attributes.
+    display: (height, width) of the picture, `size` for None. is_packed: whether ZIP packs it.
+    """
+
+    name: str
+    size: tuple[int, int]
+    channels: Mapping[str, np.dtype[Any]]
+    texts: Mapping[str, str] = field(default_factory=dict)
+    display: tuple[int, int] | None = None
+    is_packed: bool = True
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        channels: Channels,
+        texts: Mapping[str, str] | None = None,
+        *,
+        display: tuple[int, int] | None = None,
+    ) -> "PartHead":
+        """Return the head of a part that is to have these pixels, packed where that helps."""
+        height, width = next(iter(channels.values())).shape
+        kinds = {its: pixels.dtype for its, pixels in channels.items()}
+        packed = is_worth_packing(channels)
+        return cls(name, (height, width), kinds, texts or {}, display, packed)
+
+    @property
+    def lines(self) -> int:
+        """Rows of a chunk."""
+        return LINES[ZIPPED if self.is_packed else PLAIN]
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks its pixels are."""
+        return -(-self.size[0] // self.lines)
+
+    def encoded(self) -> bytes:
+        """Return the attributes as they stand in the file."""
+        height, width = self.size
+        shown = self.display or self.size
+        window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+        return b"".join(
+            [
+                _attribute("channels", "chlist", self._table()),
+                _attribute("chunkCount", "int", struct.pack("<i", self.chunks)),
+                _attribute("compression", "compression", bytes([ZIPPED if self.is_packed else 0])),
+                _attribute("dataWindow", "box2i", window),
+                _attribute(
+                    "displayWindow", "box2i", struct.pack("<4i", 0, 0, shown[1] - 1, shown[0] - 1)
+                ),
+                _attribute("lineOrder", "lineOrder", b"\0"),
+                _attribute("name", "string", self.name.encode()),
+                _attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
+                _attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)),
+                _attribute("screenWindowWidth", "float", struct.pack("<f", 1)),
+                _attribute("type", "string", b"scanlineimage"),
+                *(_attribute(key, "string", text.encode()) for key, text in self.texts.items()),
+                b"\0",
+            ]
+        )
+
+    def _table(self) -> bytes:
+        """Names and types of the channels, in the order in which a line has them."""
+        kinds = {kind: number for number, kind in TYPES.items()}
+        made = [
+            name.encode() + b"\0" + struct.pack("<iIii", kinds[self.channels[name]], 0, 1, 1)
+            for name in sorted(self.channels)
+        ]
+        return b"".join([*made, b"\0"])
+
+    def packed(self, channels: Channels) -> Iterator[tuple[int, bytes]]:
+        """Yield the first line and the bytes of each chunk of the pixels."""
+        for first in range(0, self.size[0], self.lines):
+            its = slice(first, first + self.lines)
+            # A line has its channels one behind the other.
+            parts = [
+                np.ascontiguousarray(channels[name][its]).view(np.uint8).reshape(-1, self._bytes(n))
+                for name, n in ((name, self.channels[name].itemsize) for name in sorted(channels))
+            ]
+            data = np.concatenate(parts, axis=1).tobytes()
+            if self.is_packed:
+                small = zlib.compress(zip_filtered(data), LEVEL)
+                data = small if len(small) < len(data) else data
+            yield first, data
+
+    def _bytes(self, itemsize: int) -> int:
+        return self.size[1] * itemsize
+
+
+def write_streamed(
+    path: Path, heads: Sequence[PartHead], pixels: Iterable[Mapping[str, npt.NDArray[Any]]]
+) -> None:
+    """Write a multi-part EXR, whole or not at all.
+
+    pixels: of each part in the order of `heads`, its channels of the types and the size that its
+    head says. All parts must have one display window. The first says which version of lightpaint
+    wrote it. Raises OutputError for whatever the system refuses.
+    """
+    texts = {VERSION_KEY: __version__, **heads[0].texts}
+    heads = [replace(heads[0], texts=texts), *heads[1:]]
+    with replacing(path) as beside, beside.open("wb") as file:
+        _write(file, heads, pixels)
+
+
+def _write(
+    file: BinaryIO, heads: Sequence[PartHead], pixels: Iterable[Mapping[str, npt.NDArray[Any]]]
+) -> None:
+    names = [name for head in heads for name in (*head.channels, *head.texts)]
+    flags = VERSION | MULTI_PART | (LONG_NAMES if max(map(len, names)) > LONGEST_NAME else 0)
+    file.write(struct.pack("<iI", MAGIC, flags))
+    for head in heads:
+        file.write(head.encoded())
+    file.write(b"\0")
+    table = file.tell()
+    # Where chunks lie is known when they have been written.
+    file.write(bytes(8 * sum(head.chunks for head in heads)))
+    offsets = []
+    for number, (head, channels) in enumerate(zip(heads, pixels, strict=True)):
+        for first, data in head.packed(channels):
+            offsets.append(file.tell())
+            file.write(HEAD.pack(number, first, len(data)))
+            file.write(data)
+    file.seek(table)
+    file.write(np.array(offsets, "<u8").tobytes())
+
+
+def _attribute(name: str, kind: str, value: bytes) -> bytes:
+    return b"%s\0%s\0%s%s" % (name.encode(), kind.encode(), struct.pack("<i", len(value)), value)

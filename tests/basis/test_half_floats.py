@@ -1,0 +1,208 @@
+"""Planes in half floats: only where their rounding is far below the noise, and nobody sees it."""
+
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lightpaint as lp
+from lightpaint.basis.file import FORMAT_KEY, as_stored, read_basis, write_basis
+from lightpaint.basis.file_parts import SCALE_KEY
+from lightpaint.basis.file_planes import RowPlanes
+from lightpaint.basis.half_floats import FLOAT, HALF, HIDDEN, TILE, Encoding, encodings_of
+from lightpaint.basis.planes import as_planes
+from lightpaint.errors import BasisError
+from lightpaint.images.formats.exr import read_parts, write_parts
+
+SIZE = (70, 90)
+DATA = Path(__file__).parent.parent / "data"
+
+
+def plane(noise: float, *, seed: int = 1, light: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """An image and its half difference; noise: standard deviation beside the light."""
+    rng = np.random.default_rng(seed)
+    smooth = light * (0.1 + np.linspace(0, 1, SIZE[1])[:, None] * rng.uniform(0.5, 1, 3))
+    grain = noise * smooth * rng.standard_normal((2, *SIZE, 3))
+    return (smooth + grain[0]).astype(np.float32), grain[1].astype(np.float32)
+
+
+def relative(image: np.ndarray, encoding: Encoding) -> float:
+    return float((np.abs(encoding.rounded(image) - image) / np.abs(image)).max())
+
+
+def test_noisy_planes_are_halves_and_clean_ones_are_not() -> None:
+    for noise, kind in ((0.1, HALF), (0.01, HALF), (1e-3, FLOAT), (0.0, FLOAT)):
+        image, half = plane(noise)
+        its, of_noise = encodings_of(image, half)
+        assert (its.kind, its.scale, of_noise.scale) == (kind, 1, 1)
+        assert of_noise.kind == HALF
+        # Round to nearest, of 11 binary digits.
+        assert relative(image, its) <= (2**-11 if kind == HALF else 0)
+
+
+def test_rounding_is_hidden_in_the_noise_of_every_tile() -> None:
+    image, half = plane(0.1)
+    half[TILE : 2 * TILE, :TILE] *= 1e-3
+    assert encodings_of(image, half)[0].kind == FLOAT
+    image[TILE : 2 * TILE, :TILE] = 0.5  # nothing is rounded there
+    its, _ = encodings_of(image, half)
+    assert its.kind == HALF
+    missed = np.square(its.rounded(image) - image, dtype=np.float64)
+    noise = np.square(half, dtype=np.float64)
+    for top in range(0, SIZE[0], TILE):
+        for left in range(0, SIZE[1], TILE):
+            tile = np.s_[top : top + TILE, left : left + TILE]
+            assert (missed[tile].sum((0, 1)) <= HIDDEN**2 * noise[tile].sum((0, 1))).all()
+
+
+@pytest.mark.parametrize("light", [1e-30, 1e-7, 1e5, 1e30])
+def test_what_half_floats_do_not_reach_is_scaled(light: float) -> None:
+    image, half = plane(0.1, light=light)
+    its, of_noise = encodings_of(image, half)
+    assert its.kind == of_noise.kind == HALF
+    assert its.scale != 1
+    assert np.log2(its.scale) % 1 == 0
+    assert relative(image, its) <= 2**-11
+
+
+def test_a_range_beyond_half_floats_is_float() -> None:
+    image, half = plane(0.1)
+    for its in (image, half):
+        its[:TILE] *= np.float32(1e-12)  # a shadow that counts beside lamps in view
+    assert [its.kind for its in encodings_of(image, half)] == [FLOAT, FLOAT]
+    assert encodings_of(np.zeros_like(image), np.zeros_like(half)) == (Encoding(HALF),) * 2
+
+
+@pytest.fixture
+def basis(make_basis: Any) -> lp.Basis:
+    """Noisy, clean, dim and black lights."""
+    planes = [plane(0.1), plane(0.05, seed=2), plane(0.0, seed=3), plane(0.1, light=1e-9)]
+    planes.append((np.zeros((*SIZE, 3), np.float32),) * 2)
+    images, halves = (np.stack(x) for x in zip(*planes, strict=True))
+    made: lp.Basis = make_basis(images=images, half_differences=halves)
+    return made
+
+
+def test_what_is_stored_comes_back(tmp_path: Path, basis: lp.Basis) -> None:
+    images, halves = basis.images.copy(), basis.half_differences.copy()
+    path = tmp_path / "a.basis.exr"
+    write_basis(path, basis)
+    back = read_basis(path)
+    stored = as_stored(basis)
+    for mine, its, before in (
+        (back.images, stored.images, images),
+        (back.half_differences, stored.half_differences, halves),
+    ):
+        assert mine.dtype == np.float32
+        assert mine.tobytes() == its.tobytes()
+        for one, other in zip(mine, before, strict=True):
+            # Next to zero, where noise makes light negative, steps are even: 2^-24.
+            np.testing.assert_allclose(one, other, rtol=2**-11, atol=6e-7 * other.max(initial=0))
+    parts = read_parts(path)
+    kinds = [[part.channels[c].dtype for c in ("R", "half_difference.R")] for part in parts[:5]]
+    assert kinds == [[HALF, HALF], [HALF, HALF], [FLOAT, HALF], [HALF, HALF], [HALF, HALF]]
+    assert [SCALE_KEY in part.attributes for part in parts[:5]] == [False] * 3 + [True, False]
+
+
+def test_a_file_is_half_as_long(tmp_path: Path, make_basis: Any) -> None:
+    noise = np.random.default_rng(0).uniform(0.5, 1, (2, 1, 300, 300, 3))
+    basis = make_basis(images=noise[0], half_differences=noise[1] / 10)
+    write_basis(tmp_path / "a.basis.exr", basis)
+    pixels = basis.images.nbytes  # of both sets, at two bytes each
+    assert (tmp_path / "a.basis.exr").stat().st_size < 1.02 * pixels
+
+
+@pytest.mark.parametrize("how", [{"literal": True}, {"transform": lp.ViewTransform("agx")}, {}])
+def test_weights_are_the_same_to_far_below_their_error(
+    tmp_path: Path, make_basis: Any, how: dict[str, Any]
+) -> None:
+    rng = np.random.default_rng(8)
+    made = [plane(0.02 * (1 + k), seed=k) for k in range(4)]
+    ramps = rng.uniform(0, 1, (4, SIZE[0], 1, 1)) ** 3
+    images, halves = (np.stack(x) * ramps for x in zip(*made, strict=True))
+    basis = make_basis(images=images, half_differences=halves)
+    painting = lp.Target.of(basis.mix(np.full((4, 3), 0.3)) + np.float32(0.02) * images[1])
+    expected = lp.solve(basis, painting, **how)
+    bars = lp.error_bars(expected)
+    assert bars is not None
+    write_basis(tmp_path / "a.basis.exr", basis)
+    back = read_basis(tmp_path / "a.basis.exr")
+    assert (back.images != basis.images).mean() > 0.5
+    found = lp.solve(back, painting, **how)
+    gap = np.abs(found.weights - expected.weights)
+    # HIDDEN of the noise of an image at most, and here its rounding is less: 2^-11 / 0.02.
+    assert (gap <= 0.05 * bars.standard_error).all()
+    again = lp.error_bars(found)
+    assert again is not None
+    np.testing.assert_allclose(again.standard_error, bars.standard_error, rtol=0.01)
+
+
+def test_a_file_of_the_format_before_is_read() -> None:
+    """It was written by the last version that stored all planes in float32."""
+    path = DATA / "format_1.basis.exr"
+    assert read_parts(path)[0].attributes[FORMAT_KEY] == "lightpaint-basis 1"
+    k = np.arange(2 * 4 * 5 * 3, dtype=np.float32).reshape(2, 4, 5, 3)
+    back = read_basis(path)
+    np.testing.assert_array_equal(back.images, np.float32(1) / (3 + k))
+    np.testing.assert_array_equal(np.abs(back.half_differences), np.float32(1) / (700 + k))
+    assert back.names == ("key", "Fülllicht")
+    assert back.lights[0].unit_flux == (1.5, 1.5, 1.5)
+    assert back.lights[1].members == ("a", "b")
+    assert back.origin.halves == (32, 32)
+    assert back.learned is not None
+    assert back.features is not None
+    assert back.objects is not None
+    assert back.objects.names == ("vase", "")
+
+
+@pytest.mark.parametrize(
+    "text", ["[1]", "[1, 0]", "[1, -2]", '[1, "2"]', "[1, 1e300]", "7", "{", "[true, 1]"]
+)
+def test_scales_that_are_none(tmp_path: Path, basis: lp.Basis, text: str) -> None:
+    path = tmp_path / "a.basis.exr"
+    write_basis(path, basis)
+    parts = read_parts(path)
+    parts[1].attributes[SCALE_KEY] = text  # type: ignore[index]
+    write_parts(path, parts)
+    with pytest.raises(BasisError, match=r"a\.basis\.exr is damaged as a basis"):
+        read_basis(path)
+
+
+def test_a_changed_scale_is_noticed(tmp_path: Path, basis: lp.Basis) -> None:
+    path = tmp_path / "a.basis.exr"
+    write_basis(path, basis)
+    parts = read_parts(path)
+    parts[0].attributes[SCALE_KEY] = "[2, 2]"  # type: ignore[index]
+    write_parts(path, parts)
+    with pytest.raises(BasisError, match="changed light"):
+        read_basis(path)
+
+
+class MadePlanes(RowPlanes):
+    """Noise that is made when it is asked for. bytes: of one plane."""
+
+    count, size = 60, (200, 250)
+    bytes = 200 * 250 * 3 * 4
+
+    def plane(self, i: int) -> Any:
+        return np.random.default_rng(i).random((*self.size, 3), np.float32)
+
+
+def test_writing_holds_one_light_at_a_time(tmp_path: Path, make_basis: Any) -> None:
+    planes: Any = MadePlanes()
+    basis = make_basis(images=np.ones((planes.count, 1, 1, 3)))
+    its = {name: getattr(basis, name) for name in ("lights", "origin")}
+    large = lp.Basis(
+        **its, planes=planes, noise=planes, emitters_seen=np.zeros(planes.size, dtype=bool)
+    )
+    tracemalloc.start()
+    write_basis(tmp_path / "a.basis.exr", large)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # Two planes, what is stored of them, and what is computed on the way; all are 120 of them.
+    assert peak < 10 * MadePlanes.bytes
+    back = read_basis(tmp_path / "a.basis.exr")
+    np.testing.assert_allclose(back.planes.plane(7), planes.plane(7), rtol=2**-11)
+    assert as_planes(back.planes).count == planes.count
