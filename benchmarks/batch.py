@@ -30,7 +30,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.run_options import How
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work.basis_parts import InParts
 from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.task import Task
@@ -120,7 +120,7 @@ def _own_peak_kb() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
-def errands(folder: Path, count: int) -> None:
+def items(folder: Path, count: int) -> None:
     """What the engine itself takes for errands that are nothing."""
     job = '{"folder": "", "settings": {"force": false}}'
     some = [Task(f"nothing {k}", "answer", job) for k in range(count)]
@@ -157,11 +157,11 @@ def looks(folder: Path, count: int, want: str, **how: Any) -> None:
         checked_s = time.perf_counter() - begun
 
         if address:  # workers begin with the first
-            assert not run_batch(planned.only("p000[01]"), How(**how)).failed
+            assert not run_batch(planned.select("p000[01]"), RunOptions(**how)).failed
             planned, count = plan(folder / "looks.toml", Path(place) / "out"), count - 2
 
         def work() -> None:
-            assert not run_batch(planned, How(**how)).failed
+            assert not run_batch(planned, RunOptions(**how)).failed
 
         spent = took(work, address)
         name = "a cluster of two" if address else f"{how.get('workers', 1)} processes"
@@ -196,10 +196,10 @@ def bases(folder: Path, spp: int) -> None:
     basis(InProcess(held, silent), WARM, folder / "warm")
     made: list[Basis] = []
     by = partial(basis, InProcess(held, silent), spp, folder / "alone")
-    alone = took(partial(_kept, made, by))
+    lock_folder = took(partial(_kept, made, by))
     (height, width), n = made[0].size, len(made[0].lights)
     print(f"basis of the gallery, {n} lights, {width}x{height}, {spp} samples per pixel:")
-    found = [("this process", alone)]
+    found = [("this process", lock_folder)]
     _tell(*found[-1])
     for workers in (1, 2):
         with cluster(workers, folder) as address, Cluster(address, silent) as engine:
@@ -209,7 +209,7 @@ def bases(folder: Path, spp: int) -> None:
             peak_mb = _peak_mb(address)
             _tell(*found[-1])
     one, two = found[1][1], found[2][1]
-    over = one.busiest_s / alone.busiest_s - 1, one.clock_s / alone.clock_s - 1
+    over = one.busiest_s / lock_folder.busiest_s - 1, one.clock_s / lock_folder.clock_s - 1
     print(f"    two workers take {two.busiest_s / one.busiest_s:.2f} of one, by the processor, ")
     print(f"    {two.clock_s / one.clock_s:.2f} on the clock; one takes {100 * over[0]:.1f} % more")
     print(f"    than this process, {100 * over[1]:.1f} % on the clock")
@@ -238,7 +238,7 @@ def _main() -> None:
                 with cluster(2, folder) as address:
                     looks(folder, given.looks, want, cluster=address)
         if given.spp:
-            errands(folder, 500)
+            items(folder, 500)
             bases(folder, given.spp)
 
 

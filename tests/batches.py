@@ -80,9 +80,9 @@ def run_all(manifest: str, folder: str, workers: int = 1) -> None:
     """Do what is left of a batch, as a process of its own may."""
     from lightpaint.batch.plan.planner import plan
     from lightpaint.batch.run import run_batch
-    from lightpaint.batch.run_options import How
+    from lightpaint.batch.run_options import RunOptions
 
-    run_batch(plan(manifest, folder), How(workers))
+    run_batch(plan(manifest, folder), RunOptions(workers))
 
 
 def processes() -> Any:

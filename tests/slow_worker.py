@@ -1,6 +1,6 @@
-"""Loaded by workers of a test cluster: lets tests stop them at an errand, and take their memory.
+"""Loaded by workers of a test cluster: lets tests stop them at a work item, and take their memory.
 
-A file `wait-NAME` in the folder LIGHTPAINT_TEST_SLOW holds whoever does that errand for as long as
+A file `wait-NAME` in the folder LIGHTPAINT_TEST_SLOW holds whoever does that item for as long as
 it is there; `memory-NAME` takes the memory of the first who comes.
 """
 
@@ -16,19 +16,19 @@ from lightpaint.batch.work import work
 LESSON = 2**12
 
 _FOLDER = Path(os.environ["LIGHTPAINT_TEST_SLOW"])
-_done = work._done
+_run = work._run
 
 
-def _slowly(errand: Any, *others: Any) -> Any:
+def _slowly(item: Any, *others: Any) -> Any:
     deadline_s = time.monotonic() + 120
-    while (_FOLDER / f"wait-{errand.name}").exists() and time.monotonic() < deadline_s:
+    while (_FOLDER / f"wait-{item.name}").exists() and time.monotonic() < deadline_s:
         time.sleep(0.02)
     try:
-        (_FOLDER / f"memory-{errand.name}").unlink()
+        (_FOLDER / f"memory-{item.name}").unlink()
     except FileNotFoundError:
-        return _done(errand, *others)
+        return _run(item, *others)
     raise MemoryError
 
 
-work._done = _slowly
+work._run = _slowly
 parts.LESSON = LESSON

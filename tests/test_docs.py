@@ -13,10 +13,10 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.basis.cache import LARGEST
-from lightpaint.batch.cluster.cluster import LEAST_S, PATIENCE
-from lightpaint.batch.manifest.checks import WANTED
-from lightpaint.batch.manifest.entries import MOST_LOOKS
-from lightpaint.batch.manifest.keys import MOST_FRAMES
+from lightpaint.batch.cluster.cluster import LIMIT_FACTOR, MIN_LIMIT_S
+from lightpaint.batch.manifest.checks import SOLVE_STEPS
+from lightpaint.batch.manifest.entries import MAX_LOOKS
+from lightpaint.batch.manifest.keys import MAX_FRAMES
 from lightpaint.cli.commands.rooms import template_lines
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
@@ -162,7 +162,7 @@ DEFAULTS = {
     "--port": f"{DEFAULT_PORT}, or any if that is taken",
     "--exposure": "0",
     "--space": "8 and 16 bits",
-    "--task-limit": f"{PATIENCE:g} times what it is expected to take, at least {LEAST_S:g}",
+    "--task-limit": f"{LIMIT_FACTOR:g} times what it is expected to take, at least {MIN_LIMIT_S:g}",
 }
 
 
@@ -286,10 +286,11 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
     def text(name: str) -> str:
         return " ".join((ROOT / "docs" / name).read_text().split())
 
-    assert f"by default {PATIENCE:g} times what is expected, and {LEAST_S:g} at least" in text(
-        "batch.md"
+    assert (
+        f"by default {LIMIT_FACTOR:g} times what is expected, and {MIN_LIMIT_S:g} at least"
+        in text("batch.md")
     )
-    *most, last = (f"`{step}`" for step in WANTED)
+    *most, last = (f"`{step}`" for step in SOLVE_STEPS)
     assert f"by default {', '.join(most)} and {last}" in text("batch.md")
     assert f"chooses the port ({DEFAULT_PORT}, or any if that is taken)" in text("painter.md")
     assert f"Of such connections {MAX_UNAUTHENTICATED} may be open" in text("painter.md")
@@ -300,7 +301,7 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
         f"at most {MAX_PAGES} tabs at a time",
         f"{MAX_UNAUTHENTICATED} connections that have not shown its key",
         f"{MAX_QUEUED} messages or {MAX_QUEUED_BYTES // 2**20} MiB of a page",
-        f"A batch has {MOST_LOOKS:,} looks, beside {MOST_FRAMES:,} frames",
+        f"A batch has {MAX_LOOKS:,} looks, beside {MAX_FRAMES:,} frames",
         f"a name has {MAX_NAME} characters",
     ):
         assert said in limits

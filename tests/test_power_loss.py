@@ -87,7 +87,7 @@ def test_so_is_a_journal_that_is_settled(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     for look in ("a", "b"):
         journal.add(JournalLine(look, "answer", "done", "0f"))
-    journal.settle([("b", "answer")])
+    journal.rewrite([("b", "answer")])
     assert [*Journal(tmp_path).lines] == [("b", "answer")]
 
 

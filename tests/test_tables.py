@@ -10,7 +10,7 @@ import pytest
 from batches import small_basis
 
 import lightpaint as lp
-from lightpaint.batch.gallery.summary import LightRow, Row, summary_csv
+from lightpaint.batch.gallery.summary import LightRow, SummaryRow, summary_csv
 from lightpaint.colour.color import luminance
 
 
@@ -73,7 +73,7 @@ def test_a_summary_has_rgb_and_kelvin_of_each_light() -> None:
         LightRow("key", 2.0, (3.0, 2.0, 1.0), "#ffcc99", 3200.4),
         LightRow("=fill", 0.0, (0.0, 0.0, 0.0)),
     )
-    row = Row("evening", "done", "", "evening", lights=lights)
+    row = SummaryRow("evening", "done", "", "evening", lights=lights)
     other = replace(row, look="other", lights=lights[:1])
     [first, second] = csv.DictReader(io.StringIO(summary_csv([row, other])))
     assert (first["key"], first["key R"], first["key G"], first["key B"]) == ("2", "3", "2", "1")

@@ -1,4 +1,4 @@
-"""One batch at a time in a folder."""
+"""A lock on a batch's folder: one batch at a time."""
 
 import fcntl
 import os
@@ -10,10 +10,10 @@ from lightpaint.errors import OutputError
 
 
 @contextmanager
-def alone(folder: Path, *, may_share: bool) -> Iterator[None]:
-    """Raise OutputError where another batch is at work in `folder`.
+def lock_folder(folder: Path, *, shared: bool) -> Iterator[None]:
+    """Lock `folder`. Raises OutputError where another batch works in it.
 
-    may_share: whether others that may, too, are let work there.
+    shared: whether other batches with a shared lock may work there at the same time.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -23,7 +23,7 @@ def alone(folder: Path, *, may_share: bool) -> Iterator[None]:
     try:
         with suppress(PermissionError):
             try:
-                kind = fcntl.LOCK_SH if may_share else fcntl.LOCK_EX
+                kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
                 fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise OutputError(

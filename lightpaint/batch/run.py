@@ -1,4 +1,4 @@
-"""Doing a plan: bases first, then the looks that share each, then final renders."""
+"""A run of a plan: bases first, then the looks that share each, then final renders."""
 
 import tempfile
 import time
@@ -12,22 +12,22 @@ from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import write_basis
 from lightpaint.batch.cluster.cluster import Cluster
-from lightpaint.batch.folder_lock import alone
+from lightpaint.batch.folder_lock import lock_folder
 from lightpaint.batch.gallery.gallery import write_gallery
-from lightpaint.batch.gallery.small_planes import keep_all_planes
+from lightpaint.batch.gallery.small_planes import write_task_planes
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
-from lightpaint.batch.plan.cost_estimate import look_s
+from lightpaint.batch.plan.cost_estimate import look_seconds
 from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
-from lightpaint.batch.run_options import BatchOutcome, How
-from lightpaint.batch.work.basis_parts import InParts
-from lightpaint.batch.work.distributed_render import rendered_by
-from lightpaint.batch.work.distributed_sums import solved_by_sums
+from lightpaint.batch.run_options import BatchOutcome, RunOptions
+from lightpaint.batch.work.basis_parts import PartwiseRender
+from lightpaint.batch.work.distributed_render import distributed_renderer
+from lightpaint.batch.work.distributed_sums import solve_by_sums
 from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.processes import Processes
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import attempted, fields_of, final_render, is_full
-from lightpaint.batch.work.work_items import Done, SceneFilm
+from lightpaint.batch.work.work import attempt, final_render, is_disk_full, job_fields
+from lightpaint.batch.work.work_items import ItemResult, SceneFilm
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
 from lightpaint.pipeline.pipeline import obtain
@@ -39,66 +39,66 @@ from lightpaint.scene.presets import on_film, samples
 
 def run_batch(
     plan: Plan,
-    how: How | None = None,
+    options: RunOptions | None = None,
     progress: Progress = silent,
     *,
-    told: Callable[[PlannedLook, Done], None] | None = None,
+    on_step: Callable[[PlannedLook, ItemResult], None] | None = None,
 ) -> BatchOutcome:
-    """Do what is left of `plan`. What is done is on the disk, and is not done again.
+    """Do what is left of `plan`. Results are written at once, and are not computed again.
 
     Args:
         plan: As `plan` made it.
-        how: Workers, and what a failure stops.
-        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
-        told: Hears of each step that was done or failed.
+        options: Workers, and what a failure stops.
+        progress: Receives progress and, if it is a `Listener`, remarks.
+        on_step: Called after each step that was done or failed.
 
     Raises:
-        OutputError: Where the disk is full, or another batch is at work in the folder.
-        Interrupted: For Ctrl-C; the same call goes on from there.
+        OutputError: Where the disk is full, or another batch works in the folder.
+        Interrupted: For Ctrl-C; the same call continues from there.
     """
-    how = how or How()
-    with alone(plan.folder, may_share=how.apart), ExitStack() as stack:
-        if not how.apart:
+    options = options or RunOptions()
+    with lock_folder(plan.folder, shared=options.apart), ExitStack() as stack:
+        if not options.apart:
             for place in (plan.folder, plan.folder / THUMBNAILS):
                 sweep(place)
-        run = _Run(plan, how, listener(progress), told or (lambda look, done: None))
+        run = _Run(plan, options, listener(progress), on_step or (lambda look, done: None))
         try:
-            run.all(stack)
+            run.run_all(stack)
         except KeyboardInterrupt:
             left = len(run.outcome.waiting)
             raise Interrupted(f"{left} looks are left; the same command goes on") from None
         finally:
             with suppress(LightpaintError):
-                if not how.apart:
-                    run.journal.settle(plan.steps)
-        if how.apart:
+                if not options.apart:
+                    run.journal.rewrite(plan.steps)
+        if options.apart:
             return run.outcome
         run.outcome.rows = write_gallery(plan.folder, plan, run.journal.lines)
         return run.outcome
 
 
 class _Run:
-    """One run of a plan."""
+    """A run of one plan."""
 
     def __init__(
         self,
         plan: Plan,
-        how: How,
+        options: RunOptions,
         listen: Listener,
-        told: Callable[[PlannedLook, Done], None],
+        on_step: Callable[[PlannedLook, ItemResult], None],
     ) -> None:
-        self.journal = Journal(plan.folder, "/".join(sorted(plan.chosen)) if how.apart else "")
+        self.journal = Journal(plan.folder, "/".join(sorted(plan.chosen)) if options.apart else "")
         self.outcome = BatchOutcome()
-        self._plan, self._how, self._listen, self._told = plan, how, listen, told
+        self._plan, self._options, self._listen, self._on_step = plan, options, listen, on_step
         self._looks = {look.entry.name: look for look in plan.looks}
-        self._held = plan.held
+        self._cache = plan.cache
         self._tries: dict[tuple[str, str], int] = {}
-        self._engine: Engine = InProcess(self._held, self._listen)
-        self._begun_s = time.monotonic()
+        self._engine: Engine = InProcess(self._cache, self._listen)
+        self._start_s = time.monotonic()
         self._finished = 0
 
-    def all(self, stack: ExitStack) -> None:
-        """Every step that is left, in an order in which each has what it needs."""
+    def run_all(self, stack: ExitStack) -> None:
+        """Run every remaining step, in an order in which each has its inputs."""
         for look in self._plan.chosen_looks:
             if look.failure:
                 self._fail(look, look.steps[0], look.failure)
@@ -113,33 +113,38 @@ class _Run:
         ]
         self._total = len(left)
         self._listen("steps", 0, self._total, "steps")
-        self._engine = self._begun(stack)
+        self._engine = self._start_engine(stack)
         answers = [step for step in left if step.task.kind == "answer"]
         by_sums = [x for x in answers if x.task.is_by_sums and not self._has_basis(x.task)]
         answers = [step for step in answers if step not in by_sums]
         for keys in dict.fromkeys(step.task.bases for step in by_sums):
-            self._by_sums([step for step in by_sums if step.task.bases == keys])
+            self._solve_by_sums([step for step in by_sums if step.task.bases == keys])
         for together in by_bases(answers, self._looks):
-            self._of_bases(together)
-        self._held.only(())
+            self._run_with_bases(together)
+        self._cache.keep_only(())
         for kind in ("render", "export"):
-            self._together([x for x in left if x.task.kind == kind])
+            self._run_steps([x for x in left if x.task.kind == kind])
 
-    def _begun(self, stack: ExitStack) -> Engine:
-        """Who does the work, until `stack` is closed."""
-        how = self._how
-        if how.cluster is not None:
+    def _start_engine(self, stack: ExitStack) -> Engine:
+        """Return the engine that does the work, until `stack` is closed."""
+        options = self._options
+        if options.cluster is not None:
             cluster = Cluster(
-                how.cluster, self._listen, is_shared=how.shared_fs, limit_s=how.task_limit_s
+                options.cluster,
+                self._listen,
+                is_shared=options.shared_fs,
+                limit_s=options.task_limit_s,
             )
             return stack.enter_context(cluster)
-        if how.workers > 1:
-            return stack.enter_context(Processes(how.workers, self._listen))
+        if options.workers > 1:
+            return stack.enter_context(Processes(options.workers, self._listen))
         return self._engine
 
     def _has_basis(self, task: Task) -> bool:
-        """Whether the basis of a task is saved or kept, so that nothing is to be rendered."""
-        fields = fields_of(task, self._held)
+        """Return whether the basis of a task is saved or cached, so that nothing is to be
+        rendered.
+        """
+        fields = job_fields(task, self._cache)
         if fields["basis"] is not None:
             return True
         settings: Settings = fields["settings"]
@@ -151,73 +156,77 @@ class _Run:
         exact = settings.exact_spp or not settings.use_cache
         return not exact and kept >= (film.spp if asked is None else asked)
 
-    def _by_sums(self, steps: Sequence[PlanStep]) -> None:
-        """Looks that share a basis which nobody is to have."""
+    def _solve_by_sums(self, steps: Sequence[PlanStep]) -> None:
+        """Solve looks that share a basis which nobody keeps."""
         by_look = {step.task.look: step for step in steps if self._can_begin(step)}
         tasks = [step.task for step in by_look.values()]
         if self._is_stopped():
             return
-        for done in solved_by_sums(tasks, self._engine, self._held, self._listen):
-            if done.is_full:
+        for done in solve_by_sums(tasks, self._engine, self._cache, self._listen):
+            if done.is_disk_full:
                 raise OutputError(f"{done.failure}: make room; the same command goes on")
             self._record(by_look[done.look], done)
 
-    def _of_bases(self, steps: Sequence[PlanStep]) -> None:
-        """Looks that share their bases; those that are made of others come after them."""
+    def _run_with_bases(self, steps: Sequence[PlanStep]) -> None:
+        """Run looks that share their bases; those combined from others come after them."""
         task = steps[0].task
-        self._held.only(task.bases)
+        self._cache.keep_only(task.bases)
         with ExitStack() as stack:
             files = task.files
             try:
-                obtained = self._obtained(task)
+                obtained = self._obtain_bases(task)
                 if not all(step.task.is_by_sums for step in steps):
-                    keep_all_planes(self._plan.folder, task, obtained, self._held)
+                    write_task_planes(self._plan.folder, task, obtained, self._cache)
                 if self._engine.is_apart:
                     # Workers read what this process rendered, and is done with.
-                    files = _saved(obtained, stack) if obtained else files
-                    self._held.only(())
+                    files = _save_bases(obtained, stack) if obtained else files
+                    self._cache.keep_only(())
             except LightpaintError as error:
-                if is_full(error):
+                if is_disk_full(error):
                     raise
                 for step in steps:
                     self._fail(self._looks[step.task.look], step, str(error))
                 return
             for wave in waves(steps, self._looks):
                 given = [replace(step, task=replace(step.task, files=files)) for step in wave]
-                self._together(given)
+                self._run_steps(given)
                 if self._is_stopped():
                     return
 
-    def _obtained(self, task: Task) -> list[Basis]:
-        """The bases of a task that are no files already: kept or rendered, once for all looks."""
-        fields = fields_of(task, self._held)
+    def _obtain_bases(self, task: Task) -> list[Basis]:
+        """Return the bases of a task that are no files already: cached or rendered, once for all
+        looks.
+        """
+        fields = job_fields(task, self._cache)
         if fields["basis"] is not None:
             return []
         settings: Settings = fields["settings"]
         bases = []
         for key, scene in zip(task.bases, fields["scenes"], strict=True):
             film = on_film(scene.content, settings.quality, settings.resolution)
-            basis = self._held.basis(key)
+            basis = self._cache.basis(key)
             if basis is None:
-                its = SceneFilm(scene, settings.quality, settings.resolution, _files(scene))
-                render = InParts(self._engine, its)
+                its = SceneFilm(scene, settings.quality, settings.resolution, _scene_files(scene))
+                render = PartwiseRender(self._engine, its)
                 basis = obtain(film, settings, self._listen, render=render)
-                self._held.hold(key, basis)
+                self._cache.put(key, basis)
             bases.append(basis)
         return bases
 
-    def _together(self, steps: Sequence[PlanStep]) -> None:
-        """Steps that do not wait for each other, and again those that failed and may be tried."""
+    def _run_steps(self, steps: Sequence[PlanStep]) -> None:
+        """Run steps that do not wait for each other, and retry those that failed and may be
+        retried.
+        """
         by_look = {step.task.look: step for step in steps}
         waiting = [step for step in steps if self._can_begin(step)]
         while waiting and not self._is_stopped():
             again = []
-            tasks = [self._expecting(step.task) for step in waiting]
-            for done in _closing(self._done(tasks)):
+            tasks = [self._with_expected_time(step.task) for step in waiting]
+            for done in _close_after(self._results(tasks)):
                 step = by_look[done.look]
-                if done.is_full:
+                if done.is_disk_full:
                     raise OutputError(f"{done.failure}: make room; the same command goes on")
-                if done.failure and self._may_try_again(done):
+                if done.failure and self._may_retry(done):
                     self._listen.say(f"{done.look}: {done.failure}; trying again")
                     again.append(step)
                     continue
@@ -226,41 +235,41 @@ class _Run:
                     return
             waiting = again
 
-    def _expecting(self, task: Task) -> Task:
-        """The task, which knows roughly how long it takes on one thread."""
+    def _with_expected_time(self, task: Task) -> Task:
+        """Return the task with a rough estimate of its time on one thread."""
         settings = self._looks[task.look].entry.settings
         times = 2 * (1 + settings.refine + 4 * bool(settings.suggest))
-        return replace(task, expected_s=times * look_s(self._looks[task.look], self._plan))
+        return replace(task, expected_s=times * look_seconds(self._looks[task.look], self._plan))
 
-    def _done(self, tasks: Sequence[Task]) -> Iterator[Done]:
-        """What comes of each; of few final renders each is done by all workers."""
+    def _results(self, tasks: Sequence[Task]) -> Iterator[ItemResult]:
+        """Yield the results of tasks; of few final renders each is done by all workers."""
         if tasks[0].kind == "export":  # texts, of files that are here: none is worth sending
-            yield from InProcess(self._held, self._listen).run(tasks)
+            yield from InProcess(self._cache, self._listen).run(tasks)
             return
         are_few = len(tasks) < self._engine.workers and self._engine.is_apart
         if not (are_few and tasks[0].kind == "render"):
             yield from self._engine.run(tasks)
             return
         for task in tasks:
-            variant = fields_of(task, self._held)["scenes"][0].variant
-            by_all = rendered_by(self._engine, task, variant, self._listen)
-            yield attempted(task, partial(final_render, task, self._held, self._listen, by_all))
+            variant = job_fields(task, self._cache)["scenes"][0].variant
+            by_all = distributed_renderer(self._engine, task, variant, self._listen)
+            yield attempt(task, partial(final_render, task, self._cache, self._listen, by_all))
 
     def _can_begin(self, step: PlanStep) -> bool:
-        """Whether the look has not failed by now, nor what it is made of."""
+        """Return whether neither the look nor any that it combines has failed by now."""
         look = self._looks[step.task.look]
         gone = [name for name in look.entry.of if name in self.outcome.failed]
         if gone:
             self._fail(look, step, f"it is made of {gone[0]}, which failed")
         return look.entry.name not in self.outcome.failed
 
-    def _may_try_again(self, done: Done) -> bool:
+    def _may_retry(self, done: ItemResult) -> bool:
         key = (done.look, done.kind)
         self._tries[key] = self._tries.get(key, 0) + 1
-        return self._tries[key] <= self._how.retry
+        return self._tries[key] <= self._options.retry
 
-    def _record(self, step: PlanStep, done: Done) -> None:
-        """Keep what came of a step, and tell it."""
+    def _record(self, step: PlanStep, done: ItemResult) -> None:
+        """Record the result of a step, and report it."""
         look = self._looks[done.look]
         if done.failure:
             self._fail(look, step, done.failure, done)
@@ -270,10 +279,12 @@ class _Run:
                 self.outcome.done.append(done.look)
                 self.outcome.waiting.remove(done.look)
             self._finished += 1
-            self._told(look, replace(done, left_s=self._left_s))
+            self._on_step(look, replace(done, left_s=self._seconds_left))
         self._listen("steps", self._finished, self._total, "steps")
 
-    def _fail(self, look: PlannedLook, step: PlanStep, why: str, done: Done | None = None) -> None:
+    def _fail(
+        self, look: PlannedLook, step: PlanStep, why: str, done: ItemResult | None = None
+    ) -> None:
         if self._engine.is_gone:
             raise BatchError(why)
         name = look.entry.name
@@ -283,27 +294,27 @@ class _Run:
         if name in self.outcome.waiting:
             self.outcome.waiting.remove(name)
         self.journal.add(JournalLine(name, step.task.kind, "failed", step.made_of, why))
-        self._told(look, done or Done(name, step.task.kind, why))
+        self._on_step(look, done or ItemResult(name, step.task.kind, why))
 
     def _is_stopped(self) -> bool:
-        return bool(self.outcome.failed) and not self._how.keep_going
+        return bool(self.outcome.failed) and not self._options.keep_going
 
     @property
-    def _left_s(self) -> float | None:
-        """Seconds that are left, if steps go on as they did; None before the first."""
+    def _seconds_left(self) -> float | None:
+        """Seconds that are left, at the pace of the steps so far; None before the first."""
         if not self._finished:
             return None
-        spent_s = time.monotonic() - self._begun_s
+        spent_s = time.monotonic() - self._start_s
         return spent_s / self._finished * (self._total - self._finished)
 
 
-def _files(scene: SceneFile) -> tuple[str, ...]:
-    """All that it is made of."""
+def _scene_files(scene: SceneFile) -> tuple[str, ...]:
+    """Return all files of a scene."""
     return tuple(map(str, scene.content.read_files))
 
 
-def _saved(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
-    """Files with these bases, as long as `stack` is open."""
+def _save_bases(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
+    """Save these bases to files, as long as `stack` is open."""
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lightpaint-")))
     files = [folder / f"{k}.basis.exr" for k in range(len(bases))]
     for file, basis in zip(files, bases, strict=True):
@@ -311,8 +322,8 @@ def _saved(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
     return tuple(map(str, files))
 
 
-def _closing(done: Iterator[Done]) -> Iterator[Done]:
-    """`done`, which is ended with whoever stops asking."""
+def _close_after(done: Iterator[ItemResult]) -> Iterator[ItemResult]:
+    """Yield results, and close the iterator when the caller stops."""
     try:
         yield from done
     finally:

@@ -1,19 +1,19 @@
-"""How a batch is done, and what it came to."""
+"""Options and outcome of a batch run."""
 
 from dataclasses import dataclass, field
 
-from lightpaint.batch.gallery.summary import Row
+from lightpaint.batch.gallery.summary import SummaryRow
 
 
 @dataclass(frozen=True)
-class How:
-    """How a plan is done.
+class RunOptions:
+    """Options of a run.
 
-    workers: processes; 1 for none beside this. keep_going: whether what fails stops nothing else.
-    retry: how often a step that failed is tried again. apart: whether others do the other looks of
-    the plan at the same time, in the same folder; the gallery is left to who comes last.
+    workers: processes; 1 for none beside this one. keep_going: whether a failure stops nothing
+    else. retry: how often a failed step is tried again. apart: whether other processes do the other
+    looks of the plan at the same time, in the same folder; the last one writes the gallery.
     cluster: address of a Dask scheduler whose workers do the work. shared_fs: whether they see the
-    same files under the same paths. task_limit_s: seconds after which one of them counts as hung.
+    same files under the same paths. task_limit_s: seconds after which a worker counts as hung.
     """
 
     workers: int = 1
@@ -27,13 +27,13 @@ class How:
 
 @dataclass
 class BatchOutcome:
-    """What a run came to. done, failed: names of looks, and why. skipped: done earlier.
+    """Outcome of a run. done, failed: names of looks, and reasons. skipped: done earlier.
 
-    waiting: what was not come to. rows: of all looks, as the summary has them.
+    waiting: not started. rows: of all looks, as in the summary.
     """
 
     done: list[str] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
     waiting: list[str] = field(default_factory=list)
-    rows: list[Row] = field(default_factory=list)
+    rows: list[SummaryRow] = field(default_factory=list)

@@ -6,17 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.batch.gallery.gallery import check_gallery, spoken_counts
-from lightpaint.batch.gallery.solve_gallery import entry_of, write_gallery_of
+from lightpaint.batch.gallery.gallery import check_gallery, counts_text
+from lightpaint.batch.gallery.solve_gallery import entry_of, write_solve_gallery
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
 from lightpaint.batch.work.derived_looks import (
-    leave_shifted,
     shifted_folders,
-    sibling_folder,
-    siblings,
+    variation_folder,
+    variation_jobs,
+    write_shifted,
 )
-from lightpaint.batch.work.work import is_full
+from lightpaint.batch.work.work import is_disk_full
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
 from lightpaint.errors import ALONE, OutputError
@@ -48,7 +48,7 @@ class Several:
         """Make the variations of an answer that are made of it."""
         self._enter(job)
         for word, place in self.made.get(job.folder, {}).items():
-            leave_shifted(job, word, place, lighting, bases)
+            write_shifted(job, word, place, lighting, bases)
             self.entries.append(entry_of(job, place.folder, word))
             files = [file for file in place.files if file.is_file()]
             about = {"variation": word, "of": str(job.folder)}
@@ -56,7 +56,7 @@ class Several:
 
     def goes_on(self, job: Job, error: Exception) -> bool:
         """Whether the others are solved all the same."""
-        if not self.keep_going or is_full(error):
+        if not self.keep_going or is_disk_full(error):
             return False
         self._enter(job)
         self.failed[job.folder.name] = str(error)
@@ -70,8 +70,8 @@ class Several:
             return
         named = {entry.name for entry in self.entries}
         lost = [LookEntry(name, "") for name in self.failed if name not in named]
-        rows = write_gallery_of(self.together, [*self.entries, *lost], self.failed, bases)
-        terminal.write(f"{self.together / FILES[0]}: {spoken_counts(rows)}")
+        rows = write_solve_gallery(self.together, [*self.entries, *lost], self.failed, bases)
+        terminal.write(f"{self.together / FILES[0]}: {counts_text(rows)}")
 
     def _enter(self, job: Job) -> None:
         if all(entry.name != job.folder.name for entry in self.entries):
@@ -98,7 +98,7 @@ def several_of(
     made: dict[Path, Mapping[str, ResultFolder]] = {}
     for job in jobs:
         try:
-            anew, places = siblings(job, words), shifted_folders(job, words)
+            anew, places = variation_jobs(job, words), shifted_folders(job, words)
         except ALONE as error:
             if not keep_going:
                 raise
@@ -113,7 +113,7 @@ def several_of(
 
 def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
     """Raise OutputError where a variation would go to the folder of another painting."""
-    for folder in (sibling_folder(x, word) for x in folders for word in words):
+    for folder in (variation_folder(x, word) for x in folders for word in words):
         if folder in folders:
             raise OutputError(
                 f"a variation and a painting would both go to {folder}: solve them apart, each "

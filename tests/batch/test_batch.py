@@ -19,16 +19,16 @@ from command import run, succeed
 
 from lightpaint.batch import run as run_module
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
-from lightpaint.batch.gallery.summary import LightRow, Row
+from lightpaint.batch.gallery.summary import LightRow, SummaryRow
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.run_options import How
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work import engine as engines
 from lightpaint.batch.work import work
 from lightpaint.batch.work.processes import Processes
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import Done
+from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -50,8 +50,8 @@ def here(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def do(here: Path, **how: Any) -> Any:
-    return run_batch(plan(here / "looks.toml", here / "out"), How(**how))
+def run_item(here: Path, **how: Any) -> Any:
+    return run_batch(plan(here / "looks.toml", here / "out"), RunOptions(**how))
 
 
 def test_every_look_is_what_solve_makes_of_it(
@@ -91,22 +91,24 @@ def test_a_sequence_begins_and_ends_with_its_looks(
 
 
 def test_a_second_run_does_nothing_and_a_change_only_what_hangs_on_it(here: Path) -> None:
-    assert do(here).done == [x for x in NAMES if not do_last(x)] + [x for x in NAMES if do_last(x)]
+    assert run_item(here).done == [x for x in NAMES if not do_last(x)] + [
+        x for x in NAMES if do_last(x)
+    ]
     before = contents(here / "out")
-    outcome = do(here)
+    outcome = run_item(here)
     assert (outcome.done, sorted(outcome.skipped)) == ([], sorted(NAMES))
     assert contents(here / "out") == before
     # Another painting under the same name.
     write_rgb(here / "p1.exr", 0.5 * small_basis().images.sum(axis=0))
-    outcome = do(here)
+    outcome = run_item(here)
     assert sorted(outcome.done) == ["p1", "p1-warmer", "p1-white-only"]
     # A result that is lost, and what is made of it stays: it would come out the same.
     (here / "out" / "third" / "predicted.exr").unlink()
-    assert do(here).done == ["third"]
+    assert run_item(here).done == ["third"]
     # And one that is asked for otherwise.
     text = LOOKS.replace('painting = "p2.exr"', 'painting = "p2.exr"\nsettings = { hold = 0.1 }')
     (here / "looks.toml").write_text(text, encoding="utf-8")
-    assert sorted(do(here).done) == ["dusk-0", "dusk-1", "dusk-2", "third"]
+    assert sorted(run_item(here).done) == ["dusk-0", "dusk-1", "dusk-2", "third"]
 
 
 def do_last(name: str) -> bool:
@@ -115,10 +117,10 @@ def do_last(name: str) -> bool:
 
 
 def test_a_project_that_was_moved_is_done_still(here: Path) -> None:
-    do(here)
+    run_item(here)
     moved = here.parent / f"{here.name}-moved"
     here.rename(moved)
-    assert do(moved).done == []
+    assert run_item(moved).done == []
 
 
 def test_a_damaged_journal_is_said_and_its_look_done_again(here: Path) -> None:
@@ -141,13 +143,13 @@ def test_a_damaged_journal_is_said_and_its_look_done_again(here: Path) -> None:
 
 
 def test_only_some(here: Path) -> None:
-    some = plan(here / "looks.toml", here / "out").only("dusk-1")
+    some = plan(here / "looks.toml", here / "out").select("dusk-1")
     outcome = run_batch(some)
     assert outcome.done == ["p0", "third", "dusk-1"]
     assert [row.state for row in outcome.rows].count("waiting") == 7
-    assert len(do(here).done) == 7
+    assert len(run_item(here).done) == 7
     with pytest.raises(BatchError, match="no look matches"):
-        some.only("x*")
+        some.select("x*")
 
 
 def test_one_bad_painting_fails_alone(here: Path) -> None:
@@ -176,9 +178,9 @@ def test_one_bad_painting_fails_alone(here: Path) -> None:
 
 
 def test_what_was_changed_by_hand_is_kept(here: Path) -> None:
-    do(here)
+    run_item(here)
     (here / "out" / "p0" / "lighting.json").write_text("mine", encoding="utf-8")
-    outcome = do(here)
+    outcome = run_item(here)
     assert "was changed since lightpaint wrote it" in outcome.failed["p0"]
     assert (here / "out" / "p0" / "lighting.json").read_text() == "mine"
     assert run(here, "batch", "looks.toml", "-o", "out", "--force", "-q").returncode == 0
@@ -206,11 +208,11 @@ def test_what_fails_is_tried_again_as_often_as_is_asked(
         answer(task, *others)
 
     monkeypatch.setattr(work, "_answer", sometimes)
-    outcome = do(here, retry=1)
+    outcome = run_item(here, retry=1)
     assert outcome.failed["p1"] == "RuntimeError: a library's"
     assert outcome.failed["p1-warmer"] == "it is made of p1, which failed"
     assert tries.count("p1") == 2
-    assert sorted(do(here, retry=1).done) == ["p1", "p1-warmer"]
+    assert sorted(run_item(here, retry=1).done) == ["p1", "p1-warmer"]
 
 
 def test_a_full_disk_stops_with_one_line_and_goes_on_after(
@@ -265,14 +267,14 @@ def test_a_disk_that_is_really_full(here: Path) -> None:
 def test_an_interrupt_says_how_to_go_on(
     here: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: tuple[Path, dict[str, bytes]]
 ) -> None:
-    def interrupted(*_: Any) -> Done:
+    def interrupted(*_: Any) -> ItemResult:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(engines, "do", interrupted)
+        patch.setattr(engines, "run_item", interrupted)
         with pytest.raises(Interrupted, match="10 looks are left; the same command goes on"):
-            do(here)
-    do(here)
+            run_item(here)
+    run_item(here)
     assert contents(here / "out") == undisturbed[1]
 
 
@@ -280,21 +282,21 @@ def test_workers_that_are_all_gone_are_no_look_s_failure(
     here: Path, undisturbed: tuple[Path, dict[str, bytes]]
 ) -> None:
     class Gone(engines.InProcess):
-        def run(self, errands: Any) -> Any:
-            yield engines.do(errands[0], self._held, self._listen)
+        def run(self, items: Any) -> Any:
+            yield engines.run_item(items[0], self._cache, self._listen)
             self.is_gone = True
-            yield Done(errands[1].name, errands[1].kind, "the scheduler is gone")
+            yield ItemResult(items[1].name, items[1].kind, "the scheduler is gone")
 
     def begun(run: Any, _: Any) -> Any:
-        return Gone(run._held, run._listen)
+        return Gone(run._cache, run._listen)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_module._Run, "_begun", begun)
+        patch.setattr(run_module._Run, "_start_engine", begun)
         with pytest.raises(BatchError, match="the scheduler is gone"):
-            do(here)
+            run_item(here)
     [line] = (here / "out" / "journal.jsonl").read_text().splitlines()
     assert json.loads(line)["state"] == "done"
-    do(here)
+    run_item(here)
     assert contents(here / "out") == undisturbed[1]
 
 
@@ -306,7 +308,7 @@ def test_two_batches_do_not_work_in_one_folder(here: Path) -> None:
             run_batch(planned)
         told.append(1)
 
-    run_batch(planned.only("p0"), told=other)
+    run_batch(planned.select("p0"), on_step=other)
     assert told == [1]
 
 
@@ -351,7 +353,7 @@ def test_workers_make_the_same_and_one_that_dies_costs_nothing(
     hears = _AtWork()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Processes, "__enter__", lambda it: started.append(it) or begin(it))
-        outcome = run_batch(planned, How(workers=2), hears, told=told)
+        outcome = run_batch(planned, RunOptions(workers=2), hears, on_step=told)
     assert died
     assert hears.workers == {"worker 1": None, "worker 2": None}
     assert {f"{name}: answer" for name in outcome.done} <= hears.done
@@ -418,7 +420,7 @@ def test_the_page_holds_all_and_loads_nothing(
 def test_a_page_of_a_thousand_looks_with_names_that_mean_mischief(tmp_path: Path) -> None:
     bad = "</script><img src=x onerror=alert(1)>\u202e$title"
     lights = tuple(LightRow(f"{bad}{k}", 1.0, hex="#ffffff") for k in range(12))
-    rows = [Row(f"{bad}{k}", "failed", bad, f"look {k}", lights=lights) for k in range(1000)]
+    rows = [SummaryRow(f"{bad}{k}", "failed", bad, f"look {k}", lights=lights) for k in range(1000)]
     text = gallery_page(tmp_path, bad, rows)
     assert text.count("</script>") == 3
     assert "<img src=x" not in text
@@ -446,25 +448,25 @@ def test_a_first_manifest_is_one_that_can_be_run(here: Path) -> None:
 
 
 def test_without_anybody_listening(here: Path) -> None:
-    assert run_batch(plan(here / "looks.toml", here / "out").only("third"), None, silent).done
+    assert run_batch(plan(here / "looks.toml", here / "out").select("third"), None, silent).done
 
 
 @pytest.mark.parametrize("damage", [b"", b"junk", None])
 def test_small_pictures_that_are_damaged_are_made_again(here: Path, damage: bytes | None) -> None:
-    do(here)
+    run_item(here)
     pictures = sorted((here / "out" / "thumbnails").glob("*.jpg"))
     before = {path: path.read_bytes() for path in pictures}
     assert pictures
     first = pictures[0]
     first.write_bytes(before[first][: len(before[first]) // 2] if damage is None else damage)
-    do(here)
+    run_item(here)
     assert {path: path.read_bytes() for path in pictures} == before
 
 
 @pytest.mark.parametrize("told", ['{"lights": 3}', '{"lights": [1]}', '{"lights": []}', "junk"])
 def test_planes_that_are_damaged_cost_no_gallery(here: Path, told: str) -> None:
-    do(here)
+    run_item(here)
     for path in (here / "out" / "thumbnails").glob("*.planes.json"):
         path.write_text(told)
-    do(here)
+    run_item(here)
     assert (here / "out" / "index.html").is_file()

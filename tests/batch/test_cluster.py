@@ -25,7 +25,7 @@ from lightpaint.basis.render import parts as parts_module
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.run_options import BatchOutcome, How
+from lightpaint.batch.run_options import BatchOutcome, RunOptions
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene import scene_render as render_module
 from lightpaint.scene.runtime.kernel_threads import limit_threads
@@ -179,15 +179,15 @@ class Hears:
 
     @property
     def begun(self) -> Counter[str]:
-        """How often each errand was begun."""
+        """How often each item was begun."""
         return Counter(text.split(" begun by ")[0] for text in self.said if " begun by " in text)
 
 
-def do(here: Path, name: str, workers: Workers, hears: Hears, **how: Any) -> BatchOutcome:
+def run_item(here: Path, name: str, workers: Workers, hears: Hears, **how: Any) -> BatchOutcome:
     with pytest.MonkeyPatch.context() as patch:
         in_small_parts(patch, here / f"cache-{name}")
         planned = plan(here / "looks.toml", here / name)
-        outcome = run_batch(planned, How(cluster=workers.address, **how), hears)  # type: ignore[arg-type]
+        outcome = run_batch(planned, RunOptions(cluster=workers.address, **how), hears)  # type: ignore[arg-type]
     assert not outcome.failed
     return outcome
 
@@ -224,7 +224,7 @@ def test_a_cluster_does_what_one_process_does(
 ) -> None:
     here, expected = undisturbed
     hears = Hears()
-    do(here, "all", workers, hears)
+    run_item(here, "all", workers, hears)
     assert contents(here / "all") == expected
     parts = [name for name in hears.begun if name.startswith("part ")]
     assert len(parts) == len(plan_of_parts(here)) >= 4
@@ -238,8 +238,8 @@ def test_a_cluster_does_what_one_process_does(
     assert list(hears.workers.values()) == [None, None]
     assert len({text.split()[-1] for text in hears.said if " begun by " in text}) == 2
     # Again nothing is done; and on a shared disk it is the same.
-    assert do(here, "all", workers, hears).done == []
-    do(here, "shared", workers, Hears(), shared_fs=True)
+    assert run_item(here, "all", workers, hears).done == []
+    run_item(here, "shared", workers, Hears(), shared_fs=True)
     assert contents(here / "shared") == expected
 
 
@@ -251,7 +251,7 @@ def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     spool = here / "cache-killed" / "parts"
     killer = Killer(workers, "part 3", lambda: len(list(spool.glob("*/?-*.npz"))) >= 2)
     hears = Hears(killer.hear)
-    do(here, "killed", workers, hears)
+    run_item(here, "killed", workers, hears)
     assert killer.thread is not None
     assert contents(here / "killed") == expected
     again = {name: count for name, count in hears.begun.items() if count > 1}
@@ -274,7 +274,7 @@ def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
 
     killer = Killer(workers, "bright", others_are_done)
     hears = Hears(killer.hear)
-    do(here, "look", workers, hears)
+    run_item(here, "look", workers, hears)
     assert killer.thread is not None
     assert contents(here / "look") == expected
     again = {name: count for name, count in hears.begun.items() if count > 1}
@@ -294,7 +294,7 @@ def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
             (workers.slow / "wait-part 2").unlink()
 
     hears = Hears(free)
-    do(here, "hung", workers, hears, task_limit_s=5.0)
+    run_item(here, "hung", workers, hears, task_limit_s=5.0)
     assert contents(here / "hung") == expected
     # On a busy machine others may take too long as well.
     assert hears.begun["part 2"] >= 2
@@ -314,10 +314,10 @@ def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
 
     first, second = Hears(stop), Hears()
     with pytest.raises(KeyboardInterrupt):
-        do(here, "stopped", workers, first)
+        run_item(here, "stopped", workers, first)
     kept = len(list(spool.glob("*/?-*.npz")))
     assert kept >= 2
-    do(here, "stopped", workers, second)
+    run_item(here, "stopped", workers, second)
     assert contents(here / "stopped") == expected
     parts = sum(name.startswith("part ") for name in second.begun)
     assert parts == len(plan_of_parts(here)) - kept

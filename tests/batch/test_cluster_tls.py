@@ -51,7 +51,7 @@ class Secured:
         with dask.config.set(named):
             workers = ClusterWorkers(address, Listens(), "topic")  # type: ignore[arg-type]
             try:
-                return workers.there
+                return workers.addresses
             finally:
                 workers.close()
 

@@ -15,8 +15,8 @@ from PIL import Image
 
 from lightpaint.batch.gallery import summary
 from lightpaint.batch.gallery.gallery import gallery_page
-from lightpaint.batch.gallery.small_planes import keep_planes, planes_name, read_planes
-from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, Row
+from lightpaint.batch.gallery.small_planes import planes_name, read_planes, write_planes
+from lightpaint.batch.gallery.summary import NARROW, WIDE, LightRow, SummaryRow
 from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate, write_estimate
@@ -147,7 +147,7 @@ def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Pat
     images = np.repeat(few.images, 20, 0)
     made = replace(few, lights=lights, planes=images, noise=0 * images)
     key = '{"view": 0}'
-    keep_planes(tmp_path, key, made)
+    write_planes(tmp_path, key, made)
     run_all(str(write_batch(tmp_path)), str(tmp_path / "out"))
     (tmp_path / "many").mkdir()
     text = (tmp_path / "out" / "p0" / "lighting.json").read_text(encoding="utf-8")
@@ -156,7 +156,7 @@ def test_of_many_lights_those_that_do_most_have_sliders(page: Any, tmp_path: Pat
         LightRow(light.name, 0.0 if k < 20 else 1.0, (1.0, 1.0, 1.0))
         for k, light in enumerate(lights)
     )
-    rows = [Row("many", "done", "", "many", lights=told)]
+    rows = [SummaryRow("many", "done", "", "many", lights=told)]
     name = planes_name(tmp_path, key)
     page_text = gallery_page(tmp_path, "many", rows, {"many": name})
     (tmp_path / "index.html").write_text(page_text, encoding="utf-8")
@@ -172,11 +172,11 @@ def two_mixers(folder: Path) -> tuple[Path, dict[str, str]]:
     rows, names = [], {}
     for name in ("slow", "quick"):
         basis, key = small_basis(), json.dumps({"view": name})
-        keep_planes(folder, key, basis)
+        write_planes(folder, key, basis)
         lights = tuple(LightRow(one.name, 1.0, (1.0, 1.0, 1.0)) for one in basis.lights)
         (folder / name).mkdir()
         write_lighting(folder / name / "lighting.json", Lighting.present(basis))
-        rows.append(Row(name, "done", "", name, lights=lights))
+        rows.append(SummaryRow(name, "done", "", name, lights=lights))
         names[name] = planes_name(folder, key)
     index = folder / "index.html"
     index.write_text(gallery_page(folder, "two", rows, names), encoding="utf-8")
@@ -225,12 +225,12 @@ def test_what_a_browser_lacks_for_a_mixer_is_said(page: Any, tmp_path: Path) -> 
 def test_planes_are_written_once_and_follow_their_basis(tmp_path: Path) -> None:
     basis, key = small_basis(), json.dumps({"basis": {"path": f"{tmp_path}/b.basis.exr"}})
     path = tmp_path / "out" / "thumbnails" / f"{planes_name(tmp_path / 'out', key)}.planes.json"
-    keep_planes(tmp_path / "out", key, basis)
+    write_planes(tmp_path / "out", key, basis)
     told, before = read_planes(path), path.stat().st_ino
     assert [x["name"] for x in told["lights"]] == list(basis.names)
-    keep_planes(tmp_path / "out", key, basis)
+    write_planes(tmp_path / "out", key, basis)
     assert path.stat().st_ino == before
-    keep_planes(tmp_path / "out", key, small_basis(seed=1))
+    write_planes(tmp_path / "out", key, small_basis(seed=1))
     assert read_planes(path)["planes"] != told["planes"]
     # Found again where all of it was moved.
     other = json.dumps({"basis": {"path": f"{tmp_path}/there/b.basis.exr"}})
@@ -241,9 +241,9 @@ def test_planes_are_written_once_and_follow_their_basis(tmp_path: Path) -> None:
 def many(folder: Path, count: int = 1000) -> Path:
     """A page of so many looks, one of which failed."""
     lights = (LightRow("<b>key", 0.0), LightRow("fill", 2.5, hex="#ff8800", stops=-1.25))
-    rows = [Row("broken", "failed", "no such file: <i>x</i>", "broken")]
+    rows = [SummaryRow("broken", "failed", "no such file: <i>x</i>", "broken")]
     rows += [
-        Row(f"look {k}", "done", "", f"look {k}", delta_e=k % 17 / 2, lights=lights)
+        SummaryRow(f"look {k}", "done", "", f"look {k}", delta_e=k % 17 / 2, lights=lights)
         for k in range(count)
     ]
     (folder / "index.html").write_text(gallery_page(folder, "many", rows), encoding="utf-8")
@@ -308,7 +308,7 @@ def test_pictures_of_few_looks_fill_a_window(tmp_path: Path, widest: int, width:
     image = np.full((8, 600, 3), 0.2, np.float32)
     (tmp_path / "p0").mkdir()
     write_estimate(tmp_path / "p0" / "predicted.exr", Estimate(image, 0 * image), {})
-    row = Row("p0", "done", "", "p0")
+    row = SummaryRow("p0", "done", "", "p0")
     for _ in range(2):  # made, and found
         made = summary._with_picture(row, tmp_path, tmp_path / "p0", None, "key", widest)
         assert made.size[0] == width

@@ -67,8 +67,8 @@ def test_light_groups_stand_for_a_scene(here: Path) -> None:
     assert sorted(x["look"] for x in told["looks"]) == sorted(names)
     out = here / "out"
     # As solve answers them, with what it leaves for other programs.
-    alone, many = (read_lighting(x / "lighting.json") for x in (here / "solved", out / "dim"))
-    assert alone.emission == many.emission
+    lock_folder, many = (read_lighting(x / "lighting.json") for x in (here / "solved", out / "dim"))
+    assert lock_folder.emission == many.emission
     for name in ("dim", "dim-warmer", "by hand", "on-1"):
         assert (out / name / "relit.nk").is_file()
     assert sorted(x.name for x in (out / "dim-warmer" / "export").iterdir()) == [

@@ -47,10 +47,10 @@ def test_settled_it_does_not_tell_how_it_came_about(tmp_path: Path) -> None:
         journal = Journal(folder)
         for line in lines:
             journal.add(line)
-        journal.settle(order)  # type: ignore[arg-type]
+        journal.rewrite(order)  # type: ignore[arg-type]
         found.append((folder / JOURNAL).read_bytes())
     assert found[0] == found[1]
-    journal.settle(order[:1])  # type: ignore[arg-type]
+    journal.rewrite(order[:1])  # type: ignore[arg-type]
     assert [*Journal(tmp_path / "other").lines] == order[:1]
 
 
@@ -83,7 +83,7 @@ def test_a_damaged_byte_costs_no_more_than_the_lines_it_touches(place: int, flip
             assert journal.lines[key] == line or journal.lines[key] not in LINES
         journal.add(LINES[1])
         assert Journal(folder).lines["Ærø · 夜", "answer"] == LINES[1]
-        journal.settle([(x.look, x.kind) for x in LINES])
+        journal.rewrite([(x.look, x.kind) for x in LINES])
         assert not Journal(folder).remarks
 
 

@@ -61,7 +61,7 @@ def test_its_commands_done_one_by_one_leave_what_one_batch_leaves(here: Path) ->
 def test_those_that_share_a_folder_keep_others_out(here: Path) -> None:
     from lightpaint.batch.plan.planner import plan
     from lightpaint.batch.run import run_batch
-    from lightpaint.batch.run_options import How
+    from lightpaint.batch.run_options import RunOptions
     from lightpaint.errors import OutputError
 
     planned, told = plan(here / "looks.toml", here / "out"), []
@@ -69,9 +69,9 @@ def test_those_that_share_a_folder_keep_others_out(here: Path) -> None:
     def meanwhile(*_: Any) -> None:
         with pytest.raises(OutputError, match="another batch is at work"):
             run_batch(planned)
-        told.append(run_batch(planned.only("p1"), How(apart=True)).done)
+        told.append(run_batch(planned.select("p1"), RunOptions(apart=True)).done)
 
-    run_batch(planned.only("p0"), How(apart=True), told=meanwhile)
+    run_batch(planned.select("p0"), RunOptions(apart=True), on_step=meanwhile)
     assert told == [["p1"]]
     assert not (here / "out" / "index.html").exists()
     assert set(run_batch(plan(here / "looks.toml", here / "out")).skipped) == {"p0", "p1"}

@@ -8,12 +8,12 @@ import pytest
 from batches import contents, write_batch
 from light_groups import interleaved, pictures
 
-from lightpaint.batch.cluster.parcels import Contents, Parcel, ParcelStore, packed, pieces, unpack
+from lightpaint.batch.cluster.parcels import FileHashes, Parcel, ParcelStore, pack, pieces, unpack
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import do
-from lightpaint.batch.work.work_items import Done, Errand
+from lightpaint.batch.work.work import run_item
+from lightpaint.batch.work.work_items import ItemResult, WorkItem
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.progress import silent
@@ -36,17 +36,17 @@ def task(manifest: Path, out: Path, look: str = "p0") -> Task:
     return next(x.steps[0].task for x in plan(manifest, out).looks if x.entry.name == look)
 
 
-def here_done(errand: Errand) -> Done:
-    return do(errand, WorkerCache(), silent)
+def here_done(item: WorkItem) -> ItemResult:
+    return run_item(item, WorkerCache(), silent)
 
 
 def sent(store: ParcelStore, parcel: Parcel) -> None:
     """Send what is lacking, as the engine does."""
     files = {its: file for file, its in (*parcel.files, *parcel.carried)}
-    for sum_ in store.lacking(parcel):
+    for sum_ in store.missing(parcel):
         for data, is_first, is_last in pieces(Path(files[sum_]).read_bytes()):
             store.put(sum_, data, is_first=is_first, is_last=is_last)
-    assert store.lacking(parcel) == []
+    assert store.missing(parcel) == []
 
 
 @pytest.mark.parametrize("whole", [False, True])
@@ -54,13 +54,13 @@ def test_a_look_done_elsewhere_is_the_look_done_here(
     here: Path, store: ParcelStore, whole: bool
 ) -> None:
     base = here if whole else Path()
-    run_batch(plan(base / "looks.toml", base / "expected").only("p0"))
-    errand = task(base / "looks.toml", base / "expected")
+    run_batch(plan(base / "looks.toml", base / "expected").select("p0"))
+    item = task(base / "looks.toml", base / "expected")
     elsewhere = task(base / "looks.toml", base / "out")
-    parcel = packed(elsewhere, Contents(), run="a", is_shared=False)
-    assert len(store.lacking(parcel)) == 2  # basis and painting
+    parcel = pack(elsewhere, FileHashes(), run="a", is_shared=False)
+    assert len(store.missing(parcel)) == 2  # basis and painting
     sent(store, parcel)
-    done = store.done(parcel, here_done)
+    done = store.run_parcel(parcel, here_done)
     assert (done.failure, done.files and sorted(done.files)) == (
         "",
         ["lighting.json", "predicted.exr", "report.json", "result.json"],
@@ -68,7 +68,7 @@ def test_a_look_done_elsewhere_is_the_look_done_here(
     assert not (here / "out").exists()
     assert done.files is not None
     unpack(elsewhere, done.files)
-    assert contents(here / "out/p0") == contents(here / errand.writes)
+    assert contents(here / "out/p0") == contents(here / item.writes)
     # And again, as the same answer; but not over what was changed by hand.
     unpack(elsewhere, done.files)
     (here / "out/p0/lighting.json").write_text("mine", encoding="utf-8")
@@ -94,13 +94,13 @@ def test_light_groups_in_a_folder_among_paintings_are_the_same_elsewhere(
     )
     run_batch(plan(base / "groups.toml", base / "expected"))
     for look in ("p0", "p1", "p1-warmer"):
-        errand = task(base / "groups.toml", base / "out", look)
-        parcel = packed(errand, Contents(), run="a", is_shared=False)
+        item = task(base / "groups.toml", base / "out", look)
+        parcel = pack(item, FileHashes(), run="a", is_shared=False)
         sent(store, parcel)
-        done = store.done(parcel, here_done)
+        done = store.run_parcel(parcel, here_done)
         assert done.failure == ""
         assert done.files is not None
-        unpack(errand, done.files)
+        unpack(item, done.files)
         assert contents(here / f"out/{look}") == contents(here / f"expected/{look}")
 
 
@@ -111,21 +111,21 @@ def forced(one: Task) -> Task:
 
 
 def test_other_content_under_the_same_name_is_sent_anew(here: Path, store: ParcelStore) -> None:
-    errand, contents_ = task(here / "looks.toml", here / "out"), Contents()
-    sent(store, packed(errand, contents_, run="a", is_shared=False))
+    item, contents_ = task(here / "looks.toml", here / "out"), FileHashes()
+    sent(store, pack(item, contents_, run="a", is_shared=False))
     (here / "p0.exr").write_bytes((here / "p1.exr").read_bytes())
-    parcel = packed(errand, contents_, run="a", is_shared=False)
-    assert len(store.lacking(parcel)) == 1
+    parcel = pack(item, contents_, run="a", is_shared=False)
+    assert len(store.missing(parcel)) == 1
     sent(store, parcel)
     seen: list[bytes] = []
 
-    def look(given: Errand) -> Done:
+    def look(given: WorkItem) -> ItemResult:
         assert isinstance(given, Task)
         [painting] = [file for file in given.reads if file.endswith("p0.exr")]
         seen.append(Path(painting).read_bytes())
-        return Done("p0", "answer")
+        return ItemResult("p0", "answer")
 
-    store.done(parcel, look)
+    store.run_parcel(parcel, look)
     assert seen == [(here / "p1.exr").read_bytes()]
 
 
@@ -137,13 +137,13 @@ def test_what_comes_otherwise_than_it_was_sent_is_refused(store: ParcelStore) ->
 def test_a_shared_disk_is_believed_only_if_it_holds_the_same(
     here: Path, store: ParcelStore
 ) -> None:
-    errand = task(here / "looks.toml", here / "out")
-    parcel = packed(errand, Contents(), run="a", is_shared=True)
-    assert store.lacking(parcel) == []
-    assert store.done(parcel, here_done).failure == ""
+    item = task(here / "looks.toml", here / "out")
+    parcel = pack(item, FileHashes(), run="a", is_shared=True)
+    assert store.missing(parcel) == []
+    assert store.run_parcel(parcel, here_done).failure == ""
     assert (here / "out/p0/lighting.json").is_file()
     (here / "p0.exr").write_bytes(b"other")
-    assert "p0.exr is another on a worker" in store.done(parcel, here_done).failure
+    assert "p0.exr is another on a worker" in store.run_parcel(parcel, here_done).failure
 
 
 def test_files_that_are_only_here_are_carried_to_a_shared_disk_too(
@@ -151,20 +151,20 @@ def test_files_that_are_only_here_are_carried_to_a_shared_disk_too(
 ) -> None:
     only_here = (here / "b.basis.exr").rename(here / "only-here.exr")
     write_batch(here)
-    errand = replace(task(here / "looks.toml", here / "out"), files=(str(only_here),))
-    parcel = packed(errand, Contents(), run="a", is_shared=True)
-    assert len(store.lacking(parcel)) == 1
+    item = replace(task(here / "looks.toml", here / "out"), files=(str(only_here),))
+    parcel = pack(item, FileHashes(), run="a", is_shared=True)
+    assert len(store.missing(parcel)) == 1
     sent(store, parcel)
 
-    def look(given: Errand) -> Done:
+    def look(given: WorkItem) -> ItemResult:
         assert isinstance(given, Task)
-        assert given.reads == errand.reads
+        assert given.reads == item.reads
         [file] = given.files
-        assert file != errand.files[0]
+        assert file != item.files[0]
         assert Path(file).read_bytes() == only_here.read_bytes()
-        return Done("p0", "answer")
+        return ItemResult("p0", "answer")
 
-    store.done(parcel, look)
+    store.run_parcel(parcel, look)
 
 
 @pytest.mark.parametrize("size", [0, 1, 2**26, 2**26 + 1])
@@ -176,7 +176,7 @@ def test_pieces_make_the_whole(size: int) -> None:
 
 
 def test_a_file_that_is_gone_is_one_look_s_failure(here: Path) -> None:
-    errand = task(here / "looks.toml", here / "out")
+    item = task(here / "looks.toml", here / "out")
     (here / "p0.exr").unlink()
     with pytest.raises(BatchError, match="cannot read"):
-        packed(errand, Contents(), run="a", is_shared=False)
+        pack(item, FileHashes(), run="a", is_shared=False)

@@ -65,10 +65,10 @@ def test_looks_have_a_number(here: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     text = '[[look]]\nscene = "room.xml"\npainting = "a.exr"\nsensors = {}\n'
     names = [f"sensor {k}" for k in range(100_000)]
     manifest.write_text(text.format(names))
-    [first, *_] = read_manifest(manifest).mistakes.found
+    [first, *_] = read_manifest(manifest).mistakes.lines
     assert "sensors is" in first
     assert "10000 at most" in first
-    monkeypatch.setattr(entries, "MOST_LOOKS", 20)
+    monkeypatch.setattr(entries, "MAX_LOOKS", 20)
     manifest.write_text(text.format(names[:21]))
     with pytest.raises(BatchError, match="asks for more than 20 looks"):
         plan(manifest, "out")

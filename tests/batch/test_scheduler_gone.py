@@ -17,7 +17,7 @@ from lightpaint.batch.cluster import workers as cluster_workers
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.cluster.parcels import unpack
 from lightpaint.batch.cluster.workers import ClusterWorkers
-from lightpaint.batch.work.work_items import Done
+from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, OutputError
 
 distributed = pytest.importorskip("distributed", reason="Dask's distributed")
@@ -79,8 +79,8 @@ def test_one_that_ends_while_it_is_reached(
 
 
 LATER: dict[str, Callable[[ClusterWorkers], object]] = {
-    "look_around": lambda at: (setattr(at, "_looked_s", -1e9), at.look_around()),
-    "is_there": lambda at: at.is_there("tcp://127.0.0.1:1"),
+    "refresh": lambda at: (setattr(at, "_looked_s", -1e9), at.refresh()),
+    "is_there": lambda at: at.is_known("tcp://127.0.0.1:1"),
     "submit": lambda at: at.submit(None, "tcp://127.0.0.1:1", "key"),  # type: ignore[arg-type]
     "unfit": lambda at: at._unfit(["tcp://127.0.0.1:1"]),
 }
@@ -109,38 +109,38 @@ def test_one_that_ends_later(call: str, caplog: pytest.LogCaptureFixture) -> Non
 
 def test_what_a_worker_answers_that_is_no_answer_is_its_own_failure() -> None:
     cluster = Cluster("tcp://127.0.0.1:1", Listens())  # type: ignore[arg-type]
-    errand: Any = SimpleNamespace(name="look", kind="answer")
+    item: Any = SimpleNamespace(name="look", kind="answer")
     for came, is_told in (
-        (Done("look", "answer", ""), False),
+        (ItemResult("look", "answer", ""), False),
         (["0" * 64], False),
         ([1], True),
         (None, True),
-        (Done("other", "answer", ""), True),
-        (Done("look", "answer", "", files={"a": "text"}), True),  # type: ignore[dict-item]
+        (ItemResult("other", "answer", ""), True),
+        (ItemResult("look", "answer", "", files={"a": "text"}), True),  # type: ignore[dict-item]
     ):
 
         def result(timeout: float, its: Any = came) -> Any:
             return its
 
         sent: Any = SimpleNamespace(
-            errand=errand, worker="w", future=SimpleNamespace(result=result, status="finished")
+            item=item, worker="w", future=SimpleNamespace(result=result, status="finished")
         )
-        found = cluster._came(sent)
-        told = isinstance(found, Done) and "answers with something else" in found.failure
+        found = cluster._result_of(sent)
+        told = isinstance(found, ItemResult) and "answers with something else" in found.failure
         assert told is is_told
 
 
 def test_what_others_say_under_our_topic_is_passed_over() -> None:
     cluster = Cluster("tcp://127.0.0.1:1", Listens())  # type: ignore[arg-type]
-    events = [{"errand": "a", "worker": "w"}, {}, None, {"errand": 1, "worker": "w"}, "text"]
-    cluster._at = SimpleNamespace(events=deque(events))  # type: ignore[assignment]
-    cluster._hear()
+    events = [{"item": "a", "worker": "w"}, {}, None, {"item": 1, "worker": "w"}, "text"]
+    cluster._workers = SimpleNamespace(events=deque(events))  # type: ignore[assignment]
+    cluster._read_events()
     assert cluster.begun == [("a", "w")]
 
 
 @pytest.mark.parametrize("record", [b"{}", b"junk", b"\xff", b'{"answers": 3}', b"[1]", b"[]"])
 def test_a_record_that_is_none_is_one_line(tmp_path: Path, record: bytes) -> None:
-    errand: Any = SimpleNamespace(writes=str(tmp_path / "look"), kind="answer")
+    item: Any = SimpleNamespace(writes=str(tmp_path / "look"), kind="answer")
     with pytest.raises(OutputError, match=r"a worker's result.json is damaged"):
-        unpack(errand, {"result.json": record, "lighting.json": b"{}"})
+        unpack(item, {"result.json": record, "lighting.json": b"{}"})
     assert not (tmp_path / "look").exists()

@@ -9,7 +9,7 @@ from command import refused, run
 from renderer import write_room
 
 HEAD = '[defaults]\nbasis = "b.basis.exr"\nwant = ["predict"]\n'
-LOOK = '[[look]]\npainting = "p0.exr"\n'
+LOOK_PARAMETER = '[[look]]\npainting = "p0.exr"\n'
 FIRST = HEAD + '[[look]]\nname = "one"\npainting = "p0.exr"\n'
 SEQUENCE = FIRST + '[[look]]\nname = "two"\npainting = "p1.exr"\n[[sequence]]\nname = "seq"\n'
 
@@ -21,21 +21,24 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "an unknown table": (FIRST + "[loks]\n", ("unknown key 'loks'", "'look'")),
     "looks that are no tables": ("look = 3\n", ("look is 3", "[[look]]")),
     "a look that is no table": ("look = [3]\n", ("look 1", "no table")),
-    "defaults that are no table": ("defaults = 1\n" + LOOK, ("defaults is 1",)),
-    "an unknown default": ('[defaults]\nscen = "a"\n' + LOOK, ("defaults", "mean 'scene'")),
+    "defaults that are no table": ("defaults = 1\n" + LOOK_PARAMETER, ("defaults is 1",)),
+    "an unknown default": (
+        '[defaults]\nscen = "a"\n' + LOOK_PARAMETER,
+        ("defaults", "mean 'scene'"),
+    ),
     "a painting by default": (
-        HEAD + 'painting = "p0.exr"\n' + LOOK,
+        HEAD + 'painting = "p0.exr"\n' + LOOK_PARAMETER,
         ("defaults", "unknown key 'painting'"),
     ),
     "an unknown key": (FIRST + "masc = 'a'\n", ("look 'one'", "'masc'", "mean 'mask'")),
     "a painting that is a number": (HEAD + "[[look]]\npainting = 3\n", ("painting is 3",)),
-    "an empty name": (HEAD + LOOK + 'name = ""\n', ("look 'p0.exr'", "name is ''")),
+    "an empty name": (HEAD + LOOK_PARAMETER + 'name = ""\n', ("look 'p0.exr'", "name is ''")),
     "nothing to show": (HEAD + '[[look]]\nname = "a"\n', ("look 'a'", "nothing to show")),
     "painting and lighting": (
         FIRST + 'lighting = "looks.toml"\n',
         ("look 'one'", "painting and lighting at once"),
     ),
-    "neither scene nor basis": (LOOK, ("look 'p0.exr'", "no scene and no basis")),
+    "neither scene nor basis": (LOOK_PARAMETER, ("look 'p0.exr'", "no scene and no basis")),
     "a painting that is not there": (
         HEAD + '[[look]]\npainting = "gone.exr"\n',
         ("look 'gone.exr'", "painting: no such file: gone.exr"),
@@ -120,25 +123,37 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "an unknown view": (FIRST + 'view = "acres"\n', ("look 'one'", "acres")),
     "an exposure that is a text": (FIRST + 'exposure = "+1"\n', ("exposure is '+1'", "stops")),
     "an unknown paint": (FIRST + 'paint = "oil"\n', ("paint is 'oil'", "'light'")),
-    "a name with a slash": (HEAD + LOOK + 'name = "a/b"\n', ("'a/b' is no name for a folder",)),
-    "a name twice": (FIRST + LOOK + 'name = "one"\n', ("look 'one'", "more than one look")),
+    "a name with a slash": (
+        HEAD + LOOK_PARAMETER + 'name = "a/b"\n',
+        ("'a/b' is no name for a folder",),
+    ),
+    "a name twice": (
+        FIRST + LOOK_PARAMETER + 'name = "one"\n',
+        ("look 'one'", "more than one look"),
+    ),
     "a name of the batch's own page": (
-        HEAD + LOOK + 'name = "index.html"\n',
+        HEAD + LOOK_PARAMETER + 'name = "index.html"\n',
         ("look 'index.html'", "cannot be called 'index.html'"),
     ),
-    "a name of the journal": (HEAD + LOOK + 'name = "Journal.JSONL"\n', ("files of its own",)),
-    "a name of a summary": (HEAD + LOOK + 'name = "summary.csv"\n', ("files of its own",)),
+    "a name of the journal": (
+        HEAD + LOOK_PARAMETER + 'name = "Journal.JSONL"\n',
+        ("files of its own",),
+    ),
+    "a name of a summary": (
+        HEAD + LOOK_PARAMETER + 'name = "summary.csv"\n',
+        ("files of its own",),
+    ),
     "a name of the small pictures": (
-        HEAD + LOOK + 'name = "thumbnails"\n',
+        HEAD + LOOK_PARAMETER + 'name = "thumbnails"\n',
         ("look 'thumbnails'", "files of its own"),
     ),
-    "a hidden name": (HEAD + LOOK + 'name = ".cache"\n', ("files of its own",)),
+    "a hidden name": (HEAD + LOOK_PARAMETER + 'name = ".cache"\n', ("files of its own",)),
     "a name that differs in case": (
-        FIRST + LOOK + 'name = "One"\n',
+        FIRST + LOOK_PARAMETER + 'name = "One"\n',
         ("look 'one' and look 'One'", "'one' and 'One' would be one folder", "case"),
     ),
     "a variation's name twice": (
-        FIRST + 'variations = ["warmer"]\n' + LOOK + 'name = "one-warmer"\n',
+        FIRST + 'variations = ["warmer"]\n' + LOOK_PARAMETER + 'name = "one-warmer"\n',
         ("look 'one' and look 'one-warmer'", "more than one look"),
     ),
     "a sequence without frames": (
@@ -199,7 +214,9 @@ SEVERAL: dict[str, tuple[str, list[str]]] = {
     ),
     "defaults with a mistake hide no look's, and are told once": (
         HEAD + "exposre = 1\n[defaults.settings]\nholds = 1\n"
-        '[[look]]\npainting = "p0.exr"\npaint = "oil"\n' + LOOK + 'name = "summary.csv"\n',
+        '[[look]]\npainting = "p0.exr"\npaint = "oil"\n'
+        + LOOK_PARAMETER
+        + 'name = "summary.csv"\n',
         ["'exposre'", "defaults, settings: unknown key 'holds'", "paint is 'oil'", "summary.csv"],
     ),
     "what a misspelt key stands for is not missing": (

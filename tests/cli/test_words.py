@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import lightpaint
-from lightpaint.batch.run_options import How
+from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options.job_options import LOADING
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output.vocabulary import _SAID, OPTIONS, SPELLINGS, spoken
@@ -115,7 +115,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
     known |= {*inspect.signature(lightpaint.read_light_groups).parameters}
     known |= {*inspect.signature(lightpaint.paint_with_light).parameters}
     known |= {*inspect.signature(paint_in_browser).parameters}
-    known |= {*inspect.signature(Source).parameters, *inspect.signature(How).parameters}
+    known |= {*inspect.signature(Source).parameters, *inspect.signature(RunOptions).parameters}
     assert {*NOT_IN_GROUPS, *LOADING} <= set(OPTIONS)
     assert {*OPTIONS, *(text.partition("=")[0] for text in SPELLINGS)} <= known
 

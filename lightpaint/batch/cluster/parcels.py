@@ -1,8 +1,8 @@
-"""Errands that are done elsewhere: their files go along by content, and what is written comes back.
+"""Work items for other machines: their files travel by content, and what is written comes back.
 
-On a disk that all share only the content is checked. Else each worker has a store of files by their
-SHA-256, so that none is sent to it twice, and an errand finds them under a root of its own, in the
-places that they have here: relative paths in what is written come out the same.
+On a shared disk only the content is checked. Otherwise each worker has a store of files by their
+SHA-256, so that none is sent to it twice, and an item finds them under a root of its own, at their
+local paths: relative paths in what is written come out the same.
 """
 
 import hashlib
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work_items import Done, Errand
+from lightpaint.batch.work.work_items import ItemResult, WorkItem
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import first_line
 from lightpaint.pipeline.result_folder import RECORD, ResultFolder
@@ -21,20 +21,20 @@ from lightpaint.screen import some_names
 from lightpaint.storage.json_records import strict_json
 from lightpaint.storage.staging import is_below
 
-#: Bytes that are sent at a time.
-PIECE = 2**26
+#: Bytes of a file that are sent at a time.
+PIECE_BYTES = 2**26
 
 
 @dataclass(frozen=True)
 class Parcel:
-    """An errand that is done elsewhere.
+    """A work item for another machine.
 
-    files: that it needs, by whole path, with the SHA-256 of each. carried: the same of files that
-    are only here. place: folder that relative paths start from. is_shared: whether `files` are
-    there under the same paths. run: whose it is.
+    files: those that it needs, by absolute path, with the SHA-256 of each. carried: the same of
+    files that exist only here. place: folder that relative paths start from. is_shared: whether
+    `files` are there under the same paths. run: identifies the batch.
     """
 
-    errand: Errand
+    item: WorkItem
     files: tuple[tuple[str, str], ...]
     carried: tuple[tuple[str, str], ...]
     place: str
@@ -42,160 +42,165 @@ class Parcel:
     run: str
 
 
-class Contents:
-    """SHA-256 of files, each read once as long as it is as it was."""
+class FileHashes:
+    """SHA-256 of files, each read once as long as it does not change."""
 
     def __init__(self) -> None:
-        self._sums: dict[tuple[str, int, int], str] = {}
+        self._digests: dict[tuple[str, int, int], str] = {}
 
-    def of(self, file: str) -> str:
-        """Of that file. Raises BatchError for one that cannot be read."""
+    def sha256(self, file: str) -> str:
+        """Return the SHA-256 of a file. Raises BatchError for one that cannot be read."""
         try:
             status = os.stat(file)
             key = file, status.st_size, status.st_mtime_ns
-            if key not in self._sums:
+            if key not in self._digests:
                 with open(file, "rb") as opened:
-                    self._sums[key] = hashlib.file_digest(opened, "sha256").hexdigest()
+                    self._digests[key] = hashlib.file_digest(opened, "sha256").hexdigest()
         except OSError as error:
             raise BatchError(f"cannot read {file}: {error.strerror or error}") from error
-        return self._sums[key]
+        return self._digests[key]
 
 
-def packed(errand: Errand, contents: Contents, *, run: str, is_shared: bool) -> Parcel:
-    """The errand with its files. Raises BatchError for one that cannot be read."""
+def pack(item: WorkItem, contents: FileHashes, *, run: str, is_shared: bool) -> Parcel:
+    """Return the item with its files. Raises BatchError for a file that cannot be read."""
 
     def summed(some: Iterable[str]) -> tuple[tuple[str, str], ...]:
         whole = dict.fromkeys(os.path.abspath(file) for file in some)
-        return tuple((file, contents.of(file)) for file in whole)
+        return tuple((file, contents.sha256(file)) for file in whole)
 
-    files, carried = summed(errand.needs), summed(errand.carried)
-    return Parcel(errand, files, carried, os.getcwd(), is_shared, run)
+    files, carried = summed(item.needs), summed(item.carried)
+    return Parcel(item, files, carried, os.getcwd(), is_shared, run)
 
 
 class ParcelStore:
-    """The files of a worker, in `folder`, which nobody else uses."""
+    """Files of a worker, in `folder`, which nobody else uses."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._contents = Contents()
+        self._contents = FileHashes()
         self._run = ""
 
-    def lacking(self, parcel: Parcel) -> list[str]:
-        """SHA-256 of what is to be sent first."""
-        return [its for _, its in sent_files(parcel) if not self._file(its).is_file()]
+    def missing(self, parcel: Parcel) -> list[str]:
+        """Return the SHA-256 of files that must be sent first."""
+        return [digest for _, digest in files_to_send(parcel) if not self._file(digest).is_file()]
 
-    def put(self, sum_: str, data: bytes, *, is_first: bool, is_last: bool) -> None:
+    def put(self, digest: str, data: bytes, *, is_first: bool, is_last: bool) -> None:
         """Take a piece of the file of that SHA-256. Raises BatchError if it comes to another."""
         self._folder.mkdir(parents=True, exist_ok=True)
-        half = self._file(f"{sum_}.half")
+        half = self._file(f"{digest}.half")
         with half.open("wb" if is_first else "ab") as file:
             file.write(data)
         if is_last:
-            if self._contents.of(str(half)) != sum_:
+            if self._contents.sha256(str(half)) != digest:
                 half.unlink()
                 raise BatchError("a file came otherwise than it was sent")
             half.chmod(0o444)
-            half.replace(self._file(sum_))
+            half.replace(self._file(digest))
 
-    def done(self, parcel: Parcel, do: Callable[[Errand], Done]) -> Done:
-        """What comes of it when it is done here by `do`. All it needs has to be there."""
+    def run_parcel(self, parcel: Parcel, run_item: Callable[[WorkItem], ItemResult]) -> ItemResult:
+        """Run an item here by `do`; all its files have to be in the store."""
         before = os.getcwd()
         try:
             if parcel.is_shared:
-                return self._done_in_place(parcel, do)
-            return self._done_apart(parcel, do)
+                return self._run_in_place(parcel, run_item)
+            return self._run_apart(parcel, run_item)
         except OSError as error:
-            said = f"a worker cannot do it: {error}"
-            return Done(parcel.errand.name, parcel.errand.kind, said)
+            failure = f"a worker cannot do it: {error}"
+            return ItemResult(parcel.item.name, parcel.item.kind, failure)
         finally:
             os.chdir(before)
 
-    def _done_in_place(self, parcel: Parcel, do: Callable[[Errand], Done]) -> Done:
-        errand = parcel.errand
-        for file, its in parcel.files:
+    def _run_in_place(
+        self, parcel: Parcel, run_item: Callable[[WorkItem], ItemResult]
+    ) -> ItemResult:
+        item = parcel.item
+        for file, digest in parcel.files:
             try:
-                other = self._contents.of(file) != its
+                differs = self._contents.sha256(file) != digest
             except BatchError:
-                other = True
-            if other:
-                said = (
+                differs = True
+            if differs:
+                failure = (
                     f"{file} is another on a worker: is its disk shared? leave out shared_fs=True"
                 )
-                return Done(errand.name, errand.kind, said)
+                return ItemResult(item.name, item.kind, failure)
         os.chdir(parcel.place)
-        return do(errand.moved(self._mover(parcel)))
+        return run_item(item.with_paths(self._path_map(parcel)))
 
-    def _done_apart(self, parcel: Parcel, do: Callable[[Errand], Done]) -> Done:
+    def _run_apart(self, parcel: Parcel, run_item: Callable[[WorkItem], ItemResult]) -> ItemResult:
         root = self._folder / "runs" / parcel.run
         if self._run != parcel.run:
             shutil.rmtree(root.parent, ignore_errors=True)
             self._run = parcel.run
-        errand, there = parcel.errand, f"{root}{parcel.place}"
-        os.makedirs(there, exist_ok=True)
-        filled = None
-        if errand.writes:
-            filled = Path(f"{root}{_whole(parcel, errand.writes)}")
-            shutil.rmtree(filled, ignore_errors=True)
-        laid = {}
-        for file, its in parcel.files:
+        item, addresses = parcel.item, f"{root}{parcel.place}"
+        os.makedirs(addresses, exist_ok=True)
+        target = None
+        if item.writes:
+            target = Path(f"{root}{_absolute(parcel, item.writes)}")
+            shutil.rmtree(target, ignore_errors=True)
+        links = {}
+        for file, digest in parcel.files:
             place = Path(f"{root}{file}")
             place.parent.mkdir(parents=True, exist_ok=True)
             place.unlink(missing_ok=True)
-            os.link(self._file(its), place)
-            laid[place] = self._file(its)
-        os.chdir(there)
-        done = do(errand.moved(self._mover(parcel, root)))
-        if filled is None or done.failure:
+            os.link(self._file(digest), place)
+            links[place] = self._file(digest)
+        os.chdir(addresses)
+        result = run_item(item.with_paths(self._path_map(parcel, root)))
+        if target is None or result.failure:
             # A disk that is full is this worker's, and others have others.
-            said, is_lost = done.failure.replace(str(root), ""), done.is_lost or done.is_full
-            return replace(done, failure=said, is_full=False, is_lost=is_lost)
-        written = (x for x in sorted(filled.rglob("*")) if x.is_file())
+            failure, is_lost = (
+                result.failure.replace(str(root), ""),
+                result.is_lost or result.is_disk_full,
+            )
+            return replace(result, failure=failure, is_disk_full=False, is_lost=is_lost)
+        written = (x for x in sorted(target.rglob("*")) if x.is_file())
         return replace(
-            done,
+            result,
             files={
-                file.relative_to(filled).as_posix(): _from_here(file.read_bytes(), root)
+                file.relative_to(target).as_posix(): _without_root(file.read_bytes(), root)
                 for file in written
-                if file not in laid or not file.samefile(laid[file])
+                if file not in links or not file.samefile(links[file])
             },
         )
 
-    def _mover(self, parcel: Parcel, root: Path | None = None) -> Callable[[str], str]:
-        """What leads to files in this store and, given a root, to files and folders under that."""
-        carried = {file: str(self._file(its)) for file, its in parcel.carried}
+    def _path_map(self, parcel: Parcel, root: Path | None = None) -> Callable[[str], str]:
+        """Return the map from local paths to the store's and, given a root, to paths under that."""
+        carried = {file: str(self._file(digest)) for file, digest in parcel.carried}
         known: set[str] = set()
         if root is not None:
             known |= {file for file, _ in parcel.files}
-            if parcel.errand.writes:
-                known.add(_whole(parcel, parcel.errand.writes))
+            if parcel.item.writes:
+                known.add(_absolute(parcel, parcel.item.writes))
             known |= {str(folder) for file in tuple(known) for folder in Path(file).parents}
             known.discard("/")
         # What is left out of a folder is left out there, too, where others had it sent.
         folders = {os.path.dirname(file) for file, _ in parcel.files} & known
 
         def move(text: str) -> str:
-            if (whole := _whole(parcel, text)) in carried:
+            if (whole := _absolute(parcel, text)) in carried:
                 return carried[whole]
             is_there = whole in known or os.path.dirname(whole) in folders
             return f"{root}{text}" if os.path.isabs(text) and is_there else text
 
         return move
 
-    def _file(self, sum_: str) -> Path:
-        return self._folder / sum_
+    def _file(self, digest: str) -> Path:
+        return self._folder / digest
 
 
-def sent_files(parcel: Parcel) -> tuple[tuple[str, str], ...]:
-    """Those that have to be in a worker's store."""
+def files_to_send(parcel: Parcel) -> tuple[tuple[str, str], ...]:
+    """Return the files that have to be in a worker's store."""
     return parcel.carried if parcel.is_shared else parcel.files + parcel.carried
 
 
-def _from_here(data: bytes, root: Path) -> bytes:
-    """A file that was written under `root`: texts name others by where they are without it."""
+def _without_root(data: bytes, root: Path) -> bytes:
+    """Return a file that was written under `root`, with the root removed from paths in texts."""
     return data if b"\0" in data else data.replace(os.fsencode(root), b"")
 
 
-def _answers(record: bytes) -> tuple[str, ...]:
-    """Names of the answers that a worker's record speaks of. Raises OutputError."""
+def _recorded_answers(record: bytes) -> tuple[str, ...]:
+    """Return the names of the answers in a worker's record. Raises OutputError."""
     try:
         answers = strict_json(record.decode())["answers"]
         if not (isinstance(answers, list) and all(isinstance(x, str) for x in answers)):
@@ -205,34 +210,34 @@ def _answers(record: bytes) -> tuple[str, ...]:
     return tuple(answers)
 
 
-def _whole(parcel: Parcel, path: str) -> str:
+def _absolute(parcel: Parcel, path: str) -> str:
     return os.path.normpath(os.path.join(parcel.place, path))
 
 
 def pieces(data: bytes) -> Iterable[tuple[bytes, bool, bool]]:
-    """Pieces of a file, with whether each is the first and the last."""
-    starts: Sequence[int] = range(0, max(len(data), 1), PIECE)
+    """Yield pieces of a file, with whether each is the first and the last."""
+    starts: Sequence[int] = range(0, max(len(data), 1), PIECE_BYTES)
     for start in starts:
-        yield data[start : start + PIECE], start == 0, start == starts[-1]
+        yield data[start : start + PIECE_BYTES], start == 0, start == starts[-1]
 
 
-def unpack(errand: Errand, files: dict[str, bytes]) -> None:
-    """Write what a worker has written where it belongs, all at once.
+def unpack(item: WorkItem, files: dict[str, bytes]) -> None:
+    """Write a worker's files where they belong, all at once.
 
-    Raises OutputError for what must not be replaced, as if it were written from here.
+    Raises OutputError for what must not be replaced, as for files written here.
     """
-    folder = Path(errand.writes)
+    folder = Path(item.writes)
     if odd := [name for name in files if not is_below(name)]:
         raise OutputError(f"a worker would write {some_names(odd)} beside {folder}")
-    answers = _answers(files[RECORD]) if RECORD in files else ()
-    adds_to = folder / "lighting.json" if errand.kind == "render" else None
+    answers = _recorded_answers(files[RECORD]) if RECORD in files else ()
+    adds_to = folder / "lighting.json" if item.kind == "render" else None
     results = ResultFolder(
         folder,
         tuple(folder / name for name in files if name != RECORD),
         (),
         tuple(folder / answer for answer in answers),
         adds_to,
-        force=isinstance(errand, Task) and errand.force,
+        force=isinstance(item, Task) and item.force,
     )
     try:
         with results.filled() as stage:

@@ -1,4 +1,4 @@
-"""Whether this machine and a scheduler at a `tls://` address trust each other's certificates.
+"""Trust between this machine and a scheduler at a `tls://` address, checked before Dask connects.
 
 Dask finds certificates by its own configuration (`distributed.comm.tls`), as its schedulers and
 workers do. A client of it that is not let in says so late, or waits for half a minute.
@@ -11,8 +11,8 @@ from typing import Any
 from lightpaint.errors import BatchError
 from lightpaint.files import first_line
 
-#: How this machine is told its certificates.
-CONFIGURE = (
+#: Advice on configuring certificates.
+CONFIGURE_HINT = (
     "DASK_DISTRIBUTED__COMM__TLS__CA_FILE and DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT name them "
     "(and ...__CLIENT__KEY, where the key is in a file of its own)"
 )
@@ -50,7 +50,8 @@ def check_trust(address: str, connection: socket.socket) -> None:
         return
     raise BatchError(
         f"the scheduler at {address} and this machine do not trust each other's certificates "
-        f"({why}): both have to be signed by an authority that the other one names; {CONFIGURE}"
+        f"({why}): both have to be signed by an authority that the other one names; "
+        f"{CONFIGURE_HINT}"
     )
 
 
@@ -76,5 +77,5 @@ def _context(address: str, security: Any) -> ssl.SSLContext:
             "and a certificate needs its key"
         ) from None
     if not isinstance(found, ssl.SSLContext):
-        raise BatchError(f"{address} needs certificates: {CONFIGURE}")
+        raise BatchError(f"{address} needs certificates: {CONFIGURE_HINT}")
     return found

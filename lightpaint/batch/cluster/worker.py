@@ -1,6 +1,6 @@
-"""What a worker of a Dask cluster is asked to do for a batch. All of it runs in one thread.
+"""Functions that a worker of a Dask cluster runs for a batch, all in one thread.
 
-Mitsuba is one for a process: of several tasks that Dask gives a worker at a time one is at work.
+A process has one Mitsuba: of several tasks that Dask gives a worker at a time one runs.
 """
 
 import ctypes
@@ -12,15 +12,15 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from lightpaint.batch.cluster.parcels import Parcel, ParcelStore
-from lightpaint.batch.work.work import do
-from lightpaint.batch.work.work_items import Done, spoken
+from lightpaint.batch.work.work import run_item
+from lightpaint.batch.work.work_items import ItemResult, item_label
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.version import __version__
 
-#: Of glibc's mallopt: what it sets, and bytes, as they come to by themselves where nobody sets any.
-KEPT = {-1: 2**26, -3: 2**25}  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
+#: Parameters of glibc's mallopt, with the values it settles at by itself.
+MALLOPT_VALUES = {-1: 2**26, -3: 2**25}  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
 
 
 def _keep_memory() -> None:
@@ -31,57 +31,57 @@ def _keep_memory() -> None:
     """
     with suppress(AttributeError, OSError):
         mallopt = ctypes.CDLL(None).mallopt
-        for what, size in KEPT.items():
+        for what, size in MALLOPT_VALUES.items():
             mallopt(what, size)
 
 
-class _Here:
-    """What this process has at hand."""
+class _WorkerState:
+    """State of this process between work items."""
 
     def __init__(self) -> None:
         self.thread = ThreadPoolExecutor(1, "lightpaint")
-        self.held, self.run = WorkerCache(), ""
+        self.cache, self.run = WorkerCache(), ""
         self.stores: dict[str, ParcelStore] = {}
 
     def store(self, worker: Any) -> ParcelStore:
-        """The files of that worker; they are deleted with its folder."""
+        """Return the file store of a worker; it is deleted with the worker's folder."""
         folder = str(worker.local_directory)
         return self.stores.setdefault(folder, ParcelStore(Path(folder) / "lightpaint"))
 
 
-_HERE = _Here()
+_STATE = _WorkerState()
 
 
 def versions() -> dict[str, str]:
-    """Of what decides on the last bit of a result."""
+    """Return the versions of packages that decide the last bit of a result."""
     from importlib.metadata import version
 
     found = {name: version(name) for name in ("mitsuba", "drjit", "numpy")}
     return {"lightpaint": __version__, **found}
 
 
-def put(sum_: str, data: bytes, is_first: bool, is_last: bool, dask_worker: Any = None) -> None:
+def put(digest: str, data: bytes, is_first: bool, is_last: bool, dask_worker: Any = None) -> None:
     """Take a piece of a file into this worker's store."""
-    _HERE.store(dask_worker).put(sum_, data, is_first=is_first, is_last=is_last)
+    _STATE.store(dask_worker).put(digest, data, is_first=is_first, is_last=is_last)
 
 
-def do_parcel(parcel: Parcel) -> Done | list[str]:
-    """What comes of an errand; or the SHA-256 of files that have to be sent before."""
+def do_parcel(parcel: Parcel) -> ItemResult | list[str]:
+    """Return the result of an item, or the SHA-256 of files that have to be sent first."""
     from distributed import get_worker
 
-    return _HERE.thread.submit(_do, parcel, get_worker()).result()
+    return _STATE.thread.submit(_do, parcel, get_worker()).result()
 
 
-def _do(parcel: Parcel, worker: Any) -> Done | list[str]:
-    store = _HERE.store(worker)
-    if lacking := store.lacking(parcel):
-        return lacking
-    if _HERE.run != parcel.run:
+def _do(parcel: Parcel, worker: Any) -> ItemResult | list[str]:
+    store = _STATE.store(worker)
+    if missing := store.missing(parcel):
+        return missing
+    if _STATE.run != parcel.run:
         # Files of another batch may have the same names, and are others.
-        _HERE.held.rest()
-        _HERE.held, _HERE.run = WorkerCache(), parcel.run
+        _STATE.cache.release_renderer()
+        _STATE.cache, _STATE.run = WorkerCache(), parcel.run
         threadpool_limits(worker.state.nthreads, "blas")
         limit_threads(worker.state.nthreads)
         _keep_memory()
-    worker.log_event(parcel.run, {"errand": spoken(parcel.errand), "worker": worker.address})
-    return store.done(parcel, lambda errand: do(errand, _HERE.held, silent))
+    worker.log_event(parcel.run, {"item": item_label(parcel.item), "worker": worker.address})
+    return store.run_parcel(parcel, lambda item: run_item(item, _STATE.cache, silent))

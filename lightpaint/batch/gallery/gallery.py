@@ -1,4 +1,4 @@
-"""index.html, one self-contained page of all looks, and contact.png, a sheet of them."""
+"""The gallery: index.html, a self-contained page of all looks, and contact.png, a contact sheet."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -13,10 +13,10 @@ from urllib.parse import quote
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from lightpaint.batch.gallery.gallery_mixers import in_script, mixers_html, transforms_of
+from lightpaint.batch.gallery.gallery_mixers import mixers_html, script_json, transforms_of
 from lightpaint.batch.gallery.small_planes import drop_planes, planes_name
 from lightpaint.batch.gallery.summary import (
-    Row,
+    SummaryRow,
     drop_pictures,
     is_summary,
     rows_of,
@@ -36,10 +36,10 @@ from lightpaint.screen import visible
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import bundled, styles
 
-#: Pictures of the sheet, at most, and in a row; width of each, gap, and height of the words.
-MOST, COLUMNS, WIDTH, GAP, BELOW = 120, 6, 240, 14, 22
+#: Pictures of the sheet, at most, and in a row; width of each, gap, and height of its caption.
+MAX_PICTURES, COLUMNS, WIDTH, GAP, CAPTION_HEIGHT = 120, 6, 240, 14, 22
 
-#: A dark ground, and what is written on it.
+#: Colours of the sheet: background, text, faint text, warnings.
 GROUND, TEXT, FAINT, WARNING = (24, 24, 26), (226, 226, 226), (142, 142, 146), (255, 140, 120)
 
 
@@ -55,8 +55,8 @@ def check_gallery(folder: Path, *, force: bool = False) -> None:
 
 def write_gallery(
     folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]
-) -> list[Row]:
-    """Write index.html, contact.png, summary.csv and summary.json of what there is by now.
+) -> list[SummaryRow]:
+    """Write index.html, contact.png, summary.csv and summary.json of the results so far.
 
     Returns the rows, failures first.
     """
@@ -73,7 +73,7 @@ def write_gallery(
 
 
 def bases_of_rows(folder: Path, plan: Plan) -> dict[str, str]:
-    """By the folder of each picture, which planes its mixer has."""
+    """Return the name of the planes for each picture's mixer, by the picture's folder."""
     return {
         place.relative_to(plan.folder).as_posix(): planes_name(folder, key)
         for look in plan.looks
@@ -82,32 +82,32 @@ def bases_of_rows(folder: Path, plan: Plan) -> dict[str, str]:
 
 
 def gallery_page(
-    folder: Path, title: str, rows: Sequence[Row], bases: Mapping[str, str] | None = None
+    folder: Path, title: str, rows: Sequence[SummaryRow], bases: Mapping[str, str] | None = None
 ) -> str:
-    """The page as HTML text.
+    """Return the page as HTML text.
 
-    folder: where the small pictures and planes are. bases: planes of each row, by its folder.
+    folder: of the small pictures and planes. bases: planes of each row, by its folder.
     """
     shown = [row for row in rows if row.state == "done"]
     mixers = mixers_html(folder, shown, bases or {})
-    told = []
+    records = []
     for row in rows:
-        its = {k: v for k, v in asdict(row).items() if v not in (None, "", ())}
-        its["links"] = [[Path(x).name, quote(x)] for x in row.files]
-        its.pop("files", None)
+        record = {k: v for k, v in asdict(row).items() if v not in (None, "", ())}
+        record["links"] = [[Path(x).name, quote(x)] for x in row.files]
+        record.pop("files", None)
         if row.picture:
             data = base64.b64encode((folder / row.picture).read_bytes()).decode("ascii")
-            its["picture"] = f"data:image/jpeg;base64,{data}"
+            record["picture"] = f"data:image/jpeg;base64,{data}"
         if (bases or {}).get(row.folder) in mixers:
-            its["basis"] = (bases or {})[row.folder]
-        told.append(its)
+            record["basis"] = (bases or {})[row.folder]
+        records.append(record)
     template = resources.files("lightpaint.batch.gallery").joinpath("gallery.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
         title=escape(visible(title)),
-        about=escape(spoken_counts(rows)),
+        about=escape(counts_text(rows)),
         failed=" failed" if any(row.state == "failed" for row in rows) else "",
-        looks=in_script(told),
-        transforms=in_script(transforms_of(shown) if mixers else {}),
+        looks=script_json(records),
+        transforms=script_json(transforms_of(shown) if mixers else {}),
         mixers="\n".join(mixers.values()),
         style=styles("batch/gallery/gallery.css", "viewer/mixer/mixer.css"),
         script=bundled("batch/gallery/gallery.js"),
@@ -115,56 +115,61 @@ def gallery_page(
     )
 
 
-def spoken_counts(rows: Sequence[Row]) -> str:
-    """`12 looks: 1 failed, 2 not done yet`."""
+def counts_text(rows: Sequence[SummaryRow]) -> str:
+    """Return `12 looks: 1 failed, 2 not done yet`."""
     counts = {state: sum(row.state == state for row in rows) for state in ("failed", "waiting")}
-    told = [f"{counts['failed']} failed"] * bool(counts["failed"])
-    told += [f"{counts['waiting']} not done yet"] * bool(counts["waiting"])
+    parts = [f"{counts['failed']} failed"] * bool(counts["failed"])
+    parts += [f"{counts['waiting']} not done yet"] * bool(counts["waiting"])
     looks = f"{len(rows)} look{'s' * (len(rows) != 1)}"
-    return f"{looks}: {', '.join(told) or 'all done'}"
+    return f"{looks}: {', '.join(parts) or 'all done'}"
 
 
-def contact_sheet(folder: Path, rows: list[Row]) -> Any:
-    """Small pictures side by side with their names, (H, W, 3) uint8; of very many the first."""
-    shown = rows[:MOST]
+def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
+    """Return small pictures side by side with their names, (H, W, 3) uint8; of very many
+    the first.
+    """
+    shown = rows[:MAX_PICTURES]
     columns = max(1, min(COLUMNS, len(shown)))
     height = max([round(WIDTH * row.size[1] / row.size[0]) for row in shown], default=WIDTH)
     height = min(height, 2 * WIDTH)
     count = -(-len(shown) // columns)
-    size = (columns * (WIDTH + GAP) + GAP, count * (height + BELOW + GAP) + 2 * GAP + BELOW)
+    size = (
+        columns * (WIDTH + GAP) + GAP,
+        count * (height + CAPTION_HEIGHT + GAP) + 2 * GAP + CAPTION_HEIGHT,
+    )
     sheet = Image.new("RGB", size, GROUND)
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(14)
-    told = spoken_counts(rows)
-    if len(rows) > MOST:
-        told += f"; the first {MOST} are shown"
-    draw.text((GAP, GAP), fitted(told, font, size[0] - 2 * GAP), FAINT, font)
+    title = counts_text(rows)
+    if len(rows) > MAX_PICTURES:
+        title += f"; the first {MAX_PICTURES} are shown"
+    draw.text((GAP, GAP), fitted(title, font, size[0] - 2 * GAP), FAINT, font)
     for k, row in enumerate(shown):
         x = GAP + k % columns * (WIDTH + GAP)
-        y = 2 * GAP + BELOW + k // columns * (height + BELOW + GAP)
+        y = 2 * GAP + CAPTION_HEIGHT + k // columns * (height + CAPTION_HEIGHT + GAP)
         _draw(sheet, folder, row, (x, y, WIDTH, height), font)
     return np.asarray(sheet)
 
 
 def _draw(
-    sheet: Image.Image, folder: Path, row: Row, box: tuple[int, int, int, int], font: Any
+    sheet: Image.Image, folder: Path, row: SummaryRow, box: tuple[int, int, int, int], font: Any
 ) -> None:
-    """One look in its box (x, y, width, height), with its name below and what it misses."""
+    """Draw one look in its box (x, y, width, height), with its name and miss below."""
     (x, y, width, height), draw = box, ImageDraw.Draw(sheet)
     if row.picture:
         with Image.open(folder / row.picture) as opened:
             scale = min(width / opened.width, height / opened.height)
             size = max(1, round(scale * opened.width)), max(1, round(scale * opened.height))
-            how = Image.Resampling.NEAREST if scale > 2 else Image.Resampling.LANCZOS
-            small = opened.resize(size, how)
+            filter_ = Image.Resampling.NEAREST if scale > 2 else Image.Resampling.LANCZOS
+            small = opened.resize(size, filter_)
         sheet.paste(small, (x + (width - size[0]) // 2, y + (height - size[1]) // 2))
     else:
         draw.rectangle((x, y, x + width - 1, y + height - 1), outline=FAINT)
-        said = {"failed": "failed", "waiting": "not done yet"}.get(row.state, "no picture")
+        text = {"failed": "failed", "waiting": "not done yet"}.get(row.state, "no picture")
         color = WARNING if row.state == "failed" else FAINT
-        draw.text((x + width // 2, y + height // 2), said, color, font, anchor="mm")
-    said = "" if row.delta_e is None else f"dE {row.delta_e:.1f}"
-    baseline = y + height + round(0.75 * BELOW)
-    draw.text((x + width, baseline), said, FAINT, font, anchor="rs")
-    room = width - round(font.getlength(said)) - 8
+        draw.text((x + width // 2, y + height // 2), text, color, font, anchor="mm")
+    text = "" if row.delta_e is None else f"dE {row.delta_e:.1f}"
+    baseline = y + height + round(0.75 * CAPTION_HEIGHT)
+    draw.text((x + width, baseline), text, FAINT, font, anchor="rs")
+    room = width - round(font.getlength(text)) - 8
     name = row.look if row.folder == row.look else f"{row.look} {row.sensor}"
     draw.text((x, baseline), fitted(visible(name), font, room), TEXT, font, anchor="ls")

@@ -1,6 +1,6 @@
-"""What each light of a basis does, small: kept beside the looks, once for all of them.
+"""Small planes of a basis, kept beside the looks, once for all of them.
 
-A gallery's mixer is made of it, when no basis is at hand any more.
+The gallery's mixer uses them when the basis is gone.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import fields_of
+from lightpaint.batch.work.work import job_fields
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, write_text
@@ -24,7 +24,7 @@ from lightpaint.report.page.mixer import planes_for_page, told_light
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 
-#: What their names end in.
+#: Suffix of their names.
 SUFFIX = ".planes.json"
 
 #: Longest that is read, in bytes.
@@ -32,24 +32,24 @@ MAX_BYTES = 2**27
 
 
 def planes_name(folder: Path, key: str) -> str:
-    """The name of those of a basis in the folder of a batch. key: as of `bases_of`.
+    """Return the name of a basis' small planes in the folder of a batch. key: as of `bases_of`.
 
     Paths count from the folder, so that a batch that is moved with its files finds its own.
     """
     base = os.path.realpath(folder)
-    told = json.dumps(_from_there(json.loads(key), base))
-    return hashlib.sha256(told.encode()).hexdigest()[:16]
+    record = json.dumps(_relative_paths(json.loads(key), base))
+    return hashlib.sha256(record.encode()).hexdigest()[:16]
 
 
-def keep_planes(folder: Path, key: str, basis: Basis) -> None:
-    """Write what a gallery in `folder` needs of a basis, unless it is there."""
+def write_planes(folder: Path, key: str, basis: Basis) -> None:
+    """Write a basis' small planes for the gallery in `folder`, unless they are there."""
     path = folder / THUMBNAILS / f"{planes_name(folder, key)}{SUFFIX}"
     identity = _identity(basis)
     if read_planes(path).get("identity") == identity:
         return
     is_noisy = any(x.any() for x in basis.noise)
     size, planes = planes_for_page(basis, is_clean=is_noisy)
-    told = {
+    record = {
         "identity": identity,
         "scene": Path(basis.origin.scene).name,
         "sensor": basis.origin.sensor,
@@ -61,46 +61,48 @@ def keep_planes(folder: Path, key: str, basis: Basis) -> None:
         "planes": planes,
     }
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, json.dumps(told, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(path, json.dumps(record, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def keep_all_planes(folder: Path, task: Task, obtained: Sequence[Basis], held: WorkerCache) -> None:
-    """The same of each basis of a task. obtained: those that are no files already."""
+def write_task_planes(
+    folder: Path, task: Task, obtained: Sequence[Basis], cache: WorkerCache
+) -> None:
+    """Write the small planes of a task's bases. obtained: bases that are no files already."""
     bases = list(obtained)
     if not bases:
-        given = content(fields_of(task, held)["basis"])
+        given = content(job_fields(task, cache)["basis"])
         bases = [given.basis if isinstance(given, LightGroups) else given]
     for key, basis in zip(task.bases, bases, strict=True):
-        keep_planes(folder, key, basis)
+        write_planes(folder, key, basis)
 
 
 def read_planes(path: Path) -> dict[str, Any]:
-    """What `keep_planes` wrote; {} where there is nothing that can be read."""
+    """Return what `write_planes` wrote; {} where nothing can be read."""
     with suppress(LightpaintError, ValueError):
-        told = strict_json(read_text(path, "planes", LightpaintError, limit=MAX_BYTES))
-        return told if isinstance(told, dict) else {}
+        record = strict_json(read_text(path, "planes", LightpaintError, limit=MAX_BYTES))
+        return record if isinstance(record, dict) else {}
     return {}
 
 
 def drop_planes(folder: Path, kept: Collection[str]) -> None:
-    """Delete those of bases that no look has any more. kept: names."""
+    """Delete small planes that no look uses. kept: names."""
     for path in (folder / THUMBNAILS).glob(f"*{SUFFIX}"):
         if path.name.removesuffix(SUFFIX) not in kept:
             path.unlink(missing_ok=True)
 
 
 def _identity(basis: Basis) -> str:
-    """Of all that is told of a basis: two with the same are of the same samples."""
+    """Return a hash of all that is shown of a basis: equal hashes, equal samples."""
     lights = [(light.name, light.unit, list(light.emission)) for light in basis.lights]
-    told = [__version__, basis.origin.scene_identity, basis.origin.halves, lights]
-    text = json.dumps([*told, basis.totals.tolist()], default=str)
+    record = [__version__, basis.origin.scene_identity, basis.origin.halves, lights]
+    text = json.dumps([*record, basis.totals.tolist()], default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _from_there(told: Any, base: str) -> Any:
-    """Paths in plain values, from `base`."""
-    if isinstance(told, dict):
-        return {key: _from_there(value, base) for key, value in told.items()}
-    if isinstance(told, str) and os.sep in told:
-        return os.path.relpath(os.path.realpath(told), base)
-    return told
+def _relative_paths(record: Any, base: str) -> Any:
+    """Return plain values with their paths relative to `base`."""
+    if isinstance(record, dict):
+        return {key: _relative_paths(value, base) for key, value in record.items()}
+    if isinstance(record, str) and os.sep in record:
+        return os.path.relpath(os.path.realpath(record), base)
+    return record

@@ -1,4 +1,4 @@
-"""The gallery of looks that were solved by name, without a manifest."""
+"""The gallery of one `solve` command's looks, without a manifest."""
 
 import hashlib
 import json
@@ -7,8 +7,8 @@ from pathlib import Path
 
 from lightpaint.basis.basis import Basis
 from lightpaint.batch.gallery.gallery import write_gallery
-from lightpaint.batch.gallery.small_planes import keep_planes
-from lightpaint.batch.gallery.summary import Row
+from lightpaint.batch.gallery.small_planes import write_planes
+from lightpaint.batch.gallery.summary import SummaryRow
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep
@@ -18,9 +18,10 @@ from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 
 
 def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookEntry:
-    """What a gallery says of a look.
+    """Return a gallery's entry for a look.
 
-    It was solved by `job` or, where there is a `folder`, made of its answer. variation: its word.
+    It was solved by `job` or, where there is a `folder`, derived from its answer. variation: its
+    word.
     """
     scenes = tuple(scene for scene in job.scenes if isinstance(scene, SceneFile))
     basis = job.basis if isinstance(job.basis, BasisFile | GroupsFile) else None
@@ -35,17 +36,17 @@ def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookE
     )
 
 
-def write_gallery_of(
+def write_solve_gallery(
     folder: Path, entries: Sequence[LookEntry], failed: Mapping[str, str], bases: Sequence[Basis]
-) -> list[Row]:
+) -> list[SummaryRow]:
     """Write the gallery of the looks in `folder`, by the names of their folders there.
 
-    failed: why, by name, of those that came to nothing. bases: of their views, which all share.
+    failed: reasons by name. bases: of their views, which all looks share.
     """
     looks, lines = [], {}
     keys = tuple(json.dumps({"view": k}) for k in range(len(bases)))
     for key, basis in zip(keys, bases, strict=True):
-        keep_planes(folder, key, basis)
+        write_planes(folder, key, basis)
     for entry in entries:
         name = entry.name
         made_of = "" if name in failed else _content(folder / name / "lighting.json")

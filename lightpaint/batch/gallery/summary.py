@@ -1,4 +1,4 @@
-"""What came of each look, read from its folder: numbers, lights, and a small picture."""
+"""The results of each look, read from its folder: numbers, lights, and a small picture."""
 
 import csv
 import io
@@ -54,7 +54,7 @@ COLUMNS = (
     "why",
 )
 
-#: What stands behind its name in the columns of a light: luminance, emission, kelvin.
+#: Suffixes of a light's columns: luminance, emission, kelvin.
 LIGHT_COLUMNS = ("", " R", " G", " B", " K")
 
 State = Literal["done", "failed", "waiting"]
@@ -74,12 +74,12 @@ class LightRow:
 
 
 @dataclass(frozen=True)
-class Row:
+class SummaryRow:
     """A look, or one view of it.
 
-    folder: of its results, from the batch's. delta_e, noise, share_met: as of report.json; None
-    where nothing was painted. agrees: whether a render confirms it; None where there was none.
-    files: what is there to open. picture: small, from the batch's folder; "" where there is none.
+    folder: of its results, relative to the batch's. delta_e, noise, share_met: as of report.json;
+    None where nothing was painted. agrees: whether a render confirms it; None where there was none.
+    files: to open. picture: small, relative to the batch's folder; "" where there is none.
     """
 
     look: str
@@ -101,9 +101,9 @@ class Row:
     size: tuple[int, int] = field(default=(4, 3))
 
 
-def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[Row]:
-    """A row for each view of each look, in the order of the manifest."""
-    rows: list[Row] = []
+def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[SummaryRow]:
+    """Return a row for each view of each look, in the order of the manifest."""
+    rows: list[SummaryRow] = []
     widest = WIDE if len(plan.looks) <= WIDE_LOOKS else NARROW
     views: dict[str, tuple[str, float] | None] = {}
     for look in plan.looks:
@@ -120,7 +120,7 @@ def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[R
 
 
 def state_of(look: PlannedLook, lines: Mapping[tuple[str, Kind], JournalLine]) -> tuple[State, str]:
-    """Whether all its steps are done, as they are asked for now; and why not."""
+    """Return whether all steps are done as they are requested now; and why not."""
     state: State = "done"
     for step in look.steps:
         line = lines.get((step.task.look, step.task.kind))
@@ -136,17 +136,17 @@ def _key(look: PlannedLook, lines: Mapping[tuple[str, Kind], JournalLine]) -> st
 
 
 def view_folders(look: PlannedLook) -> list[Path]:
-    """Where the pictures of each view are."""
+    """Return the folder of each view's pictures."""
     if not look.entry.by_sensor:
         return [look.folder]
     return [look.folder / str(scene.sensor) for scene in look.entry.scenes]
 
 
-def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) -> Row:
-    entry, told = look.entry, {}
+def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) -> SummaryRow:
+    entry, report = look.entry, {}
     if state == "done":
-        told = _json(folder / "report.json")
-    basis, seen, view = (told.get(key) or {} for key in ("basis", "seen", "view"))
+        report = _json(folder / "report.json")
+    basis, closeness, view = (report.get(key) or {} for key in ("basis", "seen", "view"))
     sensor = basis.get("sensor") or (folder.name if entry.by_sensor else "")
     if not sensor and entry.scenes and entry.scenes[0].sensor is not None:
         sensor = str(entry.scenes[0].sensor)
@@ -156,50 +156,52 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) ->
     there = [place / x for place in places for x in names if (place / x).is_file()]
     if any(step.task.kind == "export" for step in look.steps):
         there += sorted(x for x in (look.folder / EXPORT).glob("*") if x.name != RECORD)
-    return Row(
+    return SummaryRow(
         entry.name,
         state,
         why,
         folder.relative_to(plan.folder).as_posix(),
         sensor,
         Path(scene).name,
-        told.get("target", ""),
+        report.get("target", ""),
         entry.variation,
-        seen.get("delta_e"),
-        seen.get("noise"),
-        seen.get("share_met"),
-        (told.get("verification") or {}).get("agrees"),
+        closeness.get("delta_e"),
+        closeness.get("noise"),
+        closeness.get("share_met"),
+        (report.get("verification") or {}).get("agrees"),
         (view["name"], view["stops"]) if "name" in view else None,
-        _lights(look.folder, told) if state == "done" else (),
+        _lights(look.folder, report) if state == "done" else (),
         tuple(x.relative_to(plan.folder).as_posix() for x in there) if state == "done" else (),
     )
 
 
-def _lights(folder: Path, told: Mapping[str, Any]) -> tuple[LightRow, ...]:
+def _lights(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow, ...]:
     with suppress(LightpaintError):
         lighting = read_lighting(folder / "lighting.json")
         rows = []
         for light in lighting.lights:
             seen = lighting.photometry(light)
-            stops = (told.get("lights") or {}).get(light.name, {}).get("stops")
-            told_ = (light.emission, seen.hex, seen.kelvin, seen.duv, stops)
-            rows.append(LightRow(light.name, seen.y, *told_))
+            stops = (report.get("lights") or {}).get(light.name, {}).get("stops")
+            values = (light.emission, seen.hex, seen.kelvin, seen.duv, stops)
+            rows.append(LightRow(light.name, seen.y, *values))
         return tuple(rows)
     return ()
 
 
 def _json(path: Path) -> dict[str, Any]:
-    """What an object in a file says; {} of none, and of none of ours."""
+    """Return the object in a JSON file; {} where there is none, or another kind of value."""
     with suppress(LightpaintError, ValueError):
-        told = strict_json(read_text(path, "report", LightpaintError))
-        return told if isinstance(told, dict) else {}
+        report = strict_json(read_text(path, "report", LightpaintError))
+        return report if isinstance(report, dict) else {}
     return {}
 
 
 def _with_picture(
-    row: Row, base: Path, folder: Path, view: tuple[str, float] | None, key: str, widest: int
-) -> Row:
-    """With a picture of the prediction, made once for each answer. widest: in pixels."""
+    row: SummaryRow, base: Path, folder: Path, view: tuple[str, float] | None, key: str, widest: int
+) -> SummaryRow:
+    """Return the row with a picture of the prediction, made once for each answer. widest: in
+    pixels.
+    """
     of_view = f"-{folder.name}" if row.folder != row.look else ""
     name = f"{THUMBNAILS}/{key}{of_view}-{widest}.jpg"
     path = base / name
@@ -213,14 +215,16 @@ def _with_picture(
             transform = ViewTransform(*view) if view else ViewTransform("srgb", stops)
             with replacing(path) as beside:
                 shown = Image.fromarray(to_8_bit(np.clip(transform.encode(small), 0, 1)))
-                how = {"quality": QUALITY, "subsampling": 0}
-                shown.save(beside, "JPEG", **how, comment=f"{transform.name} {transform.stops!r}")
+                options = {"quality": QUALITY, "subsampling": 0}
+                shown.save(
+                    beside, "JPEG", **options, comment=f"{transform.name} {transform.stops!r}"
+                )
         with Image.open(path) as opened:
             size, comment = opened.size, opened.info.get("comment", b"").decode()
         # What it is seen through, chosen here or not, a mixer needs as well.
         seen, _, stops = comment.partition(" ")
         view = (seen, float(stops)) if stops else view
-        return Row(**{**vars(row), "picture": name, "size": size, "view": view})
+        return SummaryRow(**{**vars(row), "picture": name, "size": size, "view": view})
     return row
 
 
@@ -235,7 +239,7 @@ def _is_whole(path: Path) -> bool:
         return False
 
 
-def drop_pictures(folder: Path, rows: Iterable[Row]) -> None:
+def drop_pictures(folder: Path, rows: Iterable[SummaryRow]) -> None:
     """Delete small pictures of earlier answers."""
     kept = {row.picture for row in rows}
     for path in (folder / THUMBNAILS).glob("*.jpg"):
@@ -243,24 +247,24 @@ def drop_pictures(folder: Path, rows: Iterable[Row]) -> None:
             path.unlink(missing_ok=True)
 
 
-def summary_document(rows: Iterable[Row]) -> dict[str, Any]:
-    """summary.json: all rows, with their lights."""
+def summary_document(rows: Iterable[SummaryRow]) -> dict[str, Any]:
+    """Return the content of summary.json: all rows, with their lights."""
     looks = [{k: v for k, v in asdict(row).items() if v not in (None, "", ())} for row in rows]
     counts = {state: sum(x["state"] == state for x in looks) for state in ("done", "failed")}
     return {"format": FORMAT, "lightpaint": __version__, **counts, "looks": looks}
 
 
 def is_summary(path: Path) -> bool:
-    """Whether a file is a summary.json of ours."""
+    """Return whether a file is a summary.json of lightpaint."""
     return _json(path).get("format") == FORMAT
 
 
-def summary_json(rows: Iterable[Row]) -> str:
-    """summary.json as text."""
+def summary_json(rows: Iterable[SummaryRow]) -> str:
+    """Return summary.json as text."""
     return json.dumps(summary_document(rows), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def summary_csv(rows: list[Row]) -> str:
+def summary_csv(rows: list[SummaryRow]) -> str:
     """Return summary.csv: a line for each row, and five columns for each light.
 
     These are the luminance of its emission, under its name, that in R, G and B, and its colour

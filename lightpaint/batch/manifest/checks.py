@@ -1,4 +1,6 @@
-"""What a table asks for, before files are read: what lacks, contradicts itself, is not there."""
+"""Checks of a manifest's tables before files are read: missing keys, contradictions,
+missing files.
+"""
 
 from collections.abc import Mapping
 from glob import has_magic
@@ -6,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.batch.manifest.file_patterns import files_matching
-from lightpaint.batch.manifest.keys import SOURCE, SUBJECTS, Handover, Mistakes, near_key
-from lightpaint.batch.manifest.manifest import Manifest, Table, subject
-from lightpaint.batch.manifest.variations import SOLVED
+from lightpaint.batch.manifest.keys import SOURCE_KEYS, SUBJECT_KEYS, Handover, Mistakes, near_key
+from lightpaint.batch.manifest.manifest import Manifest, Table, subject_keys
+from lightpaint.batch.manifest.variations import SOLVED_WORDS
 from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -19,21 +21,21 @@ from lightpaint.relit.export.usd import check_usd
 from lightpaint.relit.export_forms import FORMS
 from lightpaint.screen import some_names
 
-#: What is wanted of a look if nobody says; of a lighting that is there already, and of a frame.
-WANTED, SHOWN = ("solve", "predict", "verify", "report"), ("predict",)
+#: Default steps of a look; and of a given lighting, or a frame.
+SOLVE_STEPS, GIVEN_LIGHTING_STEPS = ("solve", "predict", "verify", "report"), ("predict",)
 
-#: What is there in the place of a scene, and is rendered already.
+#: Keys that stand for a scene that is already rendered.
 BASES = ("basis", "light_groups")
 
 #: Keys of `Constraints.of`, as they stand in a lights file.
-CONSTRAINED = ("light", "tie", "prefer_current", "sparse")
+CONSTRAINT_KEYS = ("light", "tie", "prefer_current", "sparse")
 
 
-def check_together(mistakes: Mistakes, table: Table) -> None:
-    """Add what is missing, or contradicts itself."""
-    where, look = table.where, table.said
-    subjects = subject(look)
-    if not table.has(*SUBJECTS):
+def check_combination(mistakes: Mistakes, table: Table) -> None:
+    """Add keys that are missing or contradict each other to the mistakes."""
+    where, look = table.where, table.values
+    subjects = subject_keys(look)
+    if not table.has(*SUBJECT_KEYS):
         mistakes.add(
             where, "nothing to show: give painting, paintings, views, lighting or lightings"
         )
@@ -54,19 +56,19 @@ def check_together(mistakes: Mistakes, table: Table) -> None:
     elif several and given:
         mistakes.add(where, "a basis has one view only: give the scene, to see it from several")
     elif given and not table.has("scene"):
-        _check_of_basis(mistakes, where, look)
+        _check_basis_keys(mistakes, where, look)
     want, is_given = look.get("want", ()), "lighting" in look or "lightings" in look
     if is_given and (idle := [x for x in ("solve", "verify", "report", "lights") if x in want]):
         mistakes.add(where, f"want has {idle[0]!r}, and its lighting is given: leave it out")
     elif "lights" in want:
         check_by_sums(mistakes, table)
-    if is_given and (idle := [word for word in look.get("variations", ()) if word in SOLVED]):
+    if is_given and (idle := [word for word in look.get("variations", ()) if word in SOLVED_WORDS]):
         mistakes.add(where, f"variations has {idle[0]!r}, and its lighting is given")
 
 
 def check_by_sums(mistakes: Mistakes, table: Table) -> None:
-    """Add what does not go with a lighting and nothing else."""
-    where, look = table.where, table.said
+    """Add what contradicts a request for the lighting alone to the mistakes."""
+    where, look = table.where, table.values
     if len(look["want"]) > 1:
         mistakes.add(where, "want has 'lights', which is the lighting alone: leave the rest out")
     if "views" in look or "variations" in look:
@@ -79,40 +81,40 @@ def check_by_sums(mistakes: Mistakes, table: Table) -> None:
             mistakes.add(where, f"want has 'lights', and {key} needs images: leave it out")
 
 
-def _check_of_basis(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
-    """What a saved basis has no use of."""
+def _check_basis_keys(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+    """Add keys that a saved basis cannot use to the mistakes."""
     for step in ("verify", "render"):
         if step in look.get("want", ()):
             mistakes.add(where, f"want has {step!r}, which needs the scene: give scene = ...")
-    if idle := [key for key in SOURCE if key in look and key not in (*BASES, "pattern")]:
+    if idle := [key for key in SOURCE_KEYS if key in look and key not in (*BASES, "pattern")]:
         mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
 
 
-def check_wanted(mistakes: Mistakes, table: Table) -> None:
-    """Add a render or an export that is told of and not wanted."""
+def check_step_tables(mistakes: Mistakes, table: Table) -> None:
+    """Add a [render] or [export] table whose step is not wanted to the mistakes."""
     for step in ("render", "export"):
         if (
-            step in table.said
+            step in table.values
             and "want" not in table.unclear
-            and step not in table.said.get("want", ())
+            and step not in table.values.get("want", ())
         ):
             mistakes.add(
                 table.where, f"[{step}] says how, and want does not have {step!r}: add it there"
             )
 
 
-def check_handover(mistakes: Mistakes, where: str, asked: Handover, entry: Any) -> None:
-    """That a look has what other programs are told from. entry: one of its looks."""
+def check_handover(mistakes: Mistakes, where: str, requests: Handover, entry: Any) -> None:
+    """Add exports that a look cannot have to the mistakes. entry: one of its looks."""
     has_groups = isinstance(entry.basis, GroupsFile)
-    for form in asked.to:
+    for form in requests.to:
         if FORMS[form][has_groups] is None:
             needed = "light groups" if form == "nuke" else "a scene, and no light groups"
             mistakes.add(f"{where}, export", f"{form!r} is of {needed}: leave it out")
         elif not has_groups and not entry.scenes and form not in ("csv", "json"):
             mistakes.add(f"{where}, export", f"{form!r} needs the scene: give scene = ...")
-    if asked.stage and "usd" in asked.to and not Path(asked.stage).is_file():
-        mistakes.add(f"{where}, export", f"stage: no such file: {asked.stage}")
-    elif "usd" in asked.to:
+    if requests.stage and "usd" in requests.to and not Path(requests.stage).is_file():
+        mistakes.add(f"{where}, export", f"stage: no such file: {requests.stage}")
+    elif "usd" in requests.to:
         try:
             check_usd()
         except LightpaintError as error:
@@ -120,17 +122,19 @@ def check_handover(mistakes: Mistakes, where: str, asked: Handover, entry: Any) 
 
 
 def check_sequence(mistakes: Mistakes, table: Table) -> None:
-    """Add why it goes nowhere: it needs several looks, or a path of sensors."""
-    where, said = table.where, table.said
-    path, frames = said.get("sensors"), said.get("frames")
+    """Add what keeps a sequence from its frames to the mistakes: it needs looks, or a path of
+    sensors.
+    """
+    where, values = table.where, table.values
+    path, frames = values.get("sensors"), values.get("frames")
     lacking = [key for key in ("name", "through") if not table.has(key)]
     lacking += ["frames"] if not table.has("frames", "sensors") else []
     if lacking:
         mistakes.add(where, f"{lacking[0]} is missing: give name, through and frames (or sensors)")
-    if "name" in said and not is_name(said["name"]):
-        mistakes.add(where, f"{said['name']!r} is no name for a folder: say name = ...")
-    if len(said.get("through", "..")) < 2 and not table.has("sensors"):
-        mistakes.add(where, f"through is {said['through']}: expected at least two names of looks")
+    if "name" in values and not is_name(values["name"]):
+        mistakes.add(where, f"{values['name']!r} is no name for a folder: say name = ...")
+    if len(values.get("through", "..")) < 2 and not table.has("sensors"):
+        mistakes.add(where, f"through is {values['through']}: expected at least two names of looks")
     if path is not None and frames not in (None, len(path)):
         mistakes.add(where, f"{frames} frames of {len(path)} sensors: leave frames out")
     elif path is not None and len(path) < 2:
@@ -138,55 +142,57 @@ def check_sequence(mistakes: Mistakes, table: Table) -> None:
 
 
 def settings_of(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> Settings:
-    said = mistakes.settings(look.get("settings", {}), where)
-    want = look.get("want", WANTED)
-    return Settings(**said, verify="verify" in want, report="report" in want)
+    values = mistakes.settings(look.get("settings", {}), where)
+    want = look.get("want", SOLVE_STEPS)
+    return Settings(**values, verify="verify" in want, report="report" in want)
 
 
 def constraints_of(manifest: Manifest, where: str, look: Mapping[str, Any]) -> Constraints:
-    """Return what is asked of the lights, by tables and files; what is said last goes before."""
-    asked, mistakes = Constraints(), manifest.mistakes
+    """Return the constraints of tables and files; later ones override earlier ones."""
+    requests, mistakes = Constraints(), manifest.mistakes
     for given in look["constraints"]:
         try:
             if isinstance(given, str):
-                asked = asked.and_then(read_constraints(manifest.folder / given))
+                requests = requests.and_then(read_constraints(manifest.folder / given))
             else:
-                asked = asked.and_then(_constraints(mistakes, f"{where}, constraints", given))
+                requests = requests.and_then(_constraints(mistakes, f"{where}, constraints", given))
         except LightpaintError as error:
             mistakes.add(f"{where}, constraints", str(error))
-    return asked
+    return requests
 
 
 def _constraints(mistakes: Mistakes, where: str, given: Mapping[str, Any]) -> Constraints:
-    """Return what a table asks. What is wrong in it is added, light by light and key by key."""
-    said = {key: value for key, value in given.items() if key in CONSTRAINED}
-    for key in (key for key in given if key not in said):
-        near = near_key(key, CONSTRAINED)
-        hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(CONSTRAINED)}"
+    """Return the constraints of a table; errors are added light by light and key by key."""
+    values = {key: value for key, value in given.items() if key in CONSTRAINT_KEYS}
+    for key in (key for key in given if key not in values):
+        near = near_key(key, CONSTRAINT_KEYS)
+        hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(CONSTRAINT_KEYS)}"
         mistakes.add(where, f"unknown key {key!r}{hint}")
-    lights = said.pop("light", None)
+    lights = values.pop("light", None)
     if isinstance(lights, dict):
         lights = {
-            name: asked for name, asked in lights.items() if _is_light(mistakes, where, name, asked)
+            name: requests
+            for name, requests in lights.items()
+            if _is_light(mistakes, where, name, requests)
         }
-    for key, value in list(said.items()):
-        if not _will_do(mistakes, where, **{key: value}):
-            del said[key]
-    return Constraints.of(lights, **said)
+    for key, value in list(values.items()):
+        if not _is_valid(mistakes, where, **{key: value}):
+            del values[key]
+    return Constraints.of(lights, **values)
 
 
-def _is_light(mistakes: Mistakes, where: str, name: str, asked: Any) -> bool:
-    """Return whether that can be asked of a light; each key by itself, and then together."""
+def _is_light(mistakes: Mistakes, where: str, name: str, requests: Any) -> bool:
+    """Return whether a light's constraints are valid; each key by itself, and then together."""
     # A Duv alone says nothing.
-    each = asked if isinstance(asked, dict) else {}
-    alone = [{name: {key: value}} for key, value in each.items() if key != "duv"]
-    wrong = [one for one in alone if not _will_do(mistakes, where, light=one)]
-    return not wrong and _will_do(mistakes, where, light={name: asked})
+    each = requests if isinstance(requests, dict) else {}
+    lock_folder = [{name: {key: value}} for key, value in each.items() if key != "duv"]
+    wrong = [one for one in lock_folder if not _is_valid(mistakes, where, light=one)]
+    return not wrong and _is_valid(mistakes, where, light={name: requests})
 
 
-def _will_do(mistakes: Mistakes, where: str, **asked: Any) -> bool:
+def _is_valid(mistakes: Mistakes, where: str, **requests: Any) -> bool:
     try:
-        Constraints.of(**asked)
+        Constraints.of(**requests)
     except LightpaintError as error:
         mistakes.add(where, str(error))
         return False
@@ -194,8 +200,10 @@ def _will_do(mistakes: Mistakes, where: str, **asked: Any) -> bool:
 
 
 def check_files(manifest: Manifest, table: Table) -> None:
-    """Add what is named and not there, so that a slip of the pen is no failed look at midnight."""
-    where, look = table.where, table.said
+    """Add files that do not exist to the mistakes, so that a misspelt name fails now and not at
+    midnight.
+    """
+    where, look = table.where, table.values
     groups = look.get("light_groups")
     if groups is not None and not (manifest.folder / groups).exists():
         manifest.mistakes.add(where, f"light_groups: no such file or folder: {groups}")
@@ -215,7 +223,7 @@ def check_files(manifest: Manifest, table: Table) -> None:
 
 
 def matching(base: Path, path: str) -> list[str]:
-    """The files that a path or a pattern names, in the order of their names."""
+    """Return the files that a path or a pattern names, in the order of their names."""
     given = str(base / path)
     if not has_magic(path) or Path(given).is_file():
         return [given] if Path(given).is_file() else []

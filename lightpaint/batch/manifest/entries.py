@@ -1,4 +1,4 @@
-"""The looks that a manifest asks for, one by one: patterns, sensors, variations, frames told."""
+"""The looks of a manifest, one by one: patterns, sensors and variations expanded."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,19 +9,26 @@ from typing import Any
 
 from lightpaint.batch.manifest.checks import (
     BASES,
-    SHOWN,
-    WANTED,
+    GIVEN_LIGHTING_STEPS,
+    SOLVE_STEPS,
+    check_combination,
     check_files,
     check_handover,
-    check_together,
-    check_wanted,
+    check_step_tables,
     constraints_of,
     matching,
     settings_of,
 )
-from lightpaint.batch.manifest.keys import GIVEN, PAINTED, SOURCE, Final, Handover, Space
+from lightpaint.batch.manifest.keys import (
+    LIGHTING_STEPS,
+    PAINTING_KEYS,
+    SOURCE_KEYS,
+    Final,
+    Handover,
+    Space,
+)
 from lightpaint.batch.manifest.manifest import Manifest, Table
-from lightpaint.batch.manifest.variations import SHIFTED
+from lightpaint.batch.manifest.variations import SHIFTED_WORDS
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import is_name
@@ -30,16 +37,16 @@ from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, Painting, SceneFile
 
 #: Looks of one batch, at most.
-MOST_LOOKS = 10_000
+MAX_LOOKS = 10_000
 
 
 @dataclass(frozen=True)
 class LookEntry:
-    """One look, with all that is asked of it.
+    """A look with all its inputs and options.
 
-    name: of its folder. where: what errors call it. scenes, basis: what it is lit in. paintings:
-    of each view; none where a lighting is given. variation: the word it varies another by.
-    lighting: a file with the lighting. of: names of looks whose lightings it is made of; share,
+    name: of its folder. where: its name in errors. scenes, basis: that it is lit in. paintings: of
+    each view; none where a lighting is given. variation: the word by which it varies another.
+    lighting: a file with the lighting. of: names of looks whose lightings it combines; share,
     space: between two of them. want: steps.
     """
 
@@ -51,7 +58,7 @@ class LookEntry:
     constraints: Constraints = field(default_factory=Constraints)
     settings: Settings = field(default_factory=Settings)
     by_sensor: bool = False
-    want: tuple[str, ...] = WANTED
+    want: tuple[str, ...] = SOLVE_STEPS
     final: Final = field(default_factory=Final)
     handover: Handover = field(default_factory=Handover)
     variation: str = ""
@@ -62,44 +69,44 @@ class LookEntry:
 
     @property
     def is_solved(self) -> bool:
-        """Whether its lighting is found, and not made of others."""
+        """True if its lighting is solved for, and not given or combined."""
         return bool(self.paintings)
 
     @property
     def is_by_sums(self) -> bool:
-        """Whether nothing but its lighting is wanted, for which nobody needs its pictures."""
+        """True if only its lighting is wanted, which needs no pictures."""
         return self.want == ("lights",)
 
 
 @dataclass(frozen=True)
 class LookEntries:
-    """All looks that tables ask for.
+    """Looks of all tables.
 
-    whole: those that can be planned, in their order. rest: of each table with mistakes, what can be
-    looked at all the same: its scenes, constraints and settings, without a painting.
+    complete: those that can be planned, in their order. incomplete: of each table with mistakes,
+    the scenes, constraints and settings that can be checked all the same, without a painting.
     """
 
-    whole: list[LookEntry] = field(default_factory=list)
-    rest: list[tuple[Table, LookEntry]] = field(default_factory=list)
+    complete: list[LookEntry] = field(default_factory=list)
+    incomplete: list[tuple[Table, LookEntry]] = field(default_factory=list)
 
 
 def looks_of(manifest: Manifest) -> LookEntries:
-    """Return all looks that tables ask for; what is wrong is added to the mistakes."""
+    """Return the looks of all tables; errors are added to the mistakes."""
     sources, looks = _Sources(manifest), LookEntries()
     for table in manifest.looks:
-        made, entry = _of_look(manifest, sources, table)
-        looks.whole.extend(made)
-        if len(looks.whole) > MOST_LOOKS:
+        made, entry = _table_looks(manifest, sources, table)
+        looks.complete.extend(made)
+        if len(looks.complete) > MAX_LOOKS:
             raise BatchError(
-                f"{manifest.path} asks for more than {MOST_LOOKS} looks: make several batches of it"
+                f"{manifest.path} asks for more than {MAX_LOOKS} looks: make several batches of it"
             )
         if entry is not None:
-            looks.rest.append((table, entry))
+            looks.incomplete.append((table, entry))
     return looks
 
 
 class _Sources:
-    """Scenes and bases, of which equal ones are one, so that each is loaded once."""
+    """Scenes and bases, equal ones shared, so that each is loaded once."""
 
     def __init__(self, manifest: Manifest) -> None:
         self._base = manifest.folder
@@ -107,14 +114,14 @@ class _Sources:
         self._bases: dict[str, BasisFile | GroupsFile] = {}
 
     def scene(self, look: Mapping[str, Any], sensor: str | int | None) -> SceneFile:
-        said = {key: look[key] for key in SOURCE if key in look}
+        values = {key: look[key] for key in SOURCE_KEYS if key in look}
         for key in ("basis", "light_groups", "pattern", "sensors"):
-            said.pop(key, None)
-        path = str(self._base / said.pop("scene"))
-        if "lights_file" in said:
-            said["lights_file"] = str(self._base / said["lights_file"])
-        said["parameters"] = {k: str(v) for k, v in said.get("parameters", {}).items()}
-        made = SceneFile(path, **{**said, "sensor": sensor})
+            values.pop(key, None)
+        path = str(self._base / values.pop("scene"))
+        if "lights_file" in values:
+            values["lights_file"] = str(self._base / values["lights_file"])
+        values["parameters"] = {k: str(v) for k, v in values.get("parameters", {}).items()}
+        made = SceneFile(path, **{**values, "sensor": sensor})
         return self._scenes.setdefault(repr(made), made)
 
     def basis(self, look: Mapping[str, Any]) -> BasisFile | GroupsFile | None:
@@ -134,52 +141,52 @@ class _Sources:
         return self._bases.setdefault(repr(made), made)
 
 
-def _of_look(
+def _table_looks(
     manifest: Manifest, sources: _Sources, table: Table
 ) -> tuple[list[LookEntry], LookEntry | None]:
-    """Return the looks that one table asks for; or, of one with mistakes, what of it is clear."""
-    mistakes, where, look = manifest.mistakes, table.where, table.said
-    before = len(mistakes.found)
-    check_together(mistakes, table)
+    """Return the looks of one table; or, of one with mistakes, the part that is clear."""
+    mistakes, where, look = manifest.mistakes, table.where, table.values
+    before = len(mistakes.lines)
+    check_combination(mistakes, table)
     check_files(manifest, table)
-    check_wanted(mistakes, table)
+    check_step_tables(mistakes, table)
     is_given = table.has("lighting", "lightings")
     entry = LookEntry(
         look.get("name", ""),
         where,
         constraints=constraints_of(manifest, where, look),
         settings=settings_of(mistakes, where, look),
-        want=tuple(look.get("want", SHOWN if is_given else WANTED)),
+        want=tuple(look.get("want", GIVEN_LIGHTING_STEPS if is_given else SOLVE_STEPS)),
         final=mistakes.final(look.get("render", {}), where),
         handover=mistakes.handover(look.get("export", {}), where, manifest.folder),
     )
     made: list[LookEntry] = []
     try:
         _painting(manifest, look, "")  # its view is looked at, whatever else is wrong
-        if len(mistakes.found) == before and not table.unclear:
+        if len(mistakes.lines) == before and not table.unclear:
             entry = replace(entry, basis=sources.basis(look))
-            made = list(islice(_of_subject(manifest, sources, entry, look), MOST_LOOKS + 1))
-            made += [_varied(x, word) for word in look.get("variations", ()) for x in made]
+            made = list(islice(_subject_looks(manifest, sources, entry, look), MAX_LOOKS + 1))
+            made += [_variation_entry(x, word) for word in look.get("variations", ()) for x in made]
     except LightpaintError as error:
         mistakes.add(where, str(error))
-    shown = made[0] if made else _what_is_clear(manifest, sources, table, entry)
+    shown = made[0] if made else _partial_entry(manifest, sources, table, entry)
     if "export" in entry.want and (shown.scenes or shown.basis):
         check_handover(mistakes, where, entry.handover, shown)
     for name in {one.name for one in made} or {entry.name} - {""}:
         if not is_name(name):
             mistakes.add(where, f"{name!r} is no name for a folder: say name = ...")
-    if len(mistakes.found) == before and not table.unclear:
+    if len(mistakes.lines) == before and not table.unclear:
         return made, None
     return [], shown
 
 
-def _what_is_clear(
+def _partial_entry(
     manifest: Manifest, sources: _Sources, table: Table, entry: LookEntry
 ) -> LookEntry:
-    """Return the scenes and the basis of a table with mistakes, as far as they follow from it."""
-    look, base = table.said, manifest.folder
+    """Return the scenes and the basis of a table with mistakes, as far as they are known."""
+    look, base = table.values, manifest.folder
     # Another sensor, or none, is as good to look at the lights of a scene.
-    if table.unclear & (set(SOURCE) - {"sensor", "sensors"}):
+    if table.unclear & (set(SOURCE_KEYS) - {"sensor", "sensors"}):
         return entry
     if "scene" in look and (base / look["scene"]).is_file():
         sensors = [*look.get("views", ()), *look.get("sensors", ())]
@@ -191,10 +198,10 @@ def _what_is_clear(
     return entry
 
 
-def _of_subject(
+def _subject_looks(
     manifest: Manifest, sources: _Sources, entry: LookEntry, look: Mapping[str, Any]
 ) -> Iterator[LookEntry]:
-    """A look for each painting or lighting, through each sensor."""
+    """Yield a look for each painting or lighting, through each sensor."""
     if "views" in look:
         views = look["views"]
         yield replace(
@@ -227,26 +234,28 @@ def _of_subject(
 
 
 def _painting(manifest: Manifest, look: Mapping[str, Any], file: str) -> Painting:
-    said = {key: look[key] for key in PAINTED if key in look}
-    transform = TransformChoice(said.pop("view", None), said.pop("exposure", None))
-    if "find_template" in said:
-        said["find"] = said.pop("find_template")
+    values = {key: look[key] for key in PAINTING_KEYS if key in look}
+    transform = TransformChoice(values.pop("view", None), values.pop("exposure", None))
+    if "find_template" in values:
+        values["find"] = values.pop("find_template")
     for key in ("mask", "template"):
-        if key in said:
-            said[key] = str(manifest.folder / said[key])
-    return Painting(file, transform=transform, **said)
+        if key in values:
+            values[key] = str(manifest.folder / values[key])
+    return Painting(file, transform=transform, **values)
 
 
-def _varied(entry: LookEntry, word: str) -> LookEntry:
-    """A sibling of a look: solved otherwise, or made of its answer."""
+def _variation_entry(entry: LookEntry, word: str) -> LookEntry:
+    """Return a variation of a look: solved with other settings, or derived from its answer."""
     named = replace(entry, name=f"{entry.name}-{word.replace(' ', '-')}", variation=word)
-    if word not in SHIFTED:
+    if word not in SHIFTED_WORDS:
         if not entry.is_solved:
             raise LightpaintError(f"variations has {word!r}, and its lighting is given")
         return named
-    return replace(named, paintings=(), lighting="", of=(entry.name,), want=_given(entry.want))
+    return replace(
+        named, paintings=(), lighting="", of=(entry.name,), want=_lighting_steps(entry.want)
+    )
 
 
-def _given(want: Sequence[str]) -> tuple[str, ...]:
-    """What is wanted of a lighting that is made of others."""
-    return tuple(step for step in want if step in GIVEN) or SHOWN
+def _lighting_steps(want: Sequence[str]) -> tuple[str, ...]:
+    """Return the wanted steps that apply to a lighting that is combined from others."""
+    return tuple(step for step in want if step in LIGHTING_STEPS) or GIVEN_LIGHTING_STEPS

@@ -1,6 +1,6 @@
-"""The files that a pattern of a manifest names, found in bounds.
+"""The files that a pattern of a manifest names, found within bounds.
 
-A pattern may name any folder, and one that names the root would look at every file of the machine.
+A pattern may name any folder, and one that names the root would visit every file of the machine.
 """
 
 import os
@@ -13,8 +13,8 @@ from re import Pattern, compile
 
 from lightpaint.errors import BatchError
 
-#: Files and folders that are looked at for one pattern, and how deep `**` leads.
-MOST_LOOKED_AT, DEEPEST = 20_000, 32
+#: Files and folders that one pattern may visit, and the depth of `**`.
+MAX_VISITED, MAX_DEPTH = 20_000, 32
 
 
 def files_matching(pattern: str, base: Path = Path()) -> list[str]:
@@ -30,43 +30,43 @@ def files_matching(pattern: str, base: Path = Path()) -> list[str]:
     whole = parts[fixed:]
     rest = [x for k, x in enumerate(whole) if x != "**" or whole[max(k - 1, 0) : k] != ("**",)]
     start = os.path.join("" if base == Path() else base, *parts[:fixed])
-    found = dict.fromkeys(_Search(pattern).below(start, tuple(rest), 0))
+    found = dict.fromkeys(_Search(pattern).walk(start, tuple(rest), 0))
     return [path for path in found if os.path.isfile(path)]
 
 
 class _Search:
-    """A walk through folders that counts what it looks at."""
+    """A walk through folders that counts the files it visits."""
 
     def __init__(self, pattern: str) -> None:
-        self._pattern, self._looked_at = pattern, 0
-        self._seen: set[tuple[str, int]] = set()
+        self._pattern, self._visited_count = pattern, 0
+        self._visited: set[tuple[str, int]] = set()
 
-    def below(self, folder: str, parts: tuple[str, ...], depth: int) -> Iterator[str]:
-        """Yield what matches the parts in a folder."""
-        if (folder, len(parts)) in self._seen:
+    def walk(self, folder: str, parts: tuple[str, ...], depth: int) -> Iterator[str]:
+        """Yield the paths in a folder that match the parts."""
+        if (folder, len(parts)) in self._visited:
             return
-        self._seen.add((folder, len(parts)))
+        self._visited.add((folder, len(parts)))
         first, *others = parts
         rest = tuple(others)
         if first == "**":
             if rest:
-                yield from self.below(folder, rest, depth)
-            for name, is_folder in self._listed(folder):
+                yield from self.walk(folder, rest, depth)
+            for name, is_folder in self._list_folder(folder):
                 path = os.path.join(folder, name)
                 if name.startswith("."):
                     continue
                 if not rest:
                     yield path
-                if is_folder and depth < DEEPEST:
-                    yield from self.below(path, parts, depth + 1)
+                if is_folder and depth < MAX_DEPTH:
+                    yield from self.walk(path, parts, depth + 1)
         elif not has_magic(first):
             path = os.path.join(folder, first)
             if not rest:
                 yield path
             elif os.path.isdir(path):
-                yield from self.below(path, rest, depth)
+                yield from self.walk(path, rest, depth)
         else:
-            for name, _ in self._listed(folder):
+            for name, _ in self._list_folder(folder):
                 if not _regex(first).match(name):
                     continue
                 if name.startswith(".") and not first.startswith("."):
@@ -75,18 +75,18 @@ class _Search:
                 if not rest:
                     yield path
                 elif os.path.isdir(path):
-                    yield from self.below(path, rest, depth)
+                    yield from self.walk(path, rest, depth)
 
-    def _listed(self, folder: str) -> list[tuple[str, bool]]:
-        """Names in a folder, and which are folders themselves; none where it cannot be read."""
+    def _list_folder(self, folder: str) -> list[tuple[str, bool]]:
+        """Return names in a folder, and which are folders; none where it cannot be read."""
         found = []
         try:
             with os.scandir(folder or ".") as entries:
                 for entry in entries:
-                    self._looked_at += 1
-                    if self._looked_at > MOST_LOOKED_AT:
+                    self._visited_count += 1
+                    if self._visited_count > MAX_VISITED:
                         raise BatchError(
-                            f"the pattern {self._pattern!r} has more than {MOST_LOOKED_AT} files "
+                            f"the pattern {self._pattern!r} has more than {MAX_VISITED} files "
                             "to look at: name a folder nearer to them"
                         )
                     found.append((entry.name, entry.is_dir(follow_symlinks=False)))

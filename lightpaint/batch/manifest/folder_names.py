@@ -3,10 +3,10 @@
 import unicodedata
 from collections.abc import Iterable
 
-#: What a batch writes beside its looks, and may find there of an earlier run.
+#: Files that a batch writes beside its looks, and may replace.
 FILES = ("index.html", "contact.png", "summary.csv", "summary.json")
 
-#: What is done, in the folder of a batch; and of a part of it, in what such a name begins with.
+#: Name of the journal in the folder of a batch; and how the name of a part's journal begins.
 JOURNAL, JOURNAL_PART = "journal.jsonl", "journal-"
 
 #: The folder of small pictures.

@@ -1,4 +1,4 @@
-"""What a manifest may say: its keys, and what is expected of each."""
+"""The keys of a manifest, and the values that each takes."""
 
 import difflib
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -15,17 +15,17 @@ from lightpaint.scene.film import MAX_SPP, check_resolution
 from lightpaint.target.target_reader import Paint
 from lightpaint.validation import BRIGHTEST, MAX_LISTED, SWITCH, Check, a, one_of, whole
 
-#: What can be wanted of a look; `lights` is the lighting and nothing else.
+#: Steps of a look; `lights` is the lighting and nothing else.
 Step = Literal["solve", "predict", "verify", "report", "render", "export", "lights"]
 
-#: What can be wanted of a lighting that is there already.
-GIVEN: tuple[Step, ...] = ("predict", "render", "export")
+#: Steps of a given lighting.
+LIGHTING_STEPS: tuple[Step, ...] = ("predict", "render", "export")
 
-#: What a sequence is even in: stops of brightness, or lightness; colours as people see them.
+#: Scale in which a sequence is even: stops of brightness, or perceived lightness and colour.
 Space = Literal["log", "oklab"]
 
 #: Frames of one sequence, at most.
-MOST_FRAMES = 10_000
+MAX_FRAMES = 10_000
 
 
 def _texts(value: Any) -> bool:
@@ -59,8 +59,8 @@ TEXT: Check = (lambda value: isinstance(value, str) and value != "", "a text")
 TEXTS: Check = (_texts, f'a list of texts, ["a", "b"], {MAX_LISTED} at most')
 TABLE: Check = a(dict, "a table")
 
-#: How a scene is loaded, or what is there in its place.
-SOURCE: dict[str, Check] = {
+#: Keys for loading a scene, or what replaces it.
+SOURCE_KEYS: dict[str, Check] = {
     "scene": TEXT,
     "basis": TEXT,
     "light_groups": TEXT,
@@ -80,8 +80,8 @@ SOURCE: dict[str, Check] = {
     "integrator": TEXT,
 }
 
-#: How a painting is read.
-PAINTED: dict[str, Check] = {
+#: Keys for reading a painting.
+PAINTING_KEYS: dict[str, Check] = {
     "mask": TEXT,
     "layer": TEXT,
     "template": TEXT,
@@ -91,8 +91,8 @@ PAINTED: dict[str, Check] = {
     "paint": one_of(Paint),
 }
 
-#: What is asked, and what is wanted.
-ASKED: dict[str, Check] = {
+#: Keys for constraints, settings and steps.
+REQUEST_KEYS: dict[str, Check] = {
     "constraints": (
         lambda v: isinstance(v, dict) or (isinstance(v, str) and v != ""),
         "a table, or the path of a lights file",
@@ -104,8 +104,8 @@ ASKED: dict[str, Check] = {
     "variations": _some_of(VARIATIONS),
 }
 
-#: Of which a look has exactly one.
-SUBJECTS: dict[str, Check] = {
+#: Keys of which a look has exactly one.
+SUBJECT_KEYS: dict[str, Check] = {
     "painting": TEXT,
     "paintings": TEXTS,
     "views": (_table_of(lambda v: isinstance(v, str) and v != ""), "a table, SENSOR = PAINTING"),
@@ -113,20 +113,20 @@ SUBJECTS: dict[str, Check] = {
     "lightings": TEXTS,
 }
 
-DEFAULTS: dict[str, Check] = {**SOURCE, **PAINTED, **ASKED}
-LOOK: dict[str, Check] = {"name": TEXT, **SUBJECTS, **DEFAULTS}
-SEQUENCE: dict[str, Check] = {
+DEFAULT_KEYS: dict[str, Check] = {**SOURCE_KEYS, **PAINTING_KEYS, **REQUEST_KEYS}
+LOOK_KEYS: dict[str, Check] = {"name": TEXT, **SUBJECT_KEYS, **DEFAULT_KEYS}
+SEQUENCE_KEYS: dict[str, Check] = {
     "name": TEXT,
     "through": (_texts, "a list of names of looks"),
     "sensors": TEXTS,
-    "frames": whole(2, MOST_FRAMES),
+    "frames": whole(2, MAX_FRAMES),
     "space": one_of(Space),
-    "want": _some_of(GIVEN),
+    "want": _some_of(LIGHTING_STEPS),
     "render": TABLE,
     "export": TABLE,
 }
 
-#: Of `Settings`, what does not stand elsewhere in a manifest or on the command line.
+#: Fields of `Settings` that have no other place in a manifest or on the command line.
 SETTINGS = tuple(
     name
     for name in Settings.expected
@@ -136,42 +136,48 @@ SETTINGS = tuple(
 
 @dataclass(frozen=True)
 class Final:
-    """A final render. spp: samples per pixel, the scene's by default. resolution: of the film."""
+    """Options of a final render. spp: samples per pixel, by default the scene's. resolution: of the
+    film.
+    """
 
     spp: int | None = None
     resolution: str | None = None
     seed: int = 0
 
 
-FINAL: dict[str, Check] = {"spp": whole(2, MAX_SPP), "resolution": TEXT, "seed": whole(0)}
+FINAL_KEYS: dict[str, Check] = {"spp": whole(2, MAX_SPP), "resolution": TEXT, "seed": whole(0)}
 
 
 @dataclass(frozen=True)
 class Handover:
-    """What other programs get. to: forms, as of `lightpaint export`. stage: of USD, by its path."""
+    """Exports for other programs. to: forms, as of `lightpaint export`. stage: path of a
+    USD stage.
+    """
 
     to: tuple[str, ...] = ("csv", "json")
     stage: str = ""
 
 
-HANDOVER: dict[str, Check] = {"to": _some_of(FORMS), "stage": TEXT}
+HANDOVER_KEYS: dict[str, Check] = {"to": _some_of(FORMS), "stage": TEXT}
 
 
 @dataclass
 class Mistakes:
-    """What is wrong, a line each, as it is found."""
+    """Errors in a manifest, one line each, as they are found."""
 
     source: str
-    found: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
 
-    def add(self, where: str, said: str) -> None:
-        """One more. where: the look and the key; "" for the manifest as a whole."""
-        line = one_line(f"{self.source}: {where}{': ' if where else ''}{said}", limit=1000)
-        if line not in self.found:
-            self.found.append(line)
+    def add(self, where: str, text: str) -> None:
+        """Add an error. where: the look and the key; "" for the manifest as a whole."""
+        line = one_line(f"{self.source}: {where}{': ' if where else ''}{text}", limit=1000)
+        if line not in self.lines:
+            self.lines.append(line)
 
-    def keys(self, given: Mapping[str, Any], known: Mapping[str, Check], where: str) -> set[str]:
-        """The keys of `given` that are as expected; what is wrong with the others is added."""
+    def check_keys(
+        self, given: Mapping[str, Any], known: Mapping[str, Check], where: str
+    ) -> set[str]:
+        """Return the keys of `given` with valid values; errors in others are added."""
         right = set()
         for key, value in given.items():
             if key not in known:
@@ -186,47 +192,47 @@ class Mistakes:
                 self.add(where, f"{key} is {one_line(repr(value), limit=120)}: expected {words}")
         return right
 
-    def unclear(
+    def unclear_keys(
         self, given: Mapping[str, Any], known: Mapping[str, Check], right: Collection[str]
     ) -> frozenset[str]:
-        """Return the keys that were meant where `given` is wrong. right: as of `keys`."""
+        """Return the keys that were meant where `given` is wrong. right: as of `check_keys`."""
         wrong = [key for key in given if key not in right]
         return frozenset(key if key in known else near_key(key, known) for key in wrong) - {""}
 
     def settings(self, given: Mapping[str, Any], where: str) -> dict[str, Any]:
-        """Those of a table that mean something, by name."""
+        """Return the valid settings of a table, by name."""
         known = {name: Settings.expected[name] for name in SETTINGS}
-        right = self.keys(given, known, f"{where}, settings")
-        said = {name: value for name, value in given.items() if name in right}
+        right = self.check_keys(given, known, f"{where}, settings")
+        values = {name: value for name, value in given.items() if name in right}
         try:
-            Settings(**said)
+            Settings(**values)
         except LightpaintError as error:
             self.add(f"{where}, settings", str(error))
             return {}
-        return said
+        return values
 
     def final(self, given: Mapping[str, Any], where: str) -> Final:
-        """The final render that a table asks for."""
-        right = self.keys(given, FINAL, f"{where}, render")
-        said = {name: value for name, value in given.items() if name in right}
+        """Return the final render of a table."""
+        right = self.check_keys(given, FINAL_KEYS, f"{where}, render")
+        values = {name: value for name, value in given.items() if name in right}
         try:
-            if "resolution" in said:
-                check_resolution(said["resolution"])
+            if "resolution" in values:
+                check_resolution(values["resolution"])
         except LightpaintError as error:
             self.add(f"{where}, render", str(error))
             return Final()
-        return Final(**said)
+        return Final(**values)
 
     def handover(self, given: Mapping[str, Any], where: str, base: Path) -> Handover:
-        """What a table asks for other programs. base: what its paths are relative to."""
-        right = self.keys(given, HANDOVER, f"{where}, export")
-        said = {name: value for name, value in given.items() if name in right}
-        made = Handover(tuple(said.get("to", Handover.to)), said.get("stage", ""))
+        """Return the exports of a table. base: folder that its paths are relative to."""
+        right = self.check_keys(given, HANDOVER_KEYS, f"{where}, export")
+        values = {name: value for name, value in given.items() if name in right}
+        made = Handover(tuple(values.get("to", Handover.to)), values.get("stage", ""))
         if made.stage and "usd" not in made.to:
             self.add(f"{where}, export", "stage is of the form 'usd': add that, or leave it out")
         return replace(made, stage=str(base / made.stage) if made.stage else "")
 
 
 def near_key(key: str, known: Iterable[str]) -> str:
-    """Return the key that may have been meant by a misspelt one; "" where none is near."""
+    """Return the known key that a misspelt one probably stands for; "" where none is near."""
     return next(iter(difflib.get_close_matches(key, list(known), 1)), "")

@@ -4,33 +4,38 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from lightpaint.batch.manifest.checks import SHOWN, check_handover, check_sequence, check_wanted
-from lightpaint.batch.manifest.entries import MOST_LOOKS, LookEntries, LookEntry, looks_of
+from lightpaint.batch.manifest.checks import (
+    GIVEN_LIGHTING_STEPS,
+    check_handover,
+    check_sequence,
+    check_step_tables,
+)
+from lightpaint.batch.manifest.entries import MAX_LOOKS, LookEntries, LookEntry, looks_of
 from lightpaint.batch.manifest.folder_names import is_reserved, name_clashes
-from lightpaint.batch.manifest.keys import MOST_FRAMES, Mistakes
+from lightpaint.batch.manifest.keys import MAX_FRAMES, Mistakes
 from lightpaint.batch.manifest.manifest import Manifest, Table
-from lightpaint.batch.manifest.sequence import at_frame
+from lightpaint.batch.manifest.sequence import frame_position
 from lightpaint.errors import BatchError
 from lightpaint.screen import some_names
 
 
 def entries_of(manifest: Manifest) -> LookEntries:
-    """Return all looks in the order of the manifest; what is wrong is added to its mistakes."""
+    """Return all looks in the order of the manifest; errors are added to its mistakes."""
     looks = looks_of(manifest)
     for table in manifest.sequences:
-        looks.whole.extend(_of_sequence(manifest, looks, table))
-        if len(looks.whole) > MOST_LOOKS + MOST_FRAMES:
+        looks.complete.extend(_sequence_looks(manifest, looks, table))
+        if len(looks.complete) > MAX_LOOKS + MAX_FRAMES:
             raise BatchError(
-                f"{manifest.path} asks for more than {MOST_LOOKS} looks and {MOST_FRAMES} frames: "
+                f"{manifest.path} asks for more than {MAX_LOOKS} looks and {MAX_FRAMES} frames: "
                 "make several batches of it"
             )
-    named = [entry for _, entry in looks.rest if entry.name]
-    _check_names(manifest, [*looks.whole, *named])
+    named = [entry for _, entry in looks.incomplete if entry.name]
+    _check_names(manifest, [*looks.complete, *named])
     return looks
 
 
 def _check_names(manifest: Manifest, looks: Sequence[LookEntry]) -> None:
-    """Add to the mistakes each look whose folder another look, or the batch itself, would use."""
+    """Add each look whose folder another look, or the batch itself, would use to the mistakes."""
     for look in looks:
         if is_reserved(look.name):
             manifest.mistakes.add(
@@ -41,35 +46,35 @@ def _check_names(manifest: Manifest, looks: Sequence[LookEntry]) -> None:
     for same in name_clashes(look.name for look in looks):
         wheres = some_names(dict.fromkeys(x.where for x in looks if x.name in same), " and ")
         names = " and ".join(map(repr, same))
-        said = f"more than one look would be called {names}: say name = ... in one of them"
+        text = f"more than one look would be called {names}: say name = ... in one of them"
         if len(same) > 1:
-            said = (
+            text = (
                 f"{names} would be one folder on disks that do not tell case: say name = ... "
                 "in one of them"
             )
-        manifest.mistakes.add(wheres, said)
+        manifest.mistakes.add(wheres, text)
 
 
-def _of_sequence(manifest: Manifest, looks: LookEntries, table: Table) -> list[LookEntry]:
+def _sequence_looks(manifest: Manifest, looks: LookEntries, table: Table) -> list[LookEntry]:
     """Return a look for each frame; none of a sequence with mistakes."""
-    mistakes, where, said = manifest.mistakes, table.where, table.said
-    by_name = {look.name: look for look in looks.whole}
-    before = len(mistakes.found)
+    mistakes, where, values = manifest.mistakes, table.where, table.values
+    by_name = {look.name: look for look in looks.complete}
+    before = len(mistakes.lines)
     check_sequence(mistakes, table)
-    check_wanted(mistakes, table)
-    final = mistakes.final(said.get("render", {}), where)
-    handover = mistakes.handover(said.get("export", {}), where, manifest.folder)
-    ends = [by_name[name] for name in said.get("through", ()) if name in by_name]
-    for name in (name for name in said.get("through", ()) if name not in by_name):
-        if not any(_may_make(name, entry) for _, entry in looks.rest):
+    check_step_tables(mistakes, table)
+    final = mistakes.final(values.get("render", {}), where)
+    handover = mistakes.handover(values.get("export", {}), where, manifest.folder)
+    ends = [by_name[name] for name in values.get("through", ()) if name in by_name]
+    for name in (name for name in values.get("through", ()) if name not in by_name):
+        if not any(_may_become(name, entry) for _, entry in looks.incomplete):
             mistakes.add(where, f"through: no look is called {name!r}")
     if ends:
-        _check_ends(mistakes, where, ends, said)
-    if len(mistakes.found) > before or table.unclear or len(ends) < len(said["through"]):
+        _check_ends(mistakes, where, ends, values)
+    if len(mistakes.lines) > before or table.unclear or len(ends) < len(values["through"]):
         return []
-    want = tuple(said.get("want", SHOWN))
-    how: dict[str, Any] = {"want": want, "final": final, "handover": handover}
-    made = [replace(frame, where=where, **how) for frame in _frames(said, ends)]
+    want = tuple(values.get("want", GIVEN_LIGHTING_STEPS))
+    options: dict[str, Any] = {"want": want, "final": final, "handover": handover}
+    made = [replace(frame, where=where, **options) for frame in _frames(values, ends)]
     if "render" in want and not ends[0].scenes:
         mistakes.add(where, "want has 'render', which needs the scene of its looks")
     if "export" in want:
@@ -78,11 +83,11 @@ def _of_sequence(manifest: Manifest, looks: LookEntries, table: Table) -> list[L
 
 
 def _check_ends(
-    mistakes: Mistakes, where: str, ends: Sequence[LookEntry], said: Mapping[str, Any]
+    mistakes: Mistakes, where: str, ends: Sequence[LookEntry], values: Mapping[str, Any]
 ) -> None:
-    """Add why there is nothing between the looks that a sequence goes through."""
-    path = said.get("sensors")
-    if any(_place(end, path) != _place(ends[0], path) for end in ends):
+    """Add what keeps looks from being the ends of a sequence to the mistakes."""
+    path = values.get("sensors")
+    if any(_view_key(end, path) != _view_key(ends[0], path) for end in ends):
         mistakes.add(where, "through: its looks are of different scenes, sensors or bases")
     elif path and not ends[0].scenes:
         mistakes.add(where, "sensors: its looks are of no scene, which other sensors could see")
@@ -90,24 +95,24 @@ def _check_ends(
         mistakes.add(where, "through: a look of several views has no one picture: take single ones")
 
 
-def _may_make(name: str, entry: LookEntry) -> bool:
+def _may_become(name: str, entry: LookEntry) -> bool:
     """Return whether a table might make a look of that name without its mistakes."""
     if not entry.name:
         return True
     return name == entry.name or name.startswith(f"{entry.name}-")
 
 
-def _frames(said: Mapping[str, Any], ends: Sequence[LookEntry]) -> Iterator[LookEntry]:
-    """Each frame: what lies between two of `ends`, seen as they are or by its place on a path."""
-    path, through = said.get("sensors"), said["through"]
-    frames = len(path) if path else said["frames"]
+def _frames(values: Mapping[str, Any], ends: Sequence[LookEntry]) -> Iterator[LookEntry]:
+    """Yield each frame: a mix of two of `ends`, through their sensor or its own on a path."""
+    path, through = values.get("sensors"), values["through"]
+    frames = len(path) if path else values["frames"]
     digits = len(str(frames - 1))
     for k in range(frames):
-        first, share = at_frame(k, frames, len(through))
+        first, share = frame_position(k, frames, len(through))
         scenes = ends[first].scenes
         yield replace(
             ends[first],
-            name=f"{said['name']}-{k:0{digits}}",
+            name=f"{values['name']}-{k:0{digits}}",
             scenes=(replace(scenes[0], sensor=path[k]),) if path else scenes,
             by_sensor=False,
             paintings=(),
@@ -115,12 +120,14 @@ def _frames(said: Mapping[str, Any], ends: Sequence[LookEntry]) -> Iterator[Look
             variation="",
             of=tuple(through[first : first + 2]),
             share=share,
-            space=said.get("space", "log"),
+            space=values.get("space", "log"),
         )
 
 
-def _place(entry: LookEntry, path: Sequence[str] | None) -> tuple[Any, ...]:
-    """What two looks of one sequence have in common. path: of sensors, which theirs give way to."""
+def _view_key(entry: LookEntry, path: Sequence[str] | None) -> tuple[Any, ...]:
+    """Return what the looks of one sequence must share. path: of sensors, which replace
+    their own.
+    """
     if path:
         return tuple(replace(scene, sensor=None) for scene in entry.scenes[:1]), entry.basis
     return entry.scenes, entry.basis

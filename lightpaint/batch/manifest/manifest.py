@@ -1,11 +1,18 @@
-"""A manifest as it stands, `looks.toml`: its tables, with keys and values that mean something."""
+"""A manifest, `looks.toml`: its tables, with known keys and valid values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.manifest.keys import DEFAULTS, GIVEN, LOOK, SEQUENCE, SUBJECTS, Mistakes
+from lightpaint.batch.manifest.keys import (
+    DEFAULT_KEYS,
+    LIGHTING_STEPS,
+    LOOK_KEYS,
+    SEQUENCE_KEYS,
+    SUBJECT_KEYS,
+    Mistakes,
+)
 from lightpaint.errors import BatchError
 from lightpaint.files import one_line, read_text
 from lightpaint.storage.json_records import strict_toml
@@ -20,35 +27,35 @@ TABLES: Mapping[str, Check] = {
     "sequence": a(list, "tables, [[sequence]]"),
 }
 
-#: Tables of which a look's own keys stand beside those by default.
-JOINED = ("settings", "parameters", "render", "export")
+#: Tables whose keys in a look are merged with the defaults.
+MERGED_TABLES = ("settings", "parameters", "render", "export")
 
-#: Keys that say what a look is of: a look's own replace all of those by default.
-PLACES = ("scene", "basis", "light_groups", "pattern"), ("sensor", "sensors")
+#: Groups of keys of which a look's own replace all defaults.
+SOURCE_GROUPS = ("scene", "basis", "light_groups", "pattern"), ("sensor", "sensors")
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a manifest. where: what errors call it. said: its keys, with values that will do.
+    """A table of a manifest. where: its name in errors. values: by key, all valid.
 
-    unclear: keys that somebody gave as well, wrongly or misspelt. Nothing is known of their values,
-    but that they lack would be untrue.
+    unclear: keys that were also given, but wrongly or misspelt. Their values are unknown, but to
+    report them as missing would be wrong.
     """
 
     where: str
-    said: Mapping[str, Any]
+    values: Mapping[str, Any]
     unclear: frozenset[str] = frozenset()
 
     def has(self, *keys: str) -> bool:
         """Return whether any of these keys was given, whatever its value."""
-        return any(key in self.said or key in self.unclear for key in keys)
+        return any(key in self.values or key in self.unclear for key in keys)
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """Contents of a manifest. looks: with the defaults in them.
+    """Contents of a manifest. looks: merged with the defaults.
 
-    path: of the file, relative to whose folder all its paths are.
+    path: of the file; its folder is the base of all paths in it.
     """
 
     path: Path
@@ -58,16 +65,16 @@ class Manifest:
 
     @property
     def folder(self) -> Path:
-        """What its paths are relative to."""
+        """Base of the manifest's relative paths."""
         return self.path.parent
 
 
 def read_manifest(path: str | Path) -> Manifest:
     """Read `looks.toml` (docs/batch.md).
 
-    What is wrong with keys and values is among its mistakes, and left out of its tables.
+    Errors in keys and values are among its mistakes, and left out of its tables.
 
-    Raises BatchError for what is no TOML at all.
+    Raises BatchError for a file that is not TOML.
     """
     path = Path(path)
     text = read_text(path, "manifest", BatchError, limit=MAX_BYTES)
@@ -76,30 +83,32 @@ def read_manifest(path: str | Path) -> Manifest:
     except ValueError as error:
         raise BatchError(f"{path} is not TOML: {one_line(str(error))}") from None
     mistakes = Mistakes(str(path))
-    right = mistakes.keys(data, TABLES, "")
-    unclear = mistakes.unclear(data, TABLES, right)
+    right = mistakes.check_keys(data, TABLES, "")
+    unclear = mistakes.unclear_keys(data, TABLES, right)
     if "defaults" in unclear:  # which may have had any of its keys
-        defaults = Table("defaults", {}, frozenset(DEFAULTS))
+        defaults = Table("defaults", {}, frozenset(DEFAULT_KEYS))
     else:
-        defaults = _table(data.get("defaults", {}), DEFAULTS, "defaults", mistakes)
-        if "settings" in defaults.said:  # said once, and not of each look that they are merged into
-            known = mistakes.settings(defaults.said["settings"], "defaults")
-            defaults = replace(defaults, said={**defaults.said, "settings": known})
-    looks = _tables(data["look"] if "look" in right else [], LOOK, "look", mistakes)
+        defaults = _table(data.get("defaults", {}), DEFAULT_KEYS, "defaults", mistakes)
+        if (
+            "settings" in defaults.values
+        ):  # said once, and not of each look that they are merged into
+            known = mistakes.settings(defaults.values["settings"], "defaults")
+            defaults = replace(defaults, values={**defaults.values, "settings": known})
+    looks = _tables(data["look"] if "look" in right else [], LOOK_KEYS, "look", mistakes)
     given = data["sequence"] if "sequence" in right else []
-    sequences = _tables(given, SEQUENCE, "sequence", mistakes)
+    sequences = _tables(given, SEQUENCE_KEYS, "sequence", mistakes)
     if not data.get("look") and "look" not in unclear:
         mistakes.add("", "it has no look: begin one with [[look]]")
-    return Manifest(path, tuple(_merged(defaults, x) for x in looks), tuple(sequences), mistakes)
+    return Manifest(path, tuple(_merge(defaults, x) for x in looks), tuple(sequences), mistakes)
 
 
 def _table(
     given: Mapping[str, Any], known: Mapping[str, Check], where: str, mistakes: Mistakes
 ) -> Table:
-    """Return what a table says; what is wrong is added to the mistakes."""
-    right = mistakes.keys(given, known, where)
-    said = {key: value for key, value in given.items() if key in right}
-    return Table(where, said, mistakes.unclear(given, known, right))
+    """Return a table's valid values; errors are added to the mistakes."""
+    right = mistakes.check_keys(given, known, where)
+    values = {key: value for key, value in given.items() if key in right}
+    return Table(where, values, mistakes.unclear_keys(given, known, right))
 
 
 def _tables(
@@ -112,51 +121,53 @@ def _tables(
         if not isinstance(table, dict):
             mistakes.add(where, f"{one_line(repr(table))} is no table: write [[{what}]]")
             continue
-        if called := _called(table):
+        if called := _display_name(table):
             where = f"{what} {called!r}"
         tables.append(_table(table, known, where, mistakes))
     return tables
 
 
-def _called(table: Mapping[str, Any]) -> str:
-    """Return what a person knows a look by, as it stands in the manifest; "" where nothing does."""
+def _display_name(table: Mapping[str, Any]) -> str:
+    """Return the name of a look as it stands in the manifest; "" where it has none."""
     named = (table.get(key) for key in ("name", "painting", "lighting"))
     return next((name for name in named if isinstance(name, str) and name), "")
 
 
-def _merged(defaults: Table, table: Table) -> Table:
-    """Return a look over the defaults; of tables of values each key by itself."""
-    said, look, unclear = dict(defaults.said), table.said, defaults.unclear
-    for keys in PLACES:
+def _merge(defaults: Table, table: Table) -> Table:
+    """Return a look merged over the defaults; tables of values are merged key by key."""
+    values, look, unclear = dict(defaults.values), table.values, defaults.unclear
+    for keys in SOURCE_GROUPS:
         if table.has(*keys):
-            said = {key: value for key, value in said.items() if key not in keys}
+            values = {key: value for key, value in values.items() if key not in keys}
             unclear = unclear - set(keys)
     for key, value in look.items():
-        if key in JOINED and isinstance(said.get(key), dict):
-            value = {**said[key], **value}
-        if key == "constraints" and key in said:
-            value = [said[key], value]
-        said[key] = value
-    _leave_idle(said, look)
-    left = {key for key in unclear if key not in look or key in (*JOINED, "constraints")}
-    return Table(table.where, {**said, **_listed(said)}, table.unclear | left)
+        if key in MERGED_TABLES and isinstance(values.get(key), dict):
+            value = {**values[key], **value}
+        if key == "constraints" and key in values:
+            value = [values[key], value]
+        values[key] = value
+    _drop_unused(values, look)
+    left = {key for key in unclear if key not in look or key in (*MERGED_TABLES, "constraints")}
+    return Table(table.where, {**values, **_as_list(values)}, table.unclear | left)
 
 
-def _leave_idle(said: dict[str, Any], look: Mapping[str, Any]) -> None:
-    """Take out what is wanted by default, and a look like this has no use of."""
-    if "want" in said and "want" not in look and {"lighting", "lightings"} & set(look):
-        said["want"] = [step for step in said["want"] if step in GIVEN] or list(GIVEN[:1])
+def _drop_unused(values: dict[str, Any], look: Mapping[str, Any]) -> None:
+    """Drop default steps and tables that a look of this kind cannot use."""
+    if "want" in values and "want" not in look and {"lighting", "lightings"} & set(look):
+        values["want"] = [step for step in values["want"] if step in LIGHTING_STEPS] or list(
+            LIGHTING_STEPS[:1]
+        )
     for step in ("render", "export"):
-        if step not in look and step not in said.get("want", ()):
-            said.pop(step, None)
+        if step not in look and step not in values.get("want", ()):
+            values.pop(step, None)
 
 
-def _listed(said: Mapping[str, Any]) -> dict[str, Any]:
-    """Constraints as a list of what was said, the defaults' first."""
-    asked = said.get("constraints", [])
-    return {"constraints": asked if isinstance(asked, list) else [asked]}
+def _as_list(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return constraints as a list of all that were given, the defaults' first."""
+    requests = values.get("constraints", [])
+    return {"constraints": requests if isinstance(requests, list) else [requests]}
 
 
-def subject(look: Mapping[str, Any]) -> list[str]:
-    """Which of SUBJECTS a look says."""
-    return [key for key in SUBJECTS if key in look]
+def subject_keys(look: Mapping[str, Any]) -> list[str]:
+    """Return which of SUBJECT_KEYS a look has."""
+    return [key for key in SUBJECT_KEYS if key in look]

@@ -1,4 +1,4 @@
-"""Lightings between lightings: the frames of a sequence, even in stops or as people see."""
+"""Interpolated lightings: the frames of a sequence, even in stops or in perceived colour."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting
 
 #: Stops below the brighter end at which a light that is off begins, or ends, in `log`.
-DARK = 10.0
+OFF_STOPS = 10.0
 
 #: Linear Rec.709 to cone responses, and their cube roots to Oklab (Ottosson 2020).
 TO_CONES = np.array(
@@ -34,8 +34,8 @@ TO_LAB = np.array(
 )
 
 
-def at_frame(frame: int, frames: int, keys: int) -> tuple[int, float]:
-    """Between which two of `keys` lightings a frame lies, by the first, and how far, 0 to 1."""
+def frame_position(frame: int, frames: int, keys: int) -> tuple[int, float]:
+    """Return the first of the two lightings between which a frame lies, and how far, 0 to 1."""
     if keys == 1:
         return 0, 0.0
     position = frame * (keys - 1) / (frames - 1)
@@ -43,8 +43,8 @@ def at_frame(frame: int, frames: int, keys: int) -> tuple[int, float]:
     return first, position - first
 
 
-def between(ends: Sequence[Lighting], share: float, *, space: Space) -> Lighting:
-    """The lighting at `share`, 0 to 1, of the way from one to the other.
+def interpolate(ends: Sequence[Lighting], share: float, *, space: Space) -> Lighting:
+    """Return the lighting at `share`, 0 to 1, of the way from one to the other.
 
     Raises LightingError if the two are not of the same lights.
     """
@@ -53,7 +53,7 @@ def between(ends: Sequence[Lighting], share: float, *, space: Space) -> Lighting
         raise LightingError(
             "the lightings of a sequence are of different lights, or of lights in other groups"
         )
-    mix = _in_stops if space == "log" else _in_oklab
+    mix = _mix_in_stops if space == "log" else _mix_in_oklab
     lights = tuple(
         light
         if light.is_fixed
@@ -65,31 +65,32 @@ def between(ends: Sequence[Lighting], share: float, *, space: Space) -> Lighting
     return replace(one, lights=lights, certificate=None)
 
 
-def _in_stops(one: Doubles, other: Doubles, share: float) -> Doubles:
-    """Brightness by the same stops in each frame, and the colour evenly as people see it.
+def _mix_in_stops(one: Doubles, other: Doubles, share: float) -> Doubles:
+    """Mix brightness evenly in stops, and colour evenly as perceived.
 
     Channel by channel instead, a lamp would pass colours that are in neither end: from red to blue,
-    green. What is off, or DARK stops below the other end, begins there, in the other's colour.
+    green. A light that is off, or OFF_STOPS below the other end, starts there, in the other's
+    colour.
     """
     if share in (0.0, 1.0):
         return other if share else one
     bright = [float(luminance(rgb)) for rgb in (one, other)]
-    least = max(bright) * 2.0**-DARK
+    least = max(bright) * 2.0**-OFF_STOPS
     if least == 0:
         return np.zeros(3)
     hues = [rgb / y for rgb, y in zip((one, other), bright, strict=True) if y > least]
     y = max(bright[0], least) ** (1 - share) * max(bright[1], least) ** share
     if len(hues) == 1 or np.ptp(one) == np.ptp(other) == 0:
         return np.asarray(y * hues[0])
-    return np.asarray(y * _hue_between(hues[0], hues[1], share))
+    return np.asarray(y * _mix_hues(hues[0], hues[1], share))
 
 
-def _hue_between(one: Doubles, other: Doubles, share: float) -> Doubles:
-    """Return the colour, (3,) of luminance 1, so far on the way between two of luminance 1.
+def _mix_hues(one: Doubles, other: Doubles, share: float) -> Doubles:
+    """Return the colour, (3,) of luminance 1, at `share` between two of luminance 1.
 
-    Whites stay white: they go along the black bodies, evenly in mireds and Duv, where a straight
-    way from 2000 to 9000 K would be pink in the middle, at a Duv of -0.010. Other colours go
-    straight in Oklab at equal lightness, which does not depend on how bright they are.
+    Whites stay white: they follow the black bodies, evenly in mireds and Duv, where a straight line
+    from 2000 to 9000 K would be pink in the middle, at a Duv of -0.010. Other colours are mixed in
+    Oklab at equal lightness, which does not depend on how bright they are.
     """
     whites = [cct_and_duv(rgb) for rgb in (one, other)]
     if all(white is not None and abs(white[1]) <= WHITE_DUV for white in whites):
@@ -99,16 +100,16 @@ def _hue_between(one: Doubles, other: Doubles, share: float) -> Doubles:
     ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (one, other)]
     lab = (1 - share) * ends[0] / ends[0][0] + share * ends[1] / ends[1][0]
     # Between two colours a lamp can have lies now and then one that it cannot.
-    linear = np.maximum(_of_lab(lab), 0.0)
+    linear = np.maximum(_lab_to_linear(lab), 0.0)
     return np.asarray(linear / luminance(linear))
 
 
-def _of_lab(lab: Doubles) -> Doubles:
+def _lab_to_linear(lab: Doubles) -> Doubles:
     """Return linear Rec.709, (3,), of Oklab."""
     return np.asarray(np.linalg.solve(TO_CONES, np.linalg.solve(TO_LAB, lab) ** 3))
 
 
-def _in_oklab(one: Doubles, other: Doubles, share: float) -> Doubles:
+def _mix_in_oklab(one: Doubles, other: Doubles, share: float) -> Doubles:
     if share in (0.0, 1.0):
         return other if share else one
     if np.ptp(one) == np.ptp(other) == 0:  # as of what can only be dimmed: grey to the last bit
@@ -116,4 +117,4 @@ def _in_oklab(one: Doubles, other: Doubles, share: float) -> Doubles:
         return np.full(3, light)
     ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (one, other)]
     lab = (1 - share) * ends[0] + share * ends[1]
-    return np.maximum(_of_lab(lab), 0.0)
+    return np.maximum(_lab_to_linear(lab), 0.0)

@@ -1,4 +1,4 @@
-"""A first manifest, to be gone on from."""
+"""The starter manifest of `lightpaint batch --init`."""
 
 import json
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import check_files, write_text
 
-HEAD = """\
+HEADER = """\
 # Looks to be found in one go:  lightpaint batch {name} -o looks/
 # docs/batch.md has all keys. Paths are relative to this file.
 
@@ -22,10 +22,13 @@ quality = "preview"
 """
 
 
-def write_first(path: Path, scene: str, paintings: Sequence[str], *, force: bool = False) -> None:
+def write_starter_manifest(
+    path: Path, scene: str, paintings: Sequence[str], *, force: bool = False
+) -> None:
     """Write a manifest to `path` with a look for each painting of one scene.
 
-    Raises BatchError without a painting, and for what is not there; OutputError for a file that is.
+    Raises BatchError without a painting, and for files that do not exist; OutputError for a
+    manifest that does.
     """
     if not paintings:
         raise BatchError("no painting to begin with: give the scene, then paintings")
@@ -36,12 +39,12 @@ def write_first(path: Path, scene: str, paintings: Sequence[str], *, force: bool
     if path.exists() and not force:
         raise OutputError(f"{path} is there: choose another name with folder=..., or force=True")
     base = path.parent
-    text = HEAD.format(name=path.name, scene=_quoted(scene, base))
+    text = HEADER.format(name=path.name, scene=_quoted(scene, base))
     write_text(
         path, text + "\n".join(f"[[look]]\npainting = {_quoted(x, base)}\n" for x in paintings)
     )
 
 
 def _quoted(file: str, base: Path) -> str:
-    """A path from `base` as TOML writes it, which is how JSON does."""
+    """Return a path relative to `base` as TOML writes it, which is how JSON does."""
     return json.dumps(os.path.relpath(file, base), ensure_ascii=False).replace("\x7f", "\\u007f")

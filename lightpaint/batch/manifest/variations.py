@@ -16,28 +16,28 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import HOLD
 from lightpaint.pipeline.settings import Settings
 
-#: Words that ask for another solve, and for what.
-SOLVED = ("fewer lights", "white only", "held harder")
+#: Variations that are solved.
+SOLVED_WORDS = ("fewer lights", "white only", "held harder")
 
-#: Words that change an answer, and by how many mireds; more is warmer.
-SHIFTED = {"warmer": 60.0, "cooler": -60.0}
+#: Variations that shift an answer, by so many mireds; more is warmer.
+SHIFTED_WORDS = {"warmer": 60.0, "cooler": -60.0}
 
-VARIATIONS = (*SHIFTED, *SOLVED)
+VARIATIONS = (*SHIFTED_WORDS, *SOLVED_WORDS)
 
 #: Part of the lights that `fewer lights` leaves on, and how much harder `held harder` holds.
 FEWER, HARDER = 0.5, 4.0
 
-#: Between which colour temperatures a light is moved, in kelvin: below, lamps have no blue.
+#: Colour temperatures between which a light is shifted, in kelvin: below, lamps have no blue.
 WARMEST, COOLEST = 2000.0, 15000.0
 
-#: Colour temperature of what has none of its own, in kelvin.
+#: Colour temperature of a colour that has none of its own, in kelvin.
 NEUTRAL = 6504.0
 
 
-def words_of(given: Iterable[str]) -> tuple[str, ...]:
-    """Variations by their words, each once; hyphens may stand for spaces.
+def parse_variations(given: Iterable[str]) -> tuple[str, ...]:
+    """Return variations by their words, each once; hyphens may stand for spaces.
 
-    Raises BatchError for a word that is none.
+    Raises BatchError for an unknown word.
     """
     words = dict.fromkeys(word.replace("-", " ") for word in given)
     if unknown := [word for word in words if word not in VARIATIONS]:
@@ -46,10 +46,10 @@ def words_of(given: Iterable[str]) -> tuple[str, ...]:
     return tuple(words)
 
 
-def varied(
+def vary(
     word: str, settings: Settings, constraints: Constraints, lights: int
 ) -> tuple[Settings, Constraints]:
-    """What is asked for instead. lights: how many are adjusted."""
+    """Return the settings and constraints of a variation. lights: how many are adjusted."""
     if word == "fewer lights":
         few = max(1, ceil(FEWER * lights))
         most = few if constraints.sparse is None else min(few, constraints.sparse)
@@ -60,34 +60,38 @@ def varied(
     return replace(settings, hold=hold, unpainted=0.0), constraints
 
 
-def shifted(lighting: Lighting, mireds: float, dimmed: Collection[str] = ()) -> Lighting:
-    """Every light so much warmer, as bright as it was.
+def shift(lighting: Lighting, mireds: float, dimmer_lights: Collection[str] = ()) -> Lighting:
+    """Return a lighting with every light warmer by `mireds`, at its luminance.
 
     dimmed: names of lights that have a dimmer and no colour, and stay as they are.
     """
     lights = tuple(
-        light if light.name in dimmed else _warmer(light, mireds) for light in lighting.lights
+        light if light.name in dimmer_lights else _shift_light(light, mireds)
+        for light in lighting.lights
     )
     return replace(lighting, lights=lights, certificate=None)
 
 
-def _warmer(light: LightSetting, mireds: float) -> LightSetting:
+def _shift_light(light: LightSetting, mireds: float) -> LightSetting:
     if light.is_fixed or not any(light.emission) or not all(light.reached):
         return light
     kelvin = photometry(light.emission, unit=light.unit).kelvin or NEUTRAL
-    ends = [kelvin_to_rgb(min(max(x, WARMEST), COOLEST)) for x in (kelvin, _moved(kelvin, mireds))]
+    ends = [
+        kelvin_to_rgb(min(max(x, WARMEST), COOLEST))
+        for x in (kelvin, _shift_kelvin(kelvin, mireds))
+    ]
     ratio = np.array(ends[1]) / np.maximum(ends[0], 1e-6)
     return with_emission(light, np.array(light.emission) * ratio, keeps_luminance=True)
 
 
-def _moved(kelvin: float, mireds: float) -> float:
+def _shift_kelvin(kelvin: float, mireds: float) -> float:
     return 1e6 / max(1e6 / kelvin + mireds, 1e6 / COOLEST)
 
 
 def with_emission(
     light: LightSetting, emission: object, *, keeps_luminance: bool = False
 ) -> LightSetting:
-    """`light` at another emission, of which nothing is claimed."""
+    """Return `light` at another emission, without claims on its accuracy."""
     given = np.asarray(emission, dtype=np.float64)
     if keeps_luminance and (now := float(luminance(given))) > 0:
         given = given * float(luminance(np.array(light.emission))) / now

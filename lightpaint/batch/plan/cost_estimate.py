@@ -1,4 +1,4 @@
-"""How long a plan takes, and how much memory: from constants that were measured.
+"""Estimates of a plan's time and memory, from constants that were measured.
 
 Samples as docs/benchmarks.md has them of the gallery, on two cores. Looks by processor seconds in
 benchmarks/batch.py's own batches, some looks each on a machine that had other work: a rough guide.
@@ -16,13 +16,13 @@ SAMPLE_S, LIGHT_SAMPLE_S = 9.6e-7, 1e-8
 #: a report for each pixel.
 LOOK_S, PIXEL_S, PIXEL_LIGHT_S, REPORT_S = 0.07, 1.7e-6, 1.6e-7, 1.2e-5
 
-#: What is taken for a basis that is a file.
+#: Assumed cost of a basis that is a file.
 SAVED = Cost("", 12, (360, 640), 0, 0)
 
 
 @dataclass(frozen=True)
 class CostEstimate:
-    """Seconds of bases and of looks, those of final renders among them; bytes at the peak."""
+    """Seconds for bases and for looks, final renders among them; bytes at the peak."""
 
     bases_s: float
     looks_s: float
@@ -30,7 +30,7 @@ class CostEstimate:
 
 
 def estimate(plan: Plan) -> CostEstimate:
-    """Of what is left of `plan`, if no basis is kept."""
+    """Estimate the rest of `plan`, if no basis is cached."""
     left = [look for look in plan.chosen_looks if not look.failure and not look.is_done]
     needed = dict.fromkeys(
         key
@@ -42,19 +42,19 @@ def estimate(plan: Plan) -> CostEstimate:
     )
     costs = [plan.costs[key] for key in needed]
     return CostEstimate(
-        sum(rendered_s(cost.samples, cost.lights) for cost in costs),
-        sum(look_s(look, plan) for look in left),
+        sum(render_seconds(cost.samples, cost.lights) for cost in costs),
+        sum(look_seconds(look, plan) for look in left),
         max((cost.memory for cost in costs), default=0),
     )
 
 
-def rendered_s(samples: int, lights: int) -> float:
-    """Of so many samples of a basis."""
+def render_seconds(samples: int, lights: int) -> float:
+    """Return the seconds for so many samples of a basis."""
     return samples * (SAMPLE_S + LIGHT_SAMPLE_S * lights)
 
 
-def look_s(look: PlannedLook, plan: Plan) -> float:
-    """Of the steps of a look that are left, on two cores."""
+def look_seconds(look: PlannedLook, plan: Plan) -> float:
+    """Return the seconds for the remaining steps of a look, on two cores."""
     costs = [plan.costs.get(key, SAVED) for key in look.steps[0].task.bases]
     pixels = sum(cost.size[0] * cost.size[1] for cost in costs)
     want, spent_s = look.entry.want, 0.0

@@ -1,4 +1,4 @@
-"""What went into a result, in one number: what was asked, the content of files, our version."""
+"""Fingerprints of results: a hash of the request, the content of its files, and our version."""
 
 import hashlib
 import json
@@ -15,7 +15,9 @@ from lightpaint.version import __version__
 
 
 class Fingerprints:
-    """Of the looks of one manifest. Paths are told from its folder, so that it may be moved."""
+    """Fingerprints of one manifest's looks. Paths are relative to its folder, so that it may be
+    moved.
+    """
 
     def __init__(self, base: Path) -> None:
         self._base = base
@@ -23,33 +25,33 @@ class Fingerprints:
         self._answers: dict[str, str] = {}
 
     def answer(self, entry: LookEntry, reads: Sequence[Path]) -> str:
-        """Of all that goes into an answer; looks that it is made of have been asked for before.
+        """Return the fingerprint of an answer; looks that it combines come before it.
 
         reads: files whose content counts. Raises OutputError for one that cannot be read.
         """
-        told = asdict(replace(entry, where="", want=(), final=Final(), handover=Handover()))
+        values = asdict(replace(entry, where="", want=(), final=Final(), handover=Handover()))
         made_of = [
             __version__,
-            _relative(told, self._base),
+            _relative(values, self._base),
             sorted(self._content(file) for file in reads),
             [self._answers[name] for name in entry.of],
             *(["lights"] if entry.is_by_sums else []),
         ]
-        self._answers[entry.name] = _sum(json.dumps(made_of, default=str))
+        self._answers[entry.name] = _sha256(json.dumps(made_of, default=str))
         return self._answers[entry.name]
 
     def render(self, entry: LookEntry) -> str:
-        """Of all that goes into a final render."""
-        return _sum(json.dumps([self._answers[entry.name], asdict(entry.final)]))
+        """Return the fingerprint of a final render."""
+        return _sha256(json.dumps([self._answers[entry.name], asdict(entry.final)]))
 
     def export(self, entry: LookEntry) -> str:
-        """Of all that other programs get."""
+        """Return the fingerprint of the exports for other programs."""
         stage = [self._content(Path(entry.handover.stage))] if entry.handover.stage else []
-        told = _relative(asdict(entry.handover), self._base)
-        return _sum(json.dumps([self._answers[entry.name], told, stage]))
+        values = _relative(asdict(entry.handover), self._base)
+        return _sha256(json.dumps([self._answers[entry.name], values, stage]))
 
     def _content(self, file: Path) -> str:
-        """SHA-256 of a file; each is read once."""
+        """Return the SHA-256 of a file; each is read once."""
         if file not in self._sums:
             try:
                 with file.open("rb") as opened:
@@ -59,16 +61,16 @@ class Fingerprints:
         return self._sums[file]
 
 
-def _relative(told: Any, base: Path) -> Any:
-    """Paths in plain values, from `base`."""
-    if isinstance(told, dict):
-        return {key: _relative(value, base) for key, value in told.items()}
-    if isinstance(told, list | tuple):
-        return [_relative(value, base) for value in told]
-    if isinstance(told, str) and base.parts and told.startswith(f"{base}{os.sep}"):
-        return os.path.relpath(told, base)
-    return told
+def _relative(values: Any, base: Path) -> Any:
+    """Return plain values with their paths relative to `base`."""
+    if isinstance(values, dict):
+        return {key: _relative(value, base) for key, value in values.items()}
+    if isinstance(values, list | tuple):
+        return [_relative(value, base) for value in values]
+    if isinstance(values, str) and base.parts and values.startswith(f"{base}{os.sep}"):
+        return os.path.relpath(values, base)
+    return values
 
 
-def _sum(text: str) -> str:
+def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()

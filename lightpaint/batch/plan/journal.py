@@ -1,9 +1,8 @@
-"""What is done of a batch: a line for each step, on the disk before the next begins.
+"""The journal of a batch: a line for each step, on the disk before the next begins.
 
-A kill leaves all lines but maybe half of the last one, which counts for nothing. Nor does a line
-that a disk has damaged: its step is done again. Of the steps of a look the last line holds. At the
-end of a run the file is written anew, in the order of the looks, so that it does not tell how often
-a batch was stopped.
+A kill leaves all lines but maybe half of the last one, which is ignored. So is a line that a disk
+has damaged: its step is done again. The last line of each step counts. At the end of a run the file
+is rewritten, in the order of the looks, so that it does not show how often a batch was stopped.
 """
 
 import hashlib
@@ -26,7 +25,7 @@ MAX_BYTES = 2**28
 
 @dataclass(frozen=True)
 class JournalLine:
-    """A step that was done, or that failed. made_of: fingerprint of all that went in."""
+    """A step that was done, or that failed. made_of: fingerprint of its inputs."""
 
     look: str
     kind: Kind
@@ -36,10 +35,10 @@ class JournalLine:
 
 
 class Journal:
-    """That of the batch in `folder`.
+    """Journal of the batch in `folder`.
 
-    part: of several processes that share the folder, which part of the looks this one does: it has
-    a file of its own, and reads those of all.
+    part: of several processes that share the folder, which part of the looks this one does: it
+    writes a file of its own, and reads those of all.
     """
 
     def __init__(self, folder: Path, part: str = "") -> None:
@@ -47,28 +46,28 @@ class Journal:
         if part:
             name = hashlib.sha256(part.encode()).hexdigest()[:16]
             self._path = folder / f"{JOURNAL_PART}{name}.jsonl"
-        read = {file: _read(file) for file in [self._whole, *_parts(folder)]}
+        read = {file: _read_journal(file) for file in [self._whole, *_parts(folder)]}
         lines = (line for one in read.values() for line in one.lines)
         self._lines = {(line.look, line.kind): line for line in lines}
         self.remarks = tuple(one.remark(file) for file, one in read.items() if one.damaged)
-        own = read.get(self._path, _Read())
+        own = read.get(self._path, _JournalContent())
         # Half of a line gives way to the next one; behind a line without its end goes the end.
         self._half, self._lacks_end = own.half, own.lacks_end
 
     @property
     def lines(self) -> Mapping[tuple[str, Kind], JournalLine]:
-        """The last of each look and step."""
+        """Last line of each look and step."""
         return self._lines
 
     def add(self, line: JournalLine) -> None:
-        """Keep a line, whatever comes. Raises OutputError where the disk does not take it."""
+        """Append a line durably. Raises OutputError where the disk does not take it."""
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with self._path.open("ab") as file:
                 if self._half is not None:
                     file.truncate(self._half)
                 self._half = os.fstat(file.fileno()).st_size
-                file.write((b"\n" if self._lacks_end else b"") + _text(line).encode())
+                file.write((b"\n" if self._lacks_end else b"") + _to_text(line).encode())
                 file.flush()
                 os.fsync(file.fileno())
             self._half, self._lacks_end = None, False
@@ -76,31 +75,31 @@ class Journal:
             raise OutputError(f"cannot write {self._path}: {error.strerror or error}") from error
         self._lines[line.look, line.kind] = line
 
-    def settle(self, steps: Iterable[tuple[str, Kind]]) -> None:
-        """Write it anew, with the lines of these steps alone, in this order; parts are in it."""
+    def rewrite(self, steps: Iterable[tuple[str, Kind]]) -> None:
+        """Rewrite the file with the lines of these steps alone, in this order, parts included."""
         kept = [self._lines[step] for step in steps if step in self._lines]
-        write_text(self._whole, "".join(map(_text, kept)))
+        write_text(self._whole, "".join(map(_to_text, kept)))
         for file in _parts(self._whole.parent):
             file.unlink(missing_ok=True)
         self._lines = {(line.look, line.kind): line for line in kept}
         self._half, self._lacks_end = None, False
 
 
-def _text(line: JournalLine) -> str:
+def _to_text(line: JournalLine) -> str:
     return json.dumps(asdict(line), ensure_ascii=False) + "\n"
 
 
 def _parts(folder: Path) -> list[Path]:
-    """Return the files of those who share the folder."""
+    """Return the files of all processes that share the folder."""
     return sorted(folder.glob(f"{JOURNAL_PART}*.jsonl"))
 
 
 @dataclass(frozen=True)
-class _Read:
-    """Return what a file holds.
+class _JournalContent:
+    """The content of a journal file.
 
-    damaged: how many lines say nothing. half: where in the file half of a line begins, if one does.
-    lacks_end: whether nothing but its end is missing of the last one.
+    damaged: number of unreadable lines. half: where in the file an incomplete line begins, if one
+    does. lacks_end: whether only the end of the last line is missing.
     """
 
     lines: tuple[JournalLine, ...] = ()
@@ -109,28 +108,28 @@ class _Read:
     lacks_end: bool = False
 
     def remark(self, path: Path) -> str:
-        """Return what a person should know of the damage."""
+        """Return a remark on the damage, for people."""
         lines, they = ("a line", "its step") if self.damaged == 1 else ("lines", "their steps")
         count = "" if self.damaged == 1 else f"{self.damaged} "
         return f"{path} has {count}{lines} that cannot be read: {they} will be done again"
 
 
-def _read(path: Path) -> _Read:
-    """Return all that is whole. The lines are read one by one: damage in one costs no other."""
+def _read_journal(path: Path) -> _JournalContent:
+    """Return all whole lines. They are read one by one: damage in one costs no other."""
     if not path.exists():
-        return _Read()
+        return _JournalContent()
     data = read_bytes(path, "journal", BatchError, limit=MAX_BYTES, may_be_empty=True)
     *rows, last = data.split(b"\n")
-    found = [_line(row) for row in rows]
+    found = [_parse_line(row) for row in rows]
     # Of the last one a kill may have left half, and its step is begun again anyway.
-    end = _line(last)
+    end = _parse_line(last)
     half = len(data) - len(last) if last and end is None else None
     damaged = sum(line is None and bool(row.strip()) for row, line in zip(rows, found, strict=True))
-    return _Read(tuple(x for x in (*found, end) if x), damaged, half, end is not None)
+    return _JournalContent(tuple(x for x in (*found, end) if x), damaged, half, end is not None)
 
 
-def _line(row: bytes) -> JournalLine | None:
-    """Return the line that a row is, or None."""
+def _parse_line(row: bytes) -> JournalLine | None:
+    """Return the journal line in a row, or None."""
     try:
         return read_record(JournalLine, strict_json(row.decode("utf-8-sig")))
     except (LightpaintError, ValueError, RecursionError):

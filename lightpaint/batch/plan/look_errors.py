@@ -1,4 +1,6 @@
-"""All mistakes of a look that cannot be planned: each is sought by itself, so that none hides."""
+"""All errors of a look that cannot be planned: each is checked by itself, so that none hides
+another.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -18,14 +20,14 @@ from lightpaint.pipeline.sources import check_nothing_idle, content
 from lightpaint.scene.presets import on_film
 
 
-def look_over(entry: LookEntry, held: WorkerCache, mistakes: Mistakes) -> None:
-    """Add what is wrong with scene, sensors, settings and constraints, each looked at alone.
+def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:
+    """Add errors in scene, sensors, settings and constraints, each checked alone, to the mistakes.
 
-    held: scenes and bases, so that none is loaded for this that is there. What fails one look
-    alone, as a basis that cannot be read, is no mistake of the manifest.
+    cache: scenes and bases that are already loaded. Errors that fail one look alone, as a basis
+    that cannot be read, are no mistakes of the manifest.
     """
 
-    def tried(call: Callable[[], Any]) -> Any:
+    def attempt(call: Callable[[], Any]) -> Any:
         try:
             return call()
         except ALONE:
@@ -35,33 +37,33 @@ def look_over(entry: LookEntry, held: WorkerCache, mistakes: Mistakes) -> None:
             return None
 
     lights: Sequence[BasisLight] | None = None
-    for scene in map(held.scene, entry.scenes):
-        found = tried(partial(content, scene))
+    for scene in map(cache.scene, entry.scenes):
+        found = attempt(partial(content, scene))
         if found is None:  # its lights are there through whichever sensor
-            plain = held.scene(replace(scene, sensor=None))
-            found = tried(partial(content, plain))
+            plain = cache.scene(replace(scene, sensor=None))
+            found = attempt(partial(content, plain))
         if found is None:
             continue
         lights = basis_lights(found)
-        tried(partial(on_film, found, entry.settings.quality, entry.settings.resolution))
+        attempt(partial(on_film, found, entry.settings.quality, entry.settings.resolution))
         if "render" in entry.want:
-            tried(partial(on_film, found, None, entry.final.resolution))
+            attempt(partial(on_film, found, None, entry.final.resolution))
     if entry.basis is not None:
-        saved = held.saved(entry.basis.unread())
-        found = tried(partial(content, saved))
+        saved = cache.source(entry.basis.unread())
+        found = attempt(partial(content, saved))
         if found is not None:
             lights = found.basis.lights if isinstance(found, LightGroups) else found.lights
         if not entry.scenes:
-            tried(partial(check_nothing_idle, entry.settings, entry.basis))
+            attempt(partial(check_nothing_idle, entry.settings, entry.basis))
     if lights is not None:
-        for one in _one_by_one(entry.constraints):
-            tried(partial(reduce_to, one, lights))
+        for one in _split_constraints(entry.constraints):
+            attempt(partial(reduce_to, one, lights))
 
 
-def _one_by_one(asked: Constraints) -> Iterator[Constraints]:
-    """Yield what is asked of each light, each tie, and of all lights."""
-    for light in asked.lights:
+def _split_constraints(constraints: Constraints) -> Iterator[Constraints]:
+    """Yield the constraints on each light, each tie, and on all lights."""
+    for light in constraints.lights:
         yield Constraints(lights=(light,))
-    for tie in asked.ties:
+    for tie in constraints.ties:
         yield Constraints(ties=(tie,))
-    yield Constraints(prefer_current=asked.prefer_current, sparse=asked.sparse)
+    yield Constraints(prefer_current=constraints.prefer_current, sparse=constraints.sparse)

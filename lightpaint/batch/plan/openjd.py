@@ -1,7 +1,7 @@
 """A batch as a farm job: an Open Job Description template, which `openjd run` takes as it is.
 
-Its tasks are commands of lightpaint that share the folder of the batch, and the cache: the first
-look of each basis renders it, the others find it there.
+Its tasks are lightpaint commands that share the folder of the batch, and the cache: the first look
+of each basis renders it, the others find it there.
 """
 
 import json
@@ -15,36 +15,36 @@ from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.errors import BatchError
 from lightpaint.files import check_writable, write_text
 
-#: Its name in the folder of the job.
+#: Name of the template in the folder of the job.
 TEMPLATE = "template.json"
 
-#: Values of one parameter of a step, at most, and their length.
-MOST, LONGEST = 1024, 1024
+#: Values of one parameter of a step, and characters of a value, at most.
+MAX_VALUES, MAX_VALUE_LENGTH = 1024, 1024
 
 
-#: In the command of a task, what stands for the pattern of its looks.
-LOOK = "{{Task.Param.Look}}"
+#: Parameter in the command of a task that stands for the pattern of its looks.
+LOOK_PARAMETER = "{{Task.Param.Look}}"
 
 
-def write_openjd(folder: Path, plan: Plan, *, only: Sequence[str], force: bool = False) -> Path:
+def write_openjd(folder: Path, plan: Plan, *, command: Sequence[str], force: bool = False) -> Path:
     """Write the template of `plan` to `folder`, and return its path.
 
-    only: words of the command that does the looks of one task, LOOK among them.
+    command: words of the command that does the looks of one task, LOOK_PARAMETER among them.
     """
     check_writable(folder)
     path = folder / TEMPLATE
     if path.exists() and not force:
         raise BatchError(f"{path} is there: name another folder, or pass force=True")
-    text = json.dumps(template_of(plan, folder, only), indent=2, ensure_ascii=False)
+    text = json.dumps(template_of(plan, folder, command), indent=2, ensure_ascii=False)
     write_text(path, text + "\n")
     return path
 
 
-def template_of(plan: Plan, folder: Path, only: Sequence[str]) -> dict[str, Any]:
-    """The template, as plain values.
+def template_of(plan: Plan, folder: Path, command: Sequence[str]) -> dict[str, Any]:
+    """Return the template, as plain values.
 
-    folder: where it is to lie. Files in it are named from there, so that farms may send them with
-    the job; others by their whole paths, which all machines have to share. only: as of
+    folder: of the template. Files in it are named relative to it, so that farms may send them with
+    the job; others by absolute paths, which all machines have to share. command: as of
     `write_openjd`.
     """
 
@@ -75,20 +75,20 @@ def template_of(plan: Plan, folder: Path, only: Sequence[str]) -> dict[str, Any]
         "jobEnvironments": [
             {"name": "Cache", "variables": {"LIGHTPAINT_CACHE": "{{Param.Cache}}"}}
         ],
-        "steps": _steps(plan, only),
+        "steps": _steps(plan, command),
     }
 
 
-def _steps(plan: Plan, only: Sequence[str]) -> list[dict[str, Any]]:
-    """One after the other, each of tasks that do not wait for each other."""
+def _steps(plan: Plan, command: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the job's steps, each of tasks that do not wait for each other."""
     steps: list[dict[str, Any]] = []
     for name, looks in _waves(plan.chosen_looks):
-        for k in range(0, len(looks), MOST):
-            part = f" {k // MOST + 1}" if len(looks) > MOST else ""
-            range_ = [_pattern(look) for look in looks[k : k + MOST]]
+        for k in range(0, len(looks), MAX_VALUES):
+            part = f" {k // MAX_VALUES + 1}" if len(looks) > MAX_VALUES else ""
+            range_ = [_pattern(look) for look in looks[k : k + MAX_VALUES]]
             look = {"name": "Look", "type": "STRING", "range": range_}
             space = {"taskParameterDefinitions": [look]}
-            steps.append(_step(name + part, only, steps, parameterSpace=space))
+            steps.append(_step(name + part, command, steps, parameterSpace=space))
     # What is left, if a task was lost, and the gallery.
     steps.append(_step("Gallery", (), steps))
     return steps
@@ -109,7 +109,7 @@ def _step(
 
 
 def _waves(looks: Sequence[PlannedLook]) -> list[tuple[str, list[PlannedLook]]]:
-    """The first of each basis; those that share them; those that are made of others."""
+    """Group looks: the first of each basis; those that share them; those combined from others."""
     first: list[PlannedLook] = []
     rest: list[PlannedLook] = []
     made: list[PlannedLook] = []
@@ -133,13 +133,13 @@ def _waves(looks: Sequence[PlannedLook]) -> list[tuple[str, list[PlannedLook]]]:
 
 
 def _pattern(look: PlannedLook) -> str:
-    """A pattern that only this look's name matches. Raises BatchError if there can be none."""
+    """Return a pattern that only this look's name matches. Raises BatchError if there is none."""
     name = look.entry.name
-    if "{{" in name or len(escape(name)) > LONGEST:
+    if "{{" in name or len(escape(name)) > MAX_VALUE_LENGTH:
         raise BatchError(f"look {name!r} cannot be named in a job: say name = ...")
     return escape(name)
 
 
 def _plain(text: str) -> str:
-    """Without what a format string would take for an expression."""
+    """Return text without what a format string would take for an expression."""
     return text.replace("{{", "").replace("}}", "")

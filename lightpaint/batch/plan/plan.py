@@ -1,4 +1,4 @@
-"""What is planned: looks, their steps, what they cost."""
+"""The plan of a batch: looks, their steps and their costs."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +14,7 @@ from lightpaint.screen import some_names
 
 @dataclass(frozen=True)
 class PlanStep:
-    """One step of one look. made_of: fingerprint of all that goes in. is_done: earlier."""
+    """A step of one look. made_of: fingerprint of its inputs. is_done: by an earlier run."""
 
     task: Task
     made_of: str
@@ -23,7 +23,7 @@ class PlanStep:
 
 @dataclass(frozen=True)
 class PlannedLook:
-    """One look. failure: why it cannot be done; it is the only one. remarks: worth knowing."""
+    """A look of the plan. failure: why it cannot be done, while others can. remarks: for people."""
 
     entry: LookEntry
     folder: Path
@@ -33,13 +33,13 @@ class PlannedLook:
 
     @property
     def is_done(self) -> bool:
-        """Whether nothing is left to do."""
+        """True if no step is left."""
         return not self.failure and all(step.is_done for step in self.steps)
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Of a basis that is to be obtained. samples: of all pixels; memory: bytes at the peak."""
+    """Cost of a basis that is to be obtained. memory: bytes at the peak."""
 
     scene: str
     lights: int
@@ -49,16 +49,16 @@ class Cost:
 
     @property
     def samples(self) -> int:
-        """Of all pixels."""
+        """Samples of all pixels."""
         return self.size[0] * self.size[1] * self.spp
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All looks of a manifest. costs: of each basis, by its key. chosen: names of those to do.
+    """Looks of a manifest. costs: of each basis, by its key. chosen: names of the looks to do.
 
-    held: scenes as they were loaded to be looked at, so that they are not loaded twice. remarks: on
-    the batch as a whole, worth knowing.
+    cache: scenes that the checks have loaded, so that they are not loaded twice. remarks: on the
+    batch as a whole.
     """
 
     manifest: Path
@@ -66,21 +66,21 @@ class Plan:
     looks: tuple[PlannedLook, ...]
     costs: Mapping[str, Cost]
     chosen: frozenset[str]
-    held: WorkerCache = field(default_factory=WorkerCache, repr=False, compare=False)
+    cache: WorkerCache = field(default_factory=WorkerCache, repr=False, compare=False)
     remarks: tuple[str, ...] = ()
 
     @property
     def chosen_looks(self) -> tuple[PlannedLook, ...]:
-        """Those to do."""
+        """Looks to do."""
         return tuple(look for look in self.looks if look.entry.name in self.chosen)
 
     @property
     def steps(self) -> list[tuple[str, Kind]]:
-        """All steps, in the order of the looks."""
+        """Steps of all looks, in their order."""
         return [(step.task.look, step.task.kind) for look in self.looks for step in look.steps]
 
-    def only(self, pattern: str | None) -> "Plan":
-        """The plan of the looks whose names match, and of those that these are made of.
+    def select(self, pattern: str | None) -> "Plan":
+        """Return the plan of the looks whose names match, and of those that these combine.
 
         Raises BatchError if there is none.
         """
@@ -97,7 +97,7 @@ class Plan:
 
 
 def by_bases(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> list[list[PlanStep]]:
-    """Steps together that share their bases, after all that they are made of through others."""
+    """Group steps that share their bases, each group after those that its looks combine."""
     left, groups = list(steps), []
     while left:
         ready = {step.task.look: step.task.bases for step in left}
@@ -116,7 +116,7 @@ def by_bases(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> lis
 
 
 def waves(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> list[list[PlanStep]]:
-    """Steps that wait for none of the others; those that wait for these; and so on."""
+    """Group steps: those that wait for none of the others; those that wait for these; and so on."""
     left, found = list(steps), []
     while left:
         names = {step.task.look for step in left}

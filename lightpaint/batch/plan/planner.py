@@ -1,4 +1,4 @@
-"""What is to be done of a manifest, and what is done already; all checked before any sample."""
+"""The planner: which steps of a manifest are to be done, all checked before any sample."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,12 +14,12 @@ from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.manifest.look_list import entries_of
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest
-from lightpaint.batch.manifest.variations import varied
+from lightpaint.batch.manifest.variations import vary
 from lightpaint.batch.plan.fingerprint import Fingerprints
 from lightpaint.batch.plan.journal import Journal
-from lightpaint.batch.plan.look_errors import look_over
+from lightpaint.batch.plan.look_errors import collect_errors
 from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook, PlanStep
-from lightpaint.batch.work.derived_looks import adjusted, made_folder
+from lightpaint.batch.work.derived_looks import adjusted_light_count, derived_folder
 from lightpaint.batch.work.task import EXPORT, answer_task, bases_of, export_task, render_task
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import ALONE, BatchError, LightpaintError
@@ -52,25 +52,25 @@ def plan(
         BatchError: With all mistakes, one line each.
         OutputError: If `folder` cannot be written.
     """
-    read, folder = read_manifest(manifest), Path(folder)
-    found = entries_of(read)
-    if not read.mistakes.found:
+    manifest_, folder = read_manifest(manifest), Path(folder)
+    entries = entries_of(manifest_)
+    if not manifest_.mistakes.lines:
         check_writable(folder)
         check_gallery(folder, force=force)
-    planner = _Planner(read, folder, found.whole, force=force, command=command)
-    looks = tuple(planner.planned(entry) for entry in found.whole)
-    for _, entry in found.rest:
-        planner.look_over(entry)
-    if read.mistakes.found:
-        raise BatchError(*read.mistakes.found)
+    planner = _Planner(manifest_, folder, entries.complete, force=force, command=command)
+    looks = tuple(planner.plan_look(entry) for entry in entries.complete)
+    for _, entry in entries.incomplete:
+        planner.collect_errors(entry)
+    if manifest_.mistakes.lines:
+        raise BatchError(*manifest_.mistakes.lines)
     names = frozenset(look.entry.name for look in looks)
-    planner.held.only(())
-    held, remarks = planner.held, planner.journal.remarks
-    return Plan(read.path, folder, looks, planner.costs, names, held, remarks)
+    planner.cache.keep_only(())
+    cache, remarks = planner.cache, planner.journal.remarks
+    return Plan(manifest_.path, folder, looks, planner.costs, names, cache, remarks)
 
 
 class _Planner:
-    """Looks at one entry after the other, with what several of them share."""
+    """A planner of one entry after the other, with what several entries share."""
 
     def __init__(
         self,
@@ -84,26 +84,26 @@ class _Planner:
         self._mistakes: Mistakes = manifest.mistakes
         self._force, self._command = force, command
         self._folders = {entry.name: folder / entry.name for entry in entries}
-        self.held, self.journal = WorkerCache(), Journal(folder)
-        self._prints = Fingerprints(manifest.folder)
+        self.cache, self.journal = WorkerCache(), Journal(folder)
+        self._fingerprints = Fingerprints(manifest.folder)
         self._failed: set[str] = set()
         self.costs: dict[str, Cost] = {}
 
-    def planned(self, entry: LookEntry) -> PlannedLook:
-        """What is to be done for one look. What is wrong with the manifest is added to its
-        mistakes; what is wrong with the look's own files is its failure.
+    def plan_look(self, entry: LookEntry) -> PlannedLook:
+        """Return the plan of one look. Errors in the manifest are added to its mistakes; errors in
+        the look's own files become its failure.
         """
         failure = ""
         remarks: tuple[str, ...] = ()
         reads: tuple[Path, ...] = ()
         try:
-            entry, reads, remarks = self._looked_at(entry)
+            entry, reads, remarks = self._resolve_entry(entry)
         except ALONE as error:
             failure = str(error)
         except LightpaintError as error:
             self._mistakes.add(entry.where, str(error))
             failure = str(error)
-            self.look_over(entry)
+            self.collect_errors(entry)
         if not failure and (gone := self._failed & set(entry.of)):
             failure = f"it is made of {some_names(sorted(gone))}, which failed"
         if failure:
@@ -111,23 +111,23 @@ class _Planner:
         steps = self._steps(entry, reads if not failure else (), is_possible=not failure)
         return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
 
-    def look_over(self, entry: LookEntry) -> None:
-        """Add all mistakes of a look that cannot be planned, of which one would hide the others."""
-        look_over(entry, self.held, self._mistakes)
+    def collect_errors(self, entry: LookEntry) -> None:
+        """Add all errors of a look that cannot be planned, of which one would hide the others."""
+        collect_errors(entry, self.cache, self._mistakes)
 
     def _steps(
         self, entry: LookEntry, reads: Sequence[Path], *, is_possible: bool
     ) -> tuple[PlanStep, ...]:
-        """The answer, and its render and what other programs get, if that is wanted."""
-        how: dict[str, Any] = {"force": self._force, "command": self._command, "reads": reads}
-        tasks = [answer_task(entry, self._folders, **how)]
-        made_of = [self._prints.answer(entry, reads)]
+        """Return the steps of a look: its answer, and its render and exports if they are wanted."""
+        options: dict[str, Any] = {"force": self._force, "command": self._command, "reads": reads}
+        tasks = [answer_task(entry, self._folders, **options)]
+        made_of = [self._fingerprints.answer(entry, reads)]
         if "render" in entry.want:
-            tasks.append(render_task(entry, self._folders, **how))
-            made_of.append(self._prints.render(entry))
+            tasks.append(render_task(entry, self._folders, **options))
+            made_of.append(self._fingerprints.render(entry))
         if "export" in entry.want:
-            tasks.append(export_task(entry, self._folders, **how))
-            made_of.append(self._prints.export(entry))
+            tasks.append(export_task(entry, self._folders, **options))
+            made_of.append(self._fingerprints.export(entry))
         folder = self._folders[entry.name]
         is_whole = is_possible and is_as_written(folder)
         steps = []
@@ -141,27 +141,31 @@ class _Planner:
             steps.append(PlanStep(task, its, is_whole))
         return tuple(steps)
 
-    def _looked_at(self, entry: LookEntry) -> tuple[LookEntry, tuple[Path, ...], tuple[str, ...]]:
-        """With all decided that follows from its files; what it reads; what is worth saying."""
-        scenes = tuple(map(self.held.scene, entry.scenes))
+    def _resolve_entry(
+        self, entry: LookEntry
+    ) -> tuple[LookEntry, tuple[Path, ...], tuple[str, ...]]:
+        """Return the entry with all defaults resolved, the files that it reads, and remarks."""
+        scenes = tuple(map(self.cache.scene, entry.scenes))
         # Of saved bases no more than one is held, and by no look.
-        self.held.only(bases_of(entry))
-        basis = None if entry.basis is None else self.held.saved(entry.basis.unread())
+        self.cache.keep_only(bases_of(entry))
+        basis = None if entry.basis is None else self.cache.source(entry.basis.unread())
         if not entry.is_solved:
-            return entry, *self._made(replace(entry, scenes=scenes, basis=basis))
-        settings, asked = entry.settings, entry.constraints
-        job = self._job(entry, scenes, basis, settings, asked)
+            return entry, *self._check_lighting_look(replace(entry, scenes=scenes, basis=basis))
+        settings, constraints = entry.settings, entry.constraints
+        job = self._job(entry, scenes, basis, settings, constraints)
         if entry.variation:
-            how = replace(settings, hold=job.fit.hold)
-            settings, asked = varied(entry.variation, how, asked, adjusted(job))
-            job = self._job(entry, scenes, basis, settings, asked)
+            options = replace(settings, hold=job.fit.hold)
+            settings, constraints = vary(
+                entry.variation, options, constraints, adjusted_light_count(job)
+            )
+            job = self._job(entry, scenes, basis, settings, constraints)
         if entry.is_by_sums:
             _check_by_sums(job)
         self._note_costs(entry, [view.scene for view in job.views], job.settings)
         if entry.final.resolution is not None and "render" in entry.want:
             on_film(scenes[0].content, None, entry.final.resolution)
         reads = tuple(dict.fromkeys(job.results.reads))
-        entry = replace(entry, settings=settings, constraints=asked)
+        entry = replace(entry, settings=settings, constraints=constraints)
         return entry, reads, job.remarks
 
     def _job(
@@ -170,16 +174,18 @@ class _Planner:
         scenes: Sequence[Any],
         basis: Any,
         settings: Settings,
-        asked: Constraints,
+        constraints: Constraints,
     ) -> Job:
-        """The job of a look, which checks it; its painting is read anew, and let go of again."""
+        """Return the job of a look, which checks it; its painting is read, and released again."""
         paintings = tuple(painting.unread() for painting in entry.paintings)
         settings = replace(settings, force=self._force, command=self._command)
         folder = self._folders[entry.name]
-        return Job(tuple(scenes), paintings, folder, basis, asked, settings, entry.by_sensor)
+        return Job(tuple(scenes), paintings, folder, basis, constraints, settings, entry.by_sensor)
 
-    def _made(self, entry: LookEntry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-        """Of a look that is made of lightings: those of files are looked at."""
+    def _check_lighting_look(self, entry: LookEntry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+        """Check a look with a given or combined lighting; return the files that it reads, and
+        remarks.
+        """
         scenes: list[Scene] = [file.content for file in entry.scenes]
         scene = scenes[0] if scenes else None
         given = None if entry.basis is None else entry.basis.content
@@ -206,8 +212,8 @@ class _Planner:
         folders = [str(self._folders[name] / "lighting.json") for name in entry.of]
         lightings = tuple([entry.lighting] if entry.lighting else folders)
         views = view_names(scenes) if entry.by_sensor else [""]
-        how: dict[str, Any] = {"views": views, "groups": groups, "force": self._force}
-        made_folder(self._folders[entry.name], scene, lightings, **how).check()
+        options: dict[str, Any] = {"views": views, "groups": groups, "force": self._force}
+        derived_folder(self._folders[entry.name], scene, lightings, **options).check()
         settings = entry.settings
         films = [on_film(one, settings.quality, settings.resolution) for one in scenes]
         self._note_costs(entry, films, settings)
@@ -218,18 +224,18 @@ class _Planner:
     def _note_costs(
         self, entry: LookEntry, films: Sequence[Scene | None], settings: Settings
     ) -> None:
-        """What each basis costs that is to be obtained. films: on which it is rendered."""
+        """Store the cost of each basis that is to be obtained. films: that they are rendered on."""
         if entry.basis is not None:
             return
         for key, film in zip(bases_of(entry), films, strict=True):
             if film is None or key in self.costs:
                 continue
-            asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+            constraints = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
             self.costs[key] = Cost(
                 f"{film.path.name} through {film.sensor_names[film.sensor]}",
                 len(film.lights),
                 film.size,
-                film.spp if asked is None else asked,
+                film.spp if constraints is None else constraints,
                 memory_needed(film),
             )
 

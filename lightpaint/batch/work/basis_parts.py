@@ -1,4 +1,4 @@
-"""Bases that an engine renders, in parts."""
+"""Bases that an engine renders in parts."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from lightpaint.basis.render.render import (
     render_basis,
     with_first_hits,
 )
-from lightpaint.batch.plan.cost_estimate import rendered_s
+from lightpaint.batch.plan.cost_estimate import render_seconds
 from lightpaint.batch.work.engine import Engine
 from lightpaint.batch.work.spool import Spool
 from lightpaint.batch.work.work_items import Lesson, PartOfBasis, SceneFilm
@@ -22,8 +22,8 @@ from lightpaint.progress import Progress
 from lightpaint.scene.scene import Scene
 
 
-class InParts:
-    """Renders bases of one film by an engine: a `render_basis` for `obtain_basis`."""
+class PartwiseRender:
+    """A `render_basis` for `obtain_basis` that renders one film by an engine."""
 
     def __init__(self, engine: Engine, film: SceneFilm) -> None:
         self._engine = engine
@@ -40,7 +40,9 @@ class InParts:
         progress: Progress,
         **others: Any,
     ) -> Basis:
-        """As `render_basis`. How much a time comes to only who renders knows: that is done here."""
+        """Render as `render_basis` does. A time budget is spent in this process, which can measure
+        it.
+        """
         if time_s is not None:
             how: dict[str, Any] = {"time_s": time_s, "seed": seed, "progress": progress, **others}
             return render_basis(scene, start=start, **how)
@@ -52,7 +54,7 @@ class InParts:
         check_memory(scene)
         parts = plan_parts(scene, spp, start=start)
         spool = Spool(scene, parts, seed=seed, start=start)
-        learned = lesson_by(self._engine, self._film, scene, spp, seed, start, spool)
+        learned = obtain_lesson(self._engine, self._film, scene, spp, seed, start, spool)
         sums = PartSums(scene, parts, seed=seed, start=start)
         self._add_all(scene, parts, sums, seed, spool, progress)
         basis = sums.basis(learned)
@@ -68,7 +70,7 @@ class InParts:
         spool: Spool,
         progress: Progress,
     ) -> None:
-        """Add all parts to `sums`: those that are kept, and those that the engine renders."""
+        """Add all parts to `sums`: those that are cached, and those that the engine renders."""
         learned = str(spool.learned) if spool.learned.is_file() else ""
         left = {}
         for k, part in enumerate(parts):
@@ -78,9 +80,9 @@ class InParts:
                 continue
             pixels = (part.bottom - part.top) * scene.size[1]
             lights = len(scene.lights) if part.light is None else 1
-            expected_s = rendered_s(pixels * part.spp, lights)
-            errand = PartOfBasis(f"part {k}", self._film, part, seed, learned, expected_s)
-            left[errand.name] = errand
+            expected_s = render_seconds(pixels * part.spp, lights)
+            item = PartOfBasis(f"part {k}", self._film, part, seed, learned, expected_s)
+            left[item.name] = item
         progress("basis", len(parts) - len(left), len(parts), "parts")
         for count, done in enumerate(self._engine.run(list(left.values()))):
             if done.failure:
@@ -91,7 +93,7 @@ class InParts:
             progress("basis", len(parts) - len(left) + count + 1, len(parts), "parts")
 
 
-def lesson_by(
+def obtain_lesson(
     engine: Engine,
     film: SceneFilm,
     scene: Scene,
@@ -100,12 +102,14 @@ def lesson_by(
     start: Basis | None,
     spool: Spool,
 ) -> Floats | None:
-    """What all parts choose by, which is put into the spool; None where nothing is chosen."""
+    """Return the emission that parts sample by, and put it into the spool; None if they
+    need none.
+    """
     if method_of(scene) != ONE_PASS:
         return None
     learned = spool.lesson() if start is None else start.learned
     if learned is None:
-        expected_s = rendered_s(LESSON * LESSONS, len(scene.lights))
+        expected_s = render_seconds(LESSON * LESSONS, len(scene.lights))
         [done] = engine.run([Lesson("lesson", film, spp, seed, expected_s)])
         if done.failure:
             raise BasisError(done.failure)

@@ -1,4 +1,4 @@
-"""An answer that is made of others, and not solved: as it is, warmer, between two."""
+"""Answers derived from other answers, and not solved: as they are, warmer, between two."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.batch.manifest.variations import SHIFTED, SOLVED, shifted, varied
+from lightpaint.batch.manifest.variations import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
 from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.pipeline.answer_folder import answer_files, new_answer
 from lightpaint.pipeline.job import Job
@@ -16,7 +16,7 @@ from lightpaint.pipeline.results import write_predicted
 from lightpaint.scene.scene import Scene
 
 
-def made_folder(
+def derived_folder(
     folder: Path,
     scene: Scene | None,
     lightings: tuple[str, ...],
@@ -25,7 +25,7 @@ def made_folder(
     groups: LightGroups | None = None,
     force: bool = False,
 ) -> ResultFolder:
-    """Where an answer goes that is made of others. views: folders in it, one for each picture."""
+    """Return where a derived answer goes. views: folders in it, one for each picture."""
     reads = tuple(map(Path, lightings))
     files = answer_files(folder, scene=scene, groups=groups)
     files += [folder / view / "predicted.exr" for view in views]
@@ -37,7 +37,7 @@ def made_folder(
     return ResultFolder(folder, tuple(files), reads, answers, force=force)
 
 
-def leave_made(
+def write_derived(
     results: ResultFolder,
     lighting: Lighting,
     bases: Sequence[Basis],
@@ -49,8 +49,8 @@ def leave_made(
 ) -> None:
     """Write lighting.json, its pictures from `bases`, and the relit scene.
 
-    views: folder of each picture. groups: what the basis was read from, whose other programs get
-    the answer, too. spp: of a verification.
+    views: folder of each picture. groups: light groups that the basis was read from, whose programs
+    get the answer, too. spp: of a verification.
     """
     results.check()
     with new_answer(results, lighting, scene=scene, groups=groups) as answer:
@@ -61,40 +61,40 @@ def leave_made(
             write_predicted(its, predicted, origin=origin, spp=spp_, scene=answer.relit)
 
 
-def dimmed(basis: Basis) -> set[str]:
-    """Lights that have a dimmer and no colour."""
+def dimmer_lights(basis: Basis) -> set[str]:
+    """Return the names of lights that have a dimmer and no colour."""
     return {light.name for light in basis.lights if light.is_scalar}
 
 
-def sibling_folder(folder: Path, word: str) -> Path:
-    """Where a variation goes: beside the look that it varies."""
+def variation_folder(folder: Path, word: str) -> Path:
+    """Return where a variation goes: beside the look that it varies."""
     return folder.with_name(f"{folder.name}-{word.replace(' ', '-')}")
 
 
-def adjusted(job: Job) -> int:
-    """How many lights are adjusted."""
+def adjusted_light_count(job: Job) -> int:
+    """Return how many lights are adjusted."""
     first = job.views[0]
     told = first.basis if first.basis is not None else first.scene
     return sum(not light.is_fixed for light in told.lights) if told is not None else 0
 
 
-def siblings(job: Job, words: Sequence[str]) -> dict[str, Job]:
-    """Those variations of a look that are solved anew, by their words; checked like all jobs."""
+def variation_jobs(job: Job, words: Sequence[str]) -> dict[str, Job]:
+    """Return the jobs of variations that are solved, by their words; checked like all jobs."""
     made = {}
-    for word in (x for x in words if x in SOLVED):
-        how, lights = replace(job.settings, hold=job.fit.hold), adjusted(job)
-        settings, asked = varied(word, how, job.constraints, lights)
-        folder = sibling_folder(job.folder, word)
+    for word in (x for x in words if x in SOLVED_WORDS):
+        options, lights = replace(job.settings, hold=job.fit.hold), adjusted_light_count(job)
+        settings, asked = vary(word, options, job.constraints, lights)
+        folder = variation_folder(job.folder, word)
         its = (job.scenes, job.targets, folder, job.basis, asked, settings, job.by_sensor)
         made[word] = Job(*its)
     return made
 
 
 def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
-    """Where those variations go that are made of the answer, by their words."""
+    """Return where variations go that are derived from the answer, by their words."""
     return {
-        word: made_folder(
-            sibling_folder(job.folder, word),
+        word: derived_folder(
+            variation_folder(job.folder, word),
             job.views[0].scene,
             (str(job.folder / "lighting.json"),),
             views=_views(job),
@@ -102,23 +102,25 @@ def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
             force=job.settings.force,
         )
         for word in words
-        if word in SHIFTED
+        if word in SHIFTED_WORDS
     }
 
 
-def leave_shifted(
+def write_shifted(
     job: Job, word: str, results: ResultFolder, lighting: Lighting, bases: Sequence[Basis]
 ) -> None:
     """Write a variation of the answer of `job`. bases: of its views."""
-    varied_ = shifted(lighting, SHIFTED[word], dimmed(bases[0])).named(results.folder.name)
-    how: dict[str, Any] = {
+    shifted_lighting = shift(lighting, SHIFTED_WORDS[word], dimmer_lights(bases[0])).named(
+        results.folder.name
+    )
+    options: dict[str, Any] = {
         "scene": job.views[0].scene,
         "groups": job.groups,
         "spp": job.settings.spp,
     }
-    leave_made(results, varied_, bases, views=_views(job), **how)
+    write_derived(results, shifted_lighting, bases, views=_views(job), **options)
 
 
 def _views(job: Job) -> list[str]:
-    """The folder of each view in that of the results."""
+    """Return the folder of each view in that of the results."""
     return [str(view.folder.relative_to(job.folder)) for view in job.views]

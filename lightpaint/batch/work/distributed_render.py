@@ -1,4 +1,4 @@
-"""One final render by many workers."""
+"""A final render by many workers."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,15 +17,15 @@ from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import estimate_of, passes_of, ranges_of
 
 
-def rendered_by(
+def distributed_renderer(
     engine: Engine, task: Task, variant: str | None, listen: Listener
 ) -> Callable[[Scene], Estimate]:
-    """What has `engine` render the scene of a look that is answered, in ranges of passes.
+    """Return a function that renders an answered look's scene by `engine`, in ranges of passes.
 
     variant: Mitsuba's, of the look's own scene.
     """
 
-    def rendered(relit: Scene) -> Estimate:
+    def render(relit: Scene) -> Estimate:
         # As the answer has left it, which comes out the same when it is written anew.
         path = str(Path(task.writes) / "relit.xml")
         scene = SceneFile(
@@ -38,23 +38,23 @@ def rendered_by(
         files = tuple(map(str, scene.content.read_files))
         height, width = relit.size
         passes = passes_of(relit, task.final.spp)
-        errands = []
-        for some in ranges_of(relit, passes):
-            samples = height * width * sum(passes[k][1] for k in some)
-            name, expected_s = f"{task.look} {some.start}", samples * SAMPLE_S
-            which = some.start, some.stop
-            errands.append(Passes(name, scene, task.final, *which, files, expected_s))
-        came = {}
-        sums, following = np.zeros((2, height, width, 3), np.float64), 0
-        for count, done in enumerate(engine.run(errands)):
+        items = []
+        for range_ in ranges_of(relit, passes):
+            samples = height * width * sum(passes[k][1] for k in range_)
+            name, expected_s = f"{task.look} {range_.start}", samples * SAMPLE_S
+            which = range_.start, range_.stop
+            items.append(Passes(name, scene, task.final, *which, files, expected_s))
+        results = {}
+        sums, next_item = np.zeros((2, height, width, 3), np.float64), 0
+        for count, done in enumerate(engine.run(items)):
             if done.failure:
                 raise SceneError(done.failure)
-            came[done.look] = done.value
-            while following < len(errands) and errands[following].name in came:
-                for half, its in came.pop(errands[following].name).items():
+            results[done.look] = done.value
+            while next_item < len(items) and items[next_item].name in results:
+                for half, its in results.pop(items[next_item].name).items():
                     sums[half] += its
-                following += 1
-            listen("relit", count + 1, len(errands), "ranges of passes")
+                next_item += 1
+            listen("relit", count + 1, len(items), "ranges of passes")
         return estimate_of(sums, passes)
 
-    return rendered
+    return render

@@ -1,4 +1,4 @@
-"""Looks of which the lighting alone is wanted: workers send sums, and nobody has the basis."""
+"""Looks of which only the lighting is wanted: workers send sums, and nobody has the basis."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -6,14 +6,14 @@ from typing import Any
 
 from lightpaint.basis.render.parts import Part, plan_parts
 from lightpaint.basis.render.render import basis_lights
-from lightpaint.batch.plan.cost_estimate import rendered_s
-from lightpaint.batch.work.basis_parts import lesson_by
+from lightpaint.batch.plan.cost_estimate import render_seconds
+from lightpaint.batch.work.basis_parts import obtain_lesson
 from lightpaint.batch.work.engine import Engine
 from lightpaint.batch.work.spool import Spool
-from lightpaint.batch.work.sums_answer import leave_lights
+from lightpaint.batch.work.sums_answer import write_solved_lights
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import attempted, fields_of
-from lightpaint.batch.work.work_items import Done, PaintingOfSums, SceneFilm, SumsOfRows
+from lightpaint.batch.work.work import attempt, job_fields
+from lightpaint.batch.work.work_items import ItemResult, PaintingOfSums, SceneFilm, SumsOfRows
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BasisError
 from lightpaint.lighting.problem_sums import Sums
@@ -23,47 +23,49 @@ from lightpaint.progress import Listener
 from lightpaint.scene.presets import samples
 
 
-def solved_by_sums(
-    tasks: Sequence[Task], engine: Engine, held: WorkerCache, listen: Listener
-) -> list[Done]:
-    """Do looks that share one basis, of which nothing but the lighting is wanted."""
+def solve_by_sums(
+    tasks: Sequence[Task], engine: Engine, cache: WorkerCache, listen: Listener
+) -> list[ItemResult]:
+    """Solve looks that share one basis and want nothing but the lighting."""
     jobs: list[Job] = []
-    done: list[Done] = []
+    done: list[ItemResult] = []
 
-    def born(task: Task) -> Callable[[], None]:
-        return lambda: jobs.append(Job(**fields_of(task, held)))
+    def make_job(task: Task) -> Callable[[], None]:
+        return lambda: jobs.append(Job(**job_fields(task, cache)))
 
-    able = []
+    runnable = []
     for task in tasks:
-        if (its := attempted(task, born(task))).failure:
+        if (its := attempt(task, make_job(task))).failure:
             done.append(its)
         else:
-            able.append(task)
-    if not able:
+            runnable.append(task)
+    if not runnable:
         return done
     sums: list[Sums] = []
-    came = attempted(able[0], lambda: sums.extend(_rendered(able[0], jobs, engine, held, listen)))
-    for k, task in enumerate(able):
-        if came.failure:
-            done.append(replace(came, look=task.look))
+    results = attempt(
+        runnable[0], lambda: sums.extend(_render_sums(runnable[0], jobs, engine, cache, listen))
+    )
+    for k, task in enumerate(runnable):
+        if results.failure:
+            done.append(replace(results, look=task.look))
             continue
-        done.append(attempted(task, lambda job=jobs[k], its=sums[k]: _write(job, its)))  # type: ignore[misc]
+        done.append(attempt(task, lambda job=jobs[k], its=sums[k]: _solve_and_write(job, its)))  # type: ignore[misc]
     return done
 
 
-def _rendered(
-    task: Task, jobs: Sequence[Job], engine: Engine, held: WorkerCache, listen: Listener
+def _render_sums(
+    task: Task, jobs: Sequence[Job], engine: Engine, cache: WorkerCache, listen: Listener
 ) -> list[Sums]:
-    """The sums of each job's problem, over all rows in their order."""
+    """Return the sums of each job's problem, over all rows in their order."""
     scene, settings = jobs[0].views[0].scene, jobs[0].settings
     assert scene is not None
     asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
     spp = scene.spp if asked is None else asked
     parts = plan_parts(scene, spp)
-    file = replace(fields_of(task, held)["scenes"][0])
+    file = replace(job_fields(task, cache)["scenes"][0])
     film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, scene.read_files)))
     spool = Spool(scene, parts, seed=settings.seed, start=None)
-    lesson_by(engine, film, scene, spp, settings.seed, None, spool)
+    obtain_lesson(engine, film, scene, spp, settings.seed, None, spool)
     paintings = tuple(
         PaintingOfSums(_file_of(job), job.fit.emitters, job.settings.resize) for job in jobs
     )
@@ -71,43 +73,43 @@ def _rendered(
     tiles: dict[tuple[int, int], list[Part]] = {}
     for part in sorted(parts, key=lambda part: (part.top, part.half, part.first)):
         tiles.setdefault((part.top, part.bottom), []).append(part)
-    errands = []
+    items = []
     for k, ((top, bottom), its) in enumerate(tiles.items()):
         pixels = (bottom - top) * scene.size[1]
-        expected_s = rendered_s(pixels * sum(part.spp for part in its), len(scene.lights))
-        how: dict[str, Any] = {"film": film, "parts": tuple(its), "seed": settings.seed}
-        how |= {"learned": str(spool.learned), "paintings": paintings, "files": reads}
-        errands.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **how))
-    came: dict[str, list[Sums]] = {}
-    added: list[Sums] = []
-    following = iter(errands)
-    errand = next(following, None)
-    listen("basis", 0, len(errands), "ranges of rows")
-    for count, done in enumerate(engine.run(errands)):
+        expected_s = render_seconds(pixels * sum(part.spp for part in its), len(scene.lights))
+        options: dict[str, Any] = {"film": film, "parts": tuple(its), "seed": settings.seed}
+        options |= {"learned": str(spool.learned), "paintings": paintings, "files": reads}
+        items.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **options))
+    results: dict[str, list[Sums]] = {}
+    total: list[Sums] = []
+    following = iter(items)
+    item = next(following, None)
+    listen("basis", 0, len(items), "ranges of rows")
+    for count, done in enumerate(engine.run(items)):
         if done.failure:
             raise BasisError(done.failure)
-        came[done.look] = done.value
-        listen("basis", count + 1, len(errands), "ranges of rows")
+        results[done.look] = done.value
+        listen("basis", count + 1, len(items), "ranges of rows")
         # In the order of the rows, whatever order they come in.
-        while errand is not None and errand.name in came:
-            more = came.pop(errand.name)
-            added = [a + b for a, b in zip(added, more, strict=True)] if added else more
-            errand = next(following, None)
+        while item is not None and item.name in results:
+            more = results.pop(item.name)
+            total = [a + b for a, b in zip(total, more, strict=True)] if total else more
+            item = next(following, None)
     spool.drop()
-    return added
+    return total
 
 
-def _write(job: Job, sums: Sums) -> None:
+def _solve_and_write(job: Job, sums: Sums) -> None:
     """Solve, and write the lighting, and the scene that has it."""
     scene = job.views[0].scene
     assert scene is not None
     asked = samples(job.settings.quality, spp=job.settings.spp, time_s=None)
     half = -(-(scene.spp if asked is None else asked) // 2)
-    leave_lights(job, basis_lights(scene), sums, scene_identity=scene.identity, spp=2 * half)
+    write_solved_lights(job, basis_lights(scene), sums, scene_identity=scene.identity, spp=2 * half)
 
 
 def _file_of(job: Job) -> Painting:
-    """The painting, not read yet."""
+    """Return the painting, not read yet."""
     [painting] = job.targets
     assert isinstance(painting, Painting)
     return painting.unread()

@@ -1,56 +1,59 @@
-"""Who does errands: this process, processes beside it (processes.py), or a cluster (cluster.py)."""
+"""Engines run work items: this process, processes beside it (processes.py), or a cluster
+(cluster.py).
+"""
 
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from lightpaint.batch.work.work import do
-from lightpaint.batch.work.work_items import Done, Errand
+from lightpaint.batch.work.work import run_item
+from lightpaint.batch.work.work_items import ItemResult, WorkItem
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener
 
-#: How often an errand is given to a worker, where workers die over it.
-TRIES = 3
+#: How often an item is tried, where workers die over it.
+MAX_TRIES = 3
 
-#: What is said of one that they all die over.
-LOST = "its worker was killed, or ran out of memory"
+#: Failure of an item that all workers die over.
+LOST_TEXT = "its worker was killed, or ran out of memory"
 
 
 class Engine(Protocol):
-    """Does errands that do not wait for each other."""
+    """An engine for work items that do not wait for each other."""
 
     @property
     def is_apart(self) -> bool:
-        """Whether it works in other processes, which have no basis at hand."""
+        """True if it works in other processes, which have no basis in memory."""
 
     @property
     def is_gone(self) -> bool:
-        """Whether nobody is there any more to do anything, which is no look's failure."""
+        """True once nobody is left to do anything, which is no look's failure."""
 
     @property
     def workers(self) -> int:
-        """How many errands it does at a time, as far as is known."""
+        """Number of items that it runs at a time, as far as is known."""
 
-    def run(self, errands: Sequence[Errand]) -> Iterator[Done]:
-        """What came of each, as it is done, in any order.
+    def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
+        """Yield the result of each item as it is done, in any order.
 
-        What a worker dies over is done again, elsewhere. Ending it early ends the work.
+        An item over which a worker dies is done again, elsewhere. Closing the iterator ends the
+        work.
         """
 
 
 class InProcess:
-    """One after the other, here."""
+    """An engine that runs items here, one after the other."""
 
     is_apart = False
     is_gone = False
     workers = 1
 
-    def __init__(self, held: WorkerCache, listen: Listener) -> None:
-        self._held, self._listen = held, listen
+    def __init__(self, cache: WorkerCache, listen: Listener) -> None:
+        self._cache, self._listen = cache, listen
 
-    def run(self, errands: Sequence[Errand]) -> Iterator[Done]:
-        """As of `Engine`, in the order of the errands."""
+    def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
+        """Run the items in their order, as of `Engine`."""
         try:
-            for errand in errands:
-                yield do(errand, self._held, self._listen)
+            for item in items:
+                yield run_item(item, self._cache, self._listen)
         finally:
-            self._held.rest()
+            self._cache.release_renderer()

@@ -1,4 +1,4 @@
-"""Worker processes on this machine."""
+"""An engine of worker processes on this machine."""
 
 import multiprocessing
 import os
@@ -10,16 +10,16 @@ from concurrent.futures.process import BrokenProcessPool
 
 from threadpoolctl import threadpool_limits
 
-from lightpaint.batch.work.engine import LOST, TRIES
-from lightpaint.batch.work.work import do
-from lightpaint.batch.work.work_items import Done, Errand, spoken
+from lightpaint.batch.work.engine import LOST_TEXT, MAX_TRIES
+from lightpaint.batch.work.work import run_item
+from lightpaint.batch.work.work_items import ItemResult, WorkItem, item_label
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener, silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 
 
 class Processes:
-    """Several at a time, in worker processes. One that dies takes nothing along but its own try."""
+    """An engine of several processes. One that dies costs only its own item's try."""
 
     is_apart = True
     is_gone = False
@@ -32,43 +32,43 @@ class Processes:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._end()
+        self._stop_pool()
 
-    def run(self, errands: Sequence[Errand]) -> Iterator[Done]:
-        """As of `Engine`."""
-        waiting, tries = list(errands), dict.fromkeys((errand.name for errand in errands), 0)
+    def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
+        """Run the items, as of `Engine`."""
+        waiting, tries = list(items), dict.fromkeys((item.name for item in items), 0)
         # Of several that were at work when one died nobody knows which did: each goes alone.
-        suspects: list[Errand] = []
+        suspects: list[WorkItem] = []
         try:
             while waiting or suspects:
                 if waiting:
-                    yield from self._together(waiting, suspects)
+                    yield from self._run_parallel(waiting, suspects)
                 while suspects:
-                    errand = suspects.pop(0)
-                    tries[errand.name] += 1
-                    alone: list[Errand] = []
-                    yield from self._together([errand], alone)
-                    if alone and tries[errand.name] < TRIES:
-                        suspects.append(errand)
-                    elif alone:
-                        yield Done(errand.name, errand.kind, LOST, is_lost=True)
+                    item = suspects.pop(0)
+                    tries[item.name] += 1
+                    lock_folder: list[WorkItem] = []
+                    yield from self._run_parallel([item], lock_folder)
+                    if lock_folder and tries[item.name] < MAX_TRIES:
+                        suspects.append(item)
+                    elif lock_folder:
+                        yield ItemResult(item.name, item.kind, LOST_TEXT, is_lost=True)
         except BaseException:
-            self._end()
+            self._stop_pool()
             raise
 
-    def _together(self, waiting: list[Errand], lost: list[Errand]) -> Iterator[Done]:
+    def _run_parallel(self, waiting: list[WorkItem], lost: list[WorkItem]) -> Iterator[ItemResult]:
         """Empty `waiting`, as many at a time as there are workers, until one of them dies."""
-        running: dict[Future[Done], Errand] = {}
-        # Which process takes an errand only the pool knows, but so many are at work.
-        places: dict[Future[Done], str] = {}
+        running: dict[Future[ItemResult], WorkItem] = {}
+        # Which process takes an item only the pool knows, but so many are at work.
+        places: dict[Future[ItemResult], str] = {}
         free = [f"worker {k + 1}" for k in reversed(range(self.workers))]
-        pool = self._started()
+        pool = self._start_pool()
         while waiting or running:
             try:
                 while waiting and len(running) < self.workers:
-                    future = pool.submit(_work, waiting[0])
+                    future = pool.submit(_run_item, waiting[0])
                     running[future], places[future] = waiting[0], free.pop()
-                    self._listen.at_work(places[future], spoken(waiting[0]))
+                    self._listen.at_work(places[future], item_label(waiting[0]))
                     del waiting[0]
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
@@ -81,23 +81,23 @@ class Processes:
                 lost += running.values()
                 for place in places.values():
                     self._listen.at_work(place, None)
-                self._end()
+                self._stop_pool()
                 return
 
-    def _started(self) -> ProcessPoolExecutor:
+    def _start_pool(self) -> ProcessPoolExecutor:
         if self._pool is None:
             threads = max(1, (os.cpu_count() or 1) // self.workers)
             self._pool = ProcessPoolExecutor(
                 self.workers,
                 # A fork would have half of the renderer's threads.
                 mp_context=multiprocessing.get_context("spawn"),
-                initializer=_begin,
+                initializer=_init_worker,
                 initargs=(threads,),
             )
         return self._pool
 
-    def _end(self) -> None:
-        """Have all workers end now."""
+    def _stop_pool(self) -> None:
+        """Stop all workers now."""
         pool, self._pool = self._pool, None
         if pool is None:
             return
@@ -109,11 +109,11 @@ class Processes:
             worker.join()
 
 
-_HELD = WorkerCache()
+_CACHE = WorkerCache()
 
 
-def _begin(threads: int) -> None:
-    """A worker begins: Ctrl-C is for the process that gives the work, and ends this one, too."""
+def _init_worker(threads: int) -> None:
+    """Prepare a worker: it ignores Ctrl-C, since its parent handles it and ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, str(threads))
@@ -123,13 +123,15 @@ def _begin(threads: int) -> None:
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent was killed would wait for work for ever, or go on with what is lost."""
+    """End this worker with its parent: otherwise it would wait for ever, or work on what is
+    lost.
+    """
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
         os._exit(1)
 
 
-def _work(errand: Errand) -> Done:
-    """In a worker: do it, and say what came of it."""
-    return do(errand, _HELD, silent)
+def _run_item(item: WorkItem) -> ItemResult:
+    """Run an item in a worker."""
+    return run_item(item, _CACHE, silent)

@@ -1,4 +1,4 @@
-"""Final renders in ranges of passes, whose sums are those of a render in one go to the last bit."""
+"""Final renders in ranges of passes, whose sums equal those of one render to the last bit."""
 
 import gc
 from typing import Any
@@ -10,8 +10,8 @@ from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_sum, passes_of
 
 
-class Frame:
-    """Renders passes of one relit scene, which stays loaded: close it before another is."""
+class PassRenderer:
+    """A renderer of passes of one relit scene, which stays loaded until `close`."""
 
     def __init__(self, scene: Scene, final: Final) -> None:
         self._scene, self._final = scene, final
@@ -19,7 +19,9 @@ class Frame:
         self._loaded: Any = scene.load()
 
     def sum(self, some: range) -> dict[int, Doubles]:
-        """The undivided sum, (h, w, 3), of those passes that belong to a half, by the half."""
+        """Return the undivided sum, (h, w, 3), of those passes that belong to a half, by
+        the half.
+        """
         sums: dict[int, Doubles] = {}
         for k in some:
             half, spp = self._passes[k]
@@ -30,6 +32,6 @@ class Frame:
         return sums
 
     def close(self) -> None:
-        """Let go of the scene."""
+        """Release the scene."""
         self._loaded = None
         gc.collect()

@@ -1,4 +1,4 @@
-"""Some rows of a basis, of which a worker keeps nothing but sums."""
+"""Rows of a basis, of which a worker keeps nothing but sums."""
 
 from typing import Any
 
@@ -12,12 +12,14 @@ from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.problem_sums import Sums, sums_of
 
 
-def sums_of_rows(errand: SumsOfRows, held: WorkerCache) -> list[Sums]:
-    """Those with each painting, of the very images that a whole basis has in these rows."""
-    renderer, scene = held.renderer(errand), held.film(errand.film)
+def sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
+    """Return the sums with each painting, of the very images that a whole basis has in
+    these rows.
+    """
+    renderer, scene = cache.renderer(item), cache.film(item.film)
     halves: list[Any] = [None, None]
     spp, seen = [0, 0], None
-    for part in errand.parts:
+    for part in item.parts:
         planes, its = renderer.render(part)
         before = halves[part.half]
         halves[part.half] = planes if before is None else before + planes
@@ -25,10 +27,10 @@ def sums_of_rows(errand: SumsOfRows, held: WorkerCache) -> list[Sums]:
         spp[part.half] += part.spp
     assert seen is not None
     images, differences = mean_and_half_difference(halves, spp)
-    rows = slice(errand.parts[0].top, errand.parts[0].bottom)
-    origin = origin_of(scene, errand.seed, IN_PARTS, (spp[0], spp[1]), (1, 1))
+    rows = slice(item.parts[0].top, item.parts[0].bottom)
+    origin = origin_of(scene, item.seed, IN_PARTS, (spp[0], spp[1]), (1, 1))
     basis = Basis(basis_lights(scene), as_planes(images), as_planes(differences), seen > 0, origin)
     return [
-        sums_of(basis, held.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
-        for wanted in errand.paintings
+        sums_of(basis, cache.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
+        for wanted in item.paintings
     ]

@@ -1,4 +1,4 @@
-"""Parts of a basis that are rendered and not yet added up, on the disk: no kill costs them."""
+"""Rendered parts of a basis that are not yet added up, on the disk: no kill costs them."""
 
 import hashlib
 import re
@@ -22,15 +22,15 @@ from lightpaint.files import first_line
 from lightpaint.scene.scene import Scene
 from lightpaint.version import __version__
 
-#: Seconds after which nobody will go on with the parts of a basis.
+#: Seconds after which leftover parts of a basis are deleted.
 LEFTOVER_S = 7 * 86_400.0
 
-#: What the folder of the parts of one basis is called.
+#: Names of folders with the parts of one basis.
 _NAME = re.compile("[0-9a-f]{32}")
 
 
 class Spool:
-    """The parts of one basis. A disk that takes none is no reason to lose a render."""
+    """Rendered parts of one basis. A disk that takes none is no reason to lose a render."""
 
     def __init__(
         self, scene: Scene, parts: Sequence[Part], *, seed: int, start: Basis | None
@@ -49,11 +49,11 @@ class Spool:
 
     @property
     def learned(self) -> Path:
-        """Where the lesson goes."""
+        """Path of the lesson."""
         return self.folder / "learned.npz"
 
     def lesson(self) -> Floats | None:
-        """What was learned; None before that."""
+        """Return the lesson; None before it is learned."""
         try:
             return read_lesson(str(self.learned))
         except BasisError:
@@ -64,7 +64,7 @@ class Spool:
         _write(self.learned, compressed=True, learned=learned)
 
     def part(self, part: Part) -> tuple[Floats, Floats] | None:
-        """The sums of that part; None if they are not kept, or not as they were."""
+        """Return the sums of a part; None if they are not kept, or damaged."""
         try:
             with np.load(self._file(part), allow_pickle=False) as kept:
                 return kept["planes"], kept["seen"]
@@ -77,7 +77,7 @@ class Spool:
             _write(self._file(part), planes=planes, seen=seen)
 
     def drop(self) -> None:
-        """Delete all: the basis is made."""
+        """Delete all parts: the basis is made."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _file(self, part: Part) -> Path:
@@ -94,7 +94,7 @@ class Spool:
 
 
 def read_lesson(file: str) -> Floats:
-    """What a lesson came to. Raises BasisError."""
+    """Return a saved lesson. Raises BasisError."""
     try:
         with np.load(file, allow_pickle=False) as kept:
             learned: Floats = kept["learned"]
@@ -104,7 +104,7 @@ def read_lesson(file: str) -> Floats:
 
 
 def _write(file: Path, *, compressed: bool = False, **arrays: Any) -> None:
-    """All of it under that name, or nothing."""
+    """Write all arrays under that name, or nothing."""
     half = file.with_name(f".{file.name}.half")
     with half.open("wb") as opened:
         (np.savez_compressed if compressed else np.savez)(opened, **arrays)

@@ -1,4 +1,4 @@
-"""A lighting and nothing else: what is left of a look whose sums are known."""
+"""Answers of which only the lighting is wanted, solved from sums."""
 
 from dataclasses import replace
 
@@ -14,21 +14,25 @@ from lightpaint.pipeline.job import Job
 
 
 def answer_by_sums(job: Job, basis: Basis) -> None:
-    """Solve with a basis that is at hand, of which nothing but sums is looked at."""
+    """Solve with a basis in memory, of which only sums are used."""
     [view] = job.views
     basis = basis if view.scene is None else basis.with_requests(view.scene.requests)
     if not basis.knows_noise:
         # Only pixels tell what rounding alone has made (see lighting/round_off.py).
         problem = Problem.of(basis, view.target, constraints=job.asked, fit=job.fit)
-        leave_lighting(job, solution_of(problem).lighting)
+        write_lighting_only(job, solution_of(problem).lighting)
         return
     sums = sums_of(basis, view.target, slice(None), job.fit)
     origin = basis.origin
-    leave_lights(job, basis.lights, sums, scene_identity=origin.scene_identity, spp=origin.spp)
+    write_solved_lights(
+        job, basis.lights, sums, scene_identity=origin.scene_identity, spp=origin.spp
+    )
 
 
-def leave_lights(job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int) -> None:
-    """Solve, and leave the lighting. Others as of `problem_of_sums`."""
+def write_solved_lights(
+    job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int
+) -> None:
+    """Solve, and write the lighting. Other parameters are those of `problem_of_sums`."""
     problem = problem_of_sums(
         lights,
         job.views[0].target.name,
@@ -38,10 +42,10 @@ def leave_lights(job: Job, lights: Lights, sums: Sums, *, scene_identity: str, s
         scene_identity=scene_identity,
         spp=spp,
     )
-    leave_lighting(job, solve_linear(problem, problem.start).lighting)
+    write_lighting_only(job, solve_linear(problem, problem.start).lighting)
 
 
-def leave_lighting(job: Job, lighting: Lighting) -> None:
+def write_lighting_only(job: Job, lighting: Lighting) -> None:
     """Write the lighting, and the scene that has it."""
     [view] = job.views
     lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)

@@ -1,4 +1,4 @@
-"""One step of one look, as text that can be sent, and what came of it."""
+"""A step of one look as a work item: files and plain values, which can be sent."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Final, Handover, Space
-from lightpaint.batch.manifest.variations import SHIFTED
-from lightpaint.batch.work.work_items import Move
+from lightpaint.batch.manifest.variations import SHIFTED_WORDS
+from lightpaint.batch.work.work_items import PathMap
 from lightpaint.errors import BatchError
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile, to_json
@@ -17,23 +17,23 @@ from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
 
-#: The answer, its final render, and what other programs get of it.
+#: Steps: the answer, its final render, and exports for other programs.
 Kind = Literal["answer", "render", "export"]
 
-#: Where the last goes, in the folder of the look.
+#: Folder of the exports, in that of the look.
 EXPORT = "export"
 
 
 @dataclass(frozen=True)
 class Task:
-    """One step of one look, of files and plain values.
+    """A step of one look, of files and plain values.
 
-    look: name. kind: step. job: as `Job.to_json` writes it; of an answer that is made of others
-    without a target. lightings: files that it is made of; reads: all others but those of bases;
-    share, space: between two lightings; mireds: how much warmer. final: how it is rendered.
-    handover: what other programs get. bases: keys of what it is solved with, and files where that
-    is kept, "" where it is to be obtained. expected_s: roughly how long it takes. is_by_sums:
-    whether nothing but the lighting is wanted.
+    look: name. kind: step. job: as `Job.to_json` writes it; of a derived answer without a target.
+    lightings: files that it combines; reads: all other files but bases; share, space: between two
+    lightings; mireds: how much warmer. final: options of the final render. handover: exports for
+    other programs. bases: keys of the bases it is solved with, and files where they are saved, ""
+    where they are to be obtained. expected_s: roughly how long it takes. is_by_sums: whether only
+    the lighting is wanted.
     """
 
     look: str
@@ -54,22 +54,24 @@ class Task:
 
     @property
     def name(self) -> str:
-        """As of `Errand`."""
+        """Name of the look, as of `WorkItem`."""
         return self.look
 
     @property
     def writes(self) -> str:
-        """As of `Errand`."""
+        """Folder of the results, as of `WorkItem`."""
         return str(json.loads(self.job)["folder"])
 
     @property
     def force(self) -> bool:
-        """Whether results of something else, or changed by hand, are replaced."""
+        """True if results of something else, or changed by hand, are replaced."""
         return bool(json.loads(self.job)["settings"]["force"])
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """As of `Errand`: of a final render also what lies beside the lighting."""
+        """Files that it reads, as of `WorkItem`: of a final render also those beside the
+        lighting.
+        """
         beside: list[str] = []
         if self.kind == "render":
             beside = [str(x) for x in sorted(Path(self.writes).rglob("*")) if x.is_file()]
@@ -77,27 +79,27 @@ class Task:
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """As of `Errand`."""
+        """Saved bases, as of `WorkItem`."""
         return tuple(file for file in self.files if file)
 
-    def moved(self, move: Move) -> "Task":
-        """As of `Errand`."""
+    def with_paths(self, move: PathMap) -> "Task":
+        """Return the same task with other paths."""
         return replace(
             self,
-            job=json.dumps(_moved(json.loads(self.job), move)),
-            bases=tuple(json.dumps(_moved(json.loads(key), move)) for key in self.bases),
+            job=json.dumps(_map_paths(json.loads(self.job), move)),
+            bases=tuple(json.dumps(_map_paths(json.loads(key), move)) for key in self.bases),
             lightings=tuple(map(move, self.lightings)),
             reads=tuple(map(move, self.reads)),
             files=tuple(file and move(file) for file in self.files),
         )
 
     def to_json(self) -> str:
-        """This task as text, to be done elsewhere."""
+        """Return this task as text, to be done elsewhere."""
         return json.dumps(asdict(self))
 
     @staticmethod
     def from_json(text: str) -> "Task":
-        """The task that `to_json` wrote. Raises BatchError for what is none."""
+        """Return the task that `to_json` wrote. Raises BatchError for anything else."""
         try:
             data = strict_json(text)
             signed = {
@@ -117,7 +119,9 @@ def answer_task(
     force: bool,
     command: str,
 ) -> Task:
-    """The answer of a look. folders: of all looks, by name. reads: files that it reads."""
+    """Return the task of a look's answer. folders: of all looks, by name. reads: its input
+    files.
+    """
     settings = {**_plain(entry.settings), "force": force, "command": command}
     lightings = [str(folders[name] / "lighting.json") for name in entry.of]
     return Task(
@@ -136,7 +140,7 @@ def answer_task(
         tuple(map(str, reads)),
         entry.share,
         entry.space,
-        SHIFTED.get(entry.variation, 0.0),
+        SHIFTED_WORDS.get(entry.variation, 0.0),
         entry.final,
         entry.handover,
         bases_of(entry),
@@ -153,7 +157,7 @@ def render_task(
     force: bool,
     command: str,
 ) -> Task:
-    """The final render of a look."""
+    """Return the task of a look's final render."""
     answer = answer_task(entry, folders, reads=reads, force=force, command=command)
     lighting = str(folders[entry.name] / "lighting.json")
     return Task(entry.name, "render", answer.job, (lighting,), answer.reads, final=entry.final)
@@ -167,7 +171,7 @@ def export_task(
     force: bool,
     command: str,
 ) -> Task:
-    """What other programs get of a look."""
+    """Return the task of a look's exports for other programs."""
     answer = answer_task(entry, folders, reads=reads, force=force, command=command)
     lighting = str(folders[entry.name] / "lighting.json")
     # Of light groups it needs what they are called.
@@ -177,30 +181,32 @@ def export_task(
 
 
 def bases_of(entry: LookEntry) -> tuple[str, ...]:
-    """The key of each basis that a look is solved with: equal keys, equal bases."""
+    """Return the key of each basis that a look is solved with: equal keys, equal bases."""
     if entry.basis is not None:
         return (key_of_basis(entry.basis),)
     return tuple(key_of_scene(scene, entry.settings) for scene in entry.scenes)
 
 
 def key_of_basis(basis: BasisFile | GroupsFile) -> str:
-    """Of a saved one, or of light groups."""
+    """Return the key of a saved basis, or of light groups."""
     return json.dumps({"basis": asdict(basis)})
 
 
 def key_of_scene(scene: SceneFile, settings: Settings) -> str:
-    """Of one that is rendered: the scene through its sensor, and what settings make of it."""
+    """Return the key of a basis that is rendered: the scene through its sensor, and render
+    settings.
+    """
     rendered = ("spp", "time_s", "seed", "resolution", "quality", "use_cache", "exact_spp")
     how = {name: getattr(settings, name) for name in rendered}
     return json.dumps({"scene": asdict(scene), **how})
 
 
-def _moved(given: Any, move: Move) -> Any:
-    """A job's plain values by other paths: `move` leaves all other texts as they are."""
+def _map_paths(given: Any, move: PathMap) -> Any:
+    """Return a job's plain values with other paths: `move` leaves all other texts as they are."""
     if isinstance(given, dict):
-        return {key: _moved(value, move) for key, value in given.items()}
+        return {key: _map_paths(value, move) for key, value in given.items()}
     if isinstance(given, list):
-        return [_moved(value, move) for value in given]
+        return [_map_paths(value, move) for value in given]
     return move(given) if isinstance(given, str) else given
 
 

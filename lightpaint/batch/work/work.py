@@ -1,4 +1,4 @@
-"""Doing a task: what a worker has at hand, and what it writes."""
+"""Running a work item: what a worker computes, and what it writes."""
 
 import errno
 import time
@@ -11,13 +11,20 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.parts import lesson
 from lightpaint.batch.manifest.keys import Space
-from lightpaint.batch.manifest.sequence import between
-from lightpaint.batch.manifest.variations import shifted
-from lightpaint.batch.work.derived_looks import dimmed, leave_made, made_folder
+from lightpaint.batch.manifest.sequence import interpolate
+from lightpaint.batch.manifest.variations import shift
+from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, write_derived
 from lightpaint.batch.work.row_sums import sums_of_rows
 from lightpaint.batch.work.sums_answer import answer_by_sums
 from lightpaint.batch.work.task import EXPORT, Task
-from lightpaint.batch.work.work_items import Done, Errand, Lesson, PartOfBasis, Passes, SumsOfRows
+from lightpaint.batch.work.work_items import (
+    ItemResult,
+    Lesson,
+    PartOfBasis,
+    Passes,
+    SumsOfRows,
+    WorkItem,
+)
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import first_line, one_line, write_text
@@ -35,61 +42,61 @@ from lightpaint.progress import Listener
 from lightpaint.relit.export_forms import Source, names_of_forms, writers_of
 from lightpaint.scene.scene import Scene
 
-#: What the system says of a disk that takes no more.
-FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+#: Error numbers of a full disk.
+DISK_FULL_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
-#: Characters of a reason.
-LONGEST = 600
+#: Characters of a failure's reason, at most.
+MAX_REASON_LENGTH = 600
 
-#: What is said of one that memory does not suffice for.
-TOO_LARGE = "it takes more memory than there is: use resolution=... or fewer workers"
-
-
-def do(errand: Errand, held: WorkerCache, listen: Listener) -> Done:
-    """Do one errand; what prevents it is said in one line, and is its own failure alone."""
-    return attempted(errand, lambda: _done(errand, held, listen))
+#: Failure of an item that needs too much memory.
+OUT_OF_MEMORY_TEXT = "it takes more memory than there is: use resolution=... or fewer workers"
 
 
-def attempted(errand: Errand, work: Callable[[], Any]) -> Done:
-    """What comes of `work`, which is that errand."""
+def run_item(item: WorkItem, cache: WorkerCache, listen: Listener) -> ItemResult:
+    """Run one item; an error becomes its own failure alone, in one line."""
+    return attempt(item, lambda: _run(item, cache, listen))
+
+
+def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
+    """Run `work`, which does that item, and return the result."""
     begun = time.perf_counter()
     failure, full, lost, value = "", False, False, None
     try:
         value = work()
     except LightpaintError as error:
-        failure, full = str(error), is_full(error)
+        failure, full = str(error), is_disk_full(error)
     except MemoryError:
-        failure, lost = TOO_LARGE, True
+        failure, lost = OUT_OF_MEMORY_TEXT, True
     except OSError as error:
-        failure, full = first_line(error), error.errno in FULL
+        failure, full = first_line(error), error.errno in DISK_FULL_ERRNOS
     except Exception as error:  # a mistake of ours, or of a library's: the others go on
         failure = f"{type(error).__name__}: {first_line(error)}"
     spent_s = time.perf_counter() - begun
-    said = one_line(failure, limit=LONGEST)
-    return Done(errand.name, errand.kind, said, full, lost, spent_s, value=value)
+    failure = one_line(failure, limit=MAX_REASON_LENGTH)
+    return ItemResult(item.name, item.kind, failure, full, lost, spent_s, value=value)
 
 
-def _done(errand: Errand, held: WorkerCache, listen: Listener) -> Any:
-    """What an errand comes to, if that is not a folder that was filled."""
-    if isinstance(errand, Lesson):
-        held.rest()
-        return lesson(held.film(errand.film), errand.spp, errand.seed)
-    if isinstance(errand, PartOfBasis):
-        return held.renderer(errand).render(errand.part)
-    if isinstance(errand, SumsOfRows):
-        return sums_of_rows(errand, held)
-    if isinstance(errand, Passes):
-        return held.frame(errand).sum(range(errand.first, errand.last))
-    held.rest()
-    assert isinstance(errand, Task)
-    held.only(errand.bases)
+def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
+    """Run an item; return its value, if that is not a folder that was filled."""
+    if isinstance(item, Lesson):
+        cache.release_renderer()
+        return lesson(cache.film(item.film), item.spp, item.seed)
+    if isinstance(item, PartOfBasis):
+        return cache.renderer(item).render(item.part)
+    if isinstance(item, SumsOfRows):
+        return sums_of_rows(item, cache)
+    if isinstance(item, Passes):
+        return cache.frame(item).sum(range(item.first, item.last))
+    cache.release_renderer()
+    assert isinstance(item, Task)
+    cache.keep_only(item.bases)
     does = {"answer": _answer, "render": final_render, "export": _export}
-    return does[errand.kind](errand, held, listen)
+    return does[item.kind](item, cache, listen)
 
 
-def is_full(error: BaseException) -> bool:
-    """Whether an error goes back to a disk that takes no more."""
-    return any(isinstance(x, OSError) and x.errno in FULL for x in _causes(error))
+def is_disk_full(error: BaseException) -> bool:
+    """Return whether an error goes back to a full disk."""
+    return any(isinstance(x, OSError) and x.errno in DISK_FULL_ERRNOS for x in _causes(error))
 
 
 def _causes(error: BaseException | None) -> Iterator[BaseException]:
@@ -98,91 +105,97 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__ or error.__context__
 
 
-def fields_of(task: Task, held: WorkerCache) -> dict[str, Any]:
-    """Those of the task's job, with scenes and basis shared."""
+def job_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
+    """Return the fields of the task's job, with scenes and basis shared."""
     fields = from_json(task.job)
-    fields["scenes"] = tuple(map(held.scene, fields["scenes"]))
+    fields["scenes"] = tuple(map(cache.scene, fields["scenes"]))
     if isinstance(fields["basis"], BasisFile | GroupsFile):
-        fields["basis"] = held.saved(fields["basis"])
+        fields["basis"] = cache.source(fields["basis"])
     return fields
 
 
-def _answer(task: Task, held: WorkerCache, listen: Listener) -> None:
-    fields = fields_of(task, held)
+def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
+    fields = job_fields(task, cache)
     for key, file in zip(task.bases, task.files, strict=True):
-        held.read(key, file)
+        cache.load(key, file)
     if task.lightings:
-        _made(task, fields, held, listen)
+        _derive_answer(task, fields, cache, listen)
         return
     job = Job(**fields)
     bases = None
     if job.basis is None:
-        bases = [basis for key in task.bases if (basis := held.basis(key)) is not None]
+        bases = [basis for key in task.bases if (basis := cache.basis(key)) is not None]
     if task.is_by_sums:
         answer_by_sums(job, job.views[0].basis or (bases or [])[0])
         return
     run(job, listen, bases=bases)
 
 
-def _made(task: Task, fields: dict[str, Any], held: WorkerCache, listen: Listener) -> None:
-    """An answer that is made of others: a lighting as it is, warmer, or between two."""
+def _derive_answer(
+    task: Task, fields: dict[str, Any], cache: WorkerCache, listen: Listener
+) -> None:
+    """Write an answer derived from others: a lighting as it is, warmer, or between two."""
     settings: Settings = fields["settings"]
     scenes: list[Scene] = [file.content for file in fields["scenes"]]
     given = content(fields["basis"])
     groups = given if isinstance(given, LightGroups) else None
     bases: list[Basis] = [given if groups is None else groups.basis]
     if given is None:
-        bases = [basis for key in task.bases if (basis := held.basis(key)) is not None]
-    lighting = made_of(task.lightings, bases[0], share=task.share, space=task.space)
+        bases = [basis for key in task.bases if (basis := cache.basis(key)) is not None]
+    lighting = derive_lighting(task.lightings, bases[0], share=task.share, space=task.space)
     if task.mireds:
-        lighting = shifted(lighting, task.mireds, dimmed(bases[0]))
+        lighting = shift(lighting, task.mireds, dimmer_lights(bases[0]))
     lighting = replace(lighting.named(task.look), cd_per_unit=settings.cd_per_unit)
     views = view_names(scenes) if fields["by_sensor"] else [""]
     scene = scenes[0] if scenes else None
-    how: dict[str, Any] = {"views": views, "groups": groups}
-    results = made_folder(fields["folder"], scene, task.lightings, **how, force=settings.force)
-    leave_made(results, lighting, bases, **how, scene=scene, spp=settings.spp)
+    options: dict[str, Any] = {"views": views, "groups": groups}
+    results = derived_folder(
+        fields["folder"], scene, task.lightings, **options, force=settings.force
+    )
+    write_derived(results, lighting, bases, **options, scene=scene, spp=settings.spp)
 
 
-def made_of(files: tuple[str, ...], basis: Basis, *, share: float, space: Space) -> Lighting:
-    """The lighting of one file, or between those of two. Raises LightingError."""
+def derive_lighting(
+    files: tuple[str, ...], basis: Basis, *, share: float, space: Space
+) -> Lighting:
+    """Return the lighting of one file, or between those of two. Raises LightingError."""
     lightings = [read_lighting(file) for file in files]
-    lighting = lightings[0] if len(lightings) == 1 else between(lightings, share, space=space)
+    lighting = lightings[0] if len(lightings) == 1 else interpolate(lightings, share, space=space)
     lighting.weights_for(basis)
     return lighting
 
 
 def final_render(
     task: Task,
-    held: WorkerCache,
+    cache: WorkerCache,
     listen: Listener,
-    rendered: Callable[[Scene], Estimate] | None = None,
+    render: Callable[[Scene], Estimate] | None = None,
 ) -> None:
-    """The final renders of a look that is answered, one for each view.
+    """Render an answered look, once for each view.
 
-    rendered: who renders, if others do.
+    rendered: renders instead of this process, if given.
     """
-    fields = fields_of(task, held)
+    fields = job_fields(task, cache)
     [lighting] = map(Path, task.lightings)
     scenes: list[Scene] = [file.content for file in fields["scenes"]]
     views = view_names(scenes) if fields["by_sensor"] else [""]
     force = fields["settings"].force
     results = relit_folder(scenes[0], lighting, fields["folder"], views=views, force=force)
-    how: dict[str, Any] = {"spp": task.final.spp, "seed": task.final.seed}
-    how["resolution"] = task.final.resolution
+    options: dict[str, Any] = {"spp": task.final.spp, "seed": task.final.seed}
+    options["resolution"] = task.final.resolution
     relight_look(
         dict(zip(views, scenes, strict=True)),
         read_lighting(lighting),
         results,
         progress=listen,
-        rendered=rendered,
-        **how,
+        rendered=render,
+        **options,
     )
 
 
-def _export(task: Task, held: WorkerCache, listen: Listener) -> None:
-    """What other programs get of a look that is answered."""
-    fields = fields_of(task, held)
+def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
+    """Write an answered look's exports for other programs."""
+    fields = job_fields(task, cache)
     lighting, folder = Path(task.lightings[0]), fields["folder"] / EXPORT
     given = fields["basis"]
     source = Source(

@@ -1,6 +1,6 @@
-"""What engines are given to do: steps of looks (see task.py), and parts of what is rendered.
+"""Work items, which engines run: steps of looks (see task.py), and parts of what is rendered.
 
-An errand is files and plain values. It can be sent anywhere, done twice, and comes to the same.
+A work item is files and plain values. It can be sent anywhere and done twice, with the same result.
 """
 
 import json
@@ -14,20 +14,20 @@ from lightpaint.lighting.fit import Emitters
 from lightpaint.pipeline.sources import Painting, SceneFile, vars_of
 from lightpaint.scene.presets import Quality
 
-#: What becomes of a path where an errand is done elsewhere.
-Move = Callable[[str], str]
+#: Map from a path to that on another machine.
+PathMap = Callable[[str], str]
 
 
-class Errand(Protocol):
-    """One thing to do."""
+class WorkItem(Protocol):
+    """A piece of work."""
 
     @property
     def name(self) -> str:
-        """Which no other errand of its kind has."""
+        """Name that no other item of its kind has."""
 
     @property
     def kind(self) -> str:
-        """What it is: `answer` or `render` of a look, `lesson`, `part`, `rows`, `passes`."""
+        """Kind: `answer` or `render` of a look, `lesson`, `part`, `rows`, `passes`."""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -35,40 +35,40 @@ class Errand(Protocol):
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """Files that it reads, too, which are made for it and only here."""
+        """Files that it reads, too, which were made for it and exist only here."""
 
     @property
     def writes(self) -> str:
-        """The folder that it fills; "" if what it comes to is returned."""
+        """Folder that it fills; "" if its result is returned."""
 
     @property
     def expected_s(self) -> float:
-        """Roughly how long it takes one thread."""
+        """Rough estimate of its time on one thread."""
 
-    def moved(self, move: Move) -> "Errand":
-        """The same by other paths."""
+    def with_paths(self, move: PathMap) -> "WorkItem":
+        """Return the same item with other paths."""
 
 
-def spoken(errand: Errand) -> str:
-    """What an errand is called: `evening: answer`, `part 3`."""
-    is_step = errand.kind in ("answer", "render")
-    return f"{errand.name}: {errand.kind}" if is_step else errand.name
+def item_label(item: WorkItem) -> str:
+    """Return the label of an item: `evening: answer`, `part 3`."""
+    is_step = item.kind in ("answer", "render")
+    return f"{item.name}: {item.kind}" if is_step else item.name
 
 
 @dataclass(frozen=True)
-class Done:
-    """What came of an errand. failure: why it came to nothing; "" where it is done.
+class ItemResult:
+    """The result of a work item. failure: the reason if it failed; "" where it is done.
 
-    look: name of the errand, of steps that of the look. is_full: whether the disk is, and nothing
-    more can be kept. is_lost: whether the worker died, and the same may well succeed elsewhere.
-    spent_s: seconds. left_s: of all that is left. value: what is returned. files: what was written,
-    by name in the folder, where that is another than is meant.
+    look: name of the item, of steps that of the look. is_disk_full: whether nothing more can be
+    written. is_lost: whether the worker died, and the item may well succeed elsewhere. spent_s:
+    seconds. left_s: for all that is left. value: the returned value. files: the written files, by
+    name in the folder, where they were written elsewhere.
     """
 
     look: str
     kind: str
     failure: str = ""
-    is_full: bool = False
+    is_disk_full: bool = False
     is_lost: bool = False
     spent_s: float = 0.0
     left_s: float | None = None
@@ -78,17 +78,19 @@ class Done:
 
 @dataclass(frozen=True)
 class SceneFilm:
-    """A scene by its file, on the film that its basis is rendered on. files: all it is made of."""
+    """A scene by its file, on the film that its basis is rendered on. files: all files of the
+    scene.
+    """
 
     scene: SceneFile
     quality: Quality | None = None
     resolution: str | None = None
     files: tuple[str, ...] = ()
 
-    def moved(self, move: Move) -> "SceneFilm":
-        """The same by other paths."""
+    def with_paths(self, move: PathMap) -> "SceneFilm":
+        """Return the same with other paths."""
         return replace(
-            self, scene=moved_scene(self.scene, move), files=tuple(map(move, self.files))
+            self, scene=scene_with_paths(self.scene, move), files=tuple(map(move, self.files))
         )
 
     def unread(self) -> "SceneFilm":
@@ -97,13 +99,15 @@ class SceneFilm:
 
     @property
     def key(self) -> str:
-        """What two of the same have in common."""
+        """Key that two equal ones share."""
         return json.dumps([vars_of(self.scene), self.quality, self.resolution])
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """What parts of a basis choose emitters by is learned. spp: that they come to."""
+    """An item that learns the emission by which parts of a basis sample. spp: of the whole
+    basis.
+    """
 
     name: str
     film: SceneFilm
@@ -116,17 +120,17 @@ class Lesson:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """As of `Errand`."""
+        """Files of the scene."""
         return self.film.files
 
-    def moved(self, move: Move) -> "Lesson":
-        """As of `Errand`."""
-        return replace(self, film=self.film.moved(move))
+    def with_paths(self, move: PathMap) -> "Lesson":
+        """Return the same item with other paths."""
+        return replace(self, film=self.film.with_paths(move))
 
 
 @dataclass(frozen=True)
 class PartOfBasis:
-    """A part of a basis is rendered. learned: file of what the lesson came to; "" if nothing is."""
+    """An item that renders a part of a basis. learned: file of the lesson; "" if there is none."""
 
     name: str
     film: SceneFilm
@@ -139,30 +143,30 @@ class PartOfBasis:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """As of `Errand`."""
+        """Files of the scene."""
         return self.film.files
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """As of `Errand`."""
+        """File of the lesson."""
         return (self.learned,) if self.learned else ()
 
-    def moved(self, move: Move) -> "PartOfBasis":
-        """As of `Errand`."""
+    def with_paths(self, move: PathMap) -> "PartOfBasis":
+        """Return the same item with other paths."""
         learned = move(self.learned) if self.learned else ""
-        return replace(self, film=self.film.moved(move), learned=learned)
+        return replace(self, film=self.film.with_paths(move), learned=learned)
 
 
 @dataclass(frozen=True)
 class PaintingOfSums:
-    """A painting that sums are wanted with. emitters: as of `Fit`; resize: as of `Settings`."""
+    """A painting whose sums are wanted. emitters: as of `Fit`; resize: as of `Settings`."""
 
     painting: Painting
     emitters: Emitters
     resize: bool
 
-    def moved(self, move: Move) -> "PaintingOfSums":
-        """The same by other paths."""
+    def with_paths(self, move: PathMap) -> "PaintingOfSums":
+        """Return the same with other paths."""
         its = self.painting
         paths: dict[str, Any] = {
             name: value if (value := getattr(its, name)) is None else move(value)
@@ -173,7 +177,7 @@ class PaintingOfSums:
 
 @dataclass(frozen=True)
 class SumsOfRows:
-    """Some rows of a basis are rendered, and nothing is kept but their sums with paintings.
+    """An item that renders rows of a basis, and keeps nothing but their sums with paintings.
 
     parts: all of these rows, in their order. learned: as of `PartOfBasis`. files: of the paintings.
     """
@@ -191,30 +195,30 @@ class SumsOfRows:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """As of `Errand`."""
+        """Files of the scene and of the paintings."""
         return (*self.film.files, *self.files)
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """As of `Errand`."""
+        """File of the lesson."""
         return (self.learned,)
 
-    def moved(self, move: Move) -> "SumsOfRows":
-        """As of `Errand`."""
+    def with_paths(self, move: PathMap) -> "SumsOfRows":
+        """Return the same item with other paths."""
         return replace(
             self,
-            film=self.film.moved(move),
+            film=self.film.with_paths(move),
             learned=move(self.learned),
-            paintings=tuple(one.moved(move) for one in self.paintings),
+            paintings=tuple(one.with_paths(move) for one in self.paintings),
             files=tuple(map(move, self.files)),
         )
 
 
 @dataclass(frozen=True)
 class Passes:
-    """Some passes of a final render. relit: the scene, which is rendered as `final` says.
+    """An item that renders passes of a final render. relit: the scene. final: its options.
 
-    first, last: passes, the last one not among them.
+    first, last: range of passes, the last one not included.
     """
 
     name: str
@@ -230,17 +234,17 @@ class Passes:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """As of `Errand`."""
+        """Files of the scene."""
         return self.files
 
-    def moved(self, move: Move) -> "Passes":
-        """As of `Errand`."""
+    def with_paths(self, move: PathMap) -> "Passes":
+        """Return the same item with other paths."""
         files = tuple(map(move, self.files))
-        return replace(self, relit=moved_scene(self.relit, move), files=files)
+        return replace(self, relit=scene_with_paths(self.relit, move), files=files)
 
 
-def moved_scene(scene: SceneFile, move: Move) -> SceneFile:
-    """The same scene by other paths."""
+def scene_with_paths(scene: SceneFile, move: PathMap) -> SceneFile:
+    """Return the same scene with other paths."""
     lights_file = scene.lights_file
     return replace(
         scene, path=move(scene.path), lights_file=None if lights_file is None else move(lights_file)

@@ -6,17 +6,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from lightpaint.batch.gallery.gallery import spoken_counts
-from lightpaint.batch.gallery.summary import Row, summary_document
+from lightpaint.batch.gallery.gallery import counts_text
+from lightpaint.batch.gallery.summary import SummaryRow, summary_document
 from lightpaint.batch.manifest.folder_names import FILES
-from lightpaint.batch.manifest.starter_manifest import write_first
+from lightpaint.batch.manifest.starter_manifest import write_starter_manifest
 from lightpaint.batch.plan.cost_estimate import estimate
-from lightpaint.batch.plan.openjd import LOOK, write_openjd
+from lightpaint.batch.plan.openjd import LOOK_PARAMETER, write_openjd
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
-from lightpaint.batch.run_options import BatchOutcome, How
-from lightpaint.batch.work.work_items import Done
+from lightpaint.batch.run_options import BatchOutcome, RunOptions
+from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import BatchError, OutputError
@@ -35,14 +35,14 @@ def batch(
     is_dry: bool,
     form: str | None,
     only: str | None,
-    how: How,
+    how: RunOptions,
     force: bool,
     log: Path | None,
 ) -> CommandOutcome:
     """`lightpaint batch looks.toml -o DIR`, or `--init SCENE PAINTING...`"""
     if is_first:
         made = output or Path("looks.toml")
-        write_first(made, paths[0], paths[1:], force=force)
+        write_starter_manifest(made, paths[0], paths[1:], force=force)
         terminal.write(f"{made}: {len(paths) - 1} looks; what runs them is")
         terminal.write(f"lightpaint batch {shlex.quote(str(made))}")
         return CommandOutcome(lambda: {"manifest": str(made), "looks": len(paths) - 1})
@@ -54,7 +54,7 @@ def batch(
     # The same in all reports, however often it was stopped, and from wherever it is done.
     manifest, into = (str(Path(x).absolute()) for x in (paths[0], folder))
     command = shlex.join(["lightpaint", "batch", manifest, "-o", into])
-    planned = plan(paths[0], folder, force=force, command=command).only(only)
+    planned = plan(paths[0], folder, force=force, command=command).select(only)
     if is_dry:
         return _dry(planned)
     if form is not None:
@@ -69,26 +69,26 @@ def batch(
     note = _log(log)
     note(f"{command}: {len(planned.chosen_looks)} looks")
 
-    def told(look: PlannedLook, done: Done) -> None:
-        name, left = f"{look.entry.name}: {done.kind}", run_left(done)
+    def on_step(look: PlannedLook, done: ItemResult) -> None:
+        name, left = f"{look.entry.name}: {done.kind}", time_left(done)
         if done.failure:
             note(f"{name} failed: {done.failure}")
             return
         note(f"{name} done in {done.spent_s:.2f} s")
         listen.say(f"{name} done in {done.spent_s:.1f} s{left}")
 
-    def run_left(done: Done) -> str:
+    def time_left(done: ItemResult) -> str:
         return "" if done.left_s is None else f", {spoken_time(done.left_s)} left"
 
     with listen:
-        outcome = run_batch(planned, how, listen, told=told)
+        outcome = run_batch(planned, how, listen, on_step=on_step)
     note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
     return _told(planned, outcome)
 
 
 def _exported(planned: Plan, folder: Path, *, force: bool) -> CommandOutcome:
     """A job for a farm, and how it is run here."""
-    path = write_openjd(folder, planned, only=("--only", LOOK, "--apart"), force=force)
+    path = write_openjd(folder, planned, command=("--only", LOOK_PARAMETER, "--apart"), force=force)
     terminal.write(f"{path}: {len(planned.chosen_looks)} looks; what runs them here is")
     terminal.write(f"openjd run {shlex.quote(str(path))}")
     return CommandOutcome(lambda: documents.files_document(folder, [path]))
@@ -107,7 +107,7 @@ def _told(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
     if outcome.waiting:
         terminal.complain("batch", f"stopped: {some_of(outcome.waiting)} not begun")
     if outcome.rows:
-        terminal.write(f"{folder / FILES[0]}: {spoken_counts(outcome.rows)}")
+        terminal.write(f"{folder / FILES[0]}: {counts_text(outcome.rows)}")
     return CommandOutcome(
         lambda: {
             "folder": str(folder),
@@ -118,7 +118,7 @@ def _told(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
     )
 
 
-def _show(planned: Plan, rows: list[Row]) -> None:
+def _show(planned: Plan, rows: list[SummaryRow]) -> None:
     """A row for each look; of very many for those that are not done."""
     shown = rows if len(rows) <= LISTED else [row for row in rows if row.state != "done"][:LISTED]
     if not shown:

@@ -26,7 +26,7 @@ from lightpaint.pipeline.sources import BasisFile, GroupsFile, Painting, SceneFi
 from lightpaint.screen import some_names
 
 if TYPE_CHECKING:
-    from lightpaint.batch.run_options import How
+    from lightpaint.batch.run_options import RunOptions
     from lightpaint.pipeline.job import Job
 
 #: Where what options ask of lights stands, as errors say it.
@@ -208,13 +208,13 @@ def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
         return {"jobs": jobs_of(options, settings), **how}
 
     # Galleries, which one look has no need of.
-    from lightpaint.batch.manifest.variations import words_of
+    from lightpaint.batch.manifest.variations import parse_variations
     from lightpaint.cli.solve_variations import several_of
 
     failed: dict[str, str] = {}
     jobs, several = several_of(
         jobs_of(options, settings, failed),
-        words_of(options.variations),
+        parse_variations(options.variations),
         failed,
         output=Path(options.output) if options.output else None,
         keep_going=options.keep_going,
@@ -247,9 +247,9 @@ def _to_do(options: Namespace) -> dict[str, Any]:
     }
 
 
-def _how(options: Namespace) -> "How":
+def _how(options: Namespace) -> "RunOptions":
     """How a batch is done. Raises BatchError for what does not go together."""
-    from lightpaint.batch.run_options import How
+    from lightpaint.batch.run_options import RunOptions
 
     if options.cluster is None and (options.shared_fs or options.task_limit_s is not None):
         idle = "--shared-fs" if options.shared_fs else "--task-limit"
@@ -258,7 +258,7 @@ def _how(options: Namespace) -> "How":
         raise BatchError(
             f"--cluster {options.cluster} and --workers {options.workers}: give one of them"
         )
-    return How(
+    return RunOptions(
         options.workers,
         options.keep_going,
         options.retry,
