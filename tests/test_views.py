@@ -25,12 +25,12 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solve import solve
 from lightpaint.lighting.views import joint_basis
-from lightpaint.paint.launch import make_subjects
 from lightpaint.paint.protocol import Ask, Export, Message, Paint
 from lightpaint.paint.session_file import session_identity
 from lightpaint.paint.store.steps import ViewIdentity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.call import paint_with_light
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile

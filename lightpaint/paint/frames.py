@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from lightpaint.errors import PaintError
 from lightpaint.files import one_line
-from lightpaint.paint.protocol import REQUESTS, AnyRequest
+from lightpaint.paint.protocol import REQUESTS, VERSION, AnyRequest
 from lightpaint.paint.protocol.base import DTYPES
 from lightpaint.storage.json_records import read_record, strict_json
 
@@ -58,6 +58,16 @@ def from_frame(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
         buffers.append(rest[at : at + size])
         at += size + -size % 8
     return content, buffers
+
+
+def is_other_version(content: Mapping[str, Any]) -> bool:
+    """Return whether this is the first message of a page of another version, whatever else it
+    holds.
+    """
+    version = content.get("version")
+    return (
+        content.get("kind") in ("hello", "observe") and type(version) is int and version != VERSION
+    )
 
 
 def parse_request(

@@ -3,107 +3,25 @@
 import gc
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.colour.display.view_transform import TransformChoice
-from lightpaint.errors import OutputError, SceneError
-from lightpaint.files import check_writable, file_length
-from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.constraints.reduction import reduce_to
-from lightpaint.lighting.views import check_same_lights
-from lightpaint.paint.lazy_scene import LazyScene
+from lightpaint.errors import OutputError
+from lightpaint.files import check_writable
 from lightpaint.paint.server.address import BoundSocket, listen
 from lightpaint.paint.server.connection_file import ConnectionFile
 from lightpaint.paint.server.server import Server, check_installed
-from lightpaint.paint.session_file import SessionFile, check_view_names, session_identity
+from lightpaint.paint.session_file import SessionFile
 from lightpaint.paint.store.database import set_aside
-from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import (
-    BasisFile,
-    GroupsFile,
-    SceneFile,
-    check_nothing_idle,
-)
-from lightpaint.scene.scene import Scene
 from lightpaint.signals import interruptible_between_pieces
 
 #: Name of the session file, in its folder.
 SESSION_FILE = "session.db"
-
-
-def make_subject(
-    source: SceneFile | BasisFile | GroupsFile,
-    folder: Path,
-    *,
-    settings: Settings | None = None,
-    constraints: Constraints | None = None,
-    choice: TransformChoice | None = None,
-    command: Callable[[Mapping[str, str], LightRequests], str] = lambda paintings, requests: "",
-    view_count: int = 1,
-) -> Subject:
-    """Return one view to be painted, read and checked before anything is rendered.
-
-    Parameters are those of `Subject`. Raises LightpaintError for what cannot be painted, and for
-    constraints that its lights cannot meet.
-    """
-    settings, constraints = settings or Settings(), constraints or Constraints()
-    fields: dict[str, Any] = {
-        "source": source.path,
-        "folder": folder,
-        "settings": settings,
-        "constraints": constraints,
-        "choice": choice or TransformChoice(),
-        "command": command,
-        "view_count": view_count,
-    }
-    if not isinstance(source, SceneFile):
-        check_nothing_idle(settings, source)
-        content = source.content
-        groups = content if isinstance(content, LightGroups) else None
-        basis = content.basis if isinstance(content, LightGroups) else content
-        reduce_to(constraints_of(basis.requests).and_then(constraints), basis.lights)
-        return Subject(basis=basis, groups=groups, **fields)
-    # What can be seen without the renderer is said before anything is opened.
-    file_length(Path(source.path), "scene file", SceneError)
-    lazy_scene = LazyScene(source, settings)
-    if (record := lazy_scene.record) is not None:
-        reduce_to(constraints_of(record.lights.requests).and_then(constraints), record.lights)
-
-    def check(scene: Scene) -> None:
-        from lightpaint.basis.render.render import basis_lights
-
-        reduce_to(constraints_of(scene.requests).and_then(constraints), basis_lights(scene))
-
-    lazy_scene.checks.append(check)
-    return Subject(scene=lazy_scene, **fields)
-
-
-def make_subjects(
-    sources: Sequence[SceneFile | BasisFile | GroupsFile], folder: Path, **how: Any
-) -> tuple[Subject, ...]:
-    """Return the views of one lighting, to be painted together. how: parameters of `make_subject`.
-
-    Raises LightpaintError for what cannot be painted, alone or together, as far as that is known.
-    """
-    subjects = tuple(
-        make_subject(source, folder, view_count=len(sources), **how) for source in sources
-    )
-    if (identity := session_identity(subjects)) is not None:
-        check_view_names([view.sensor for view in identity.views])
-    bases = [subject.basis for subject in subjects if subject.basis is not None]
-    for basis in bases[1:]:
-        check_same_lights(bases[0], basis)
-    return subjects
 
 
 def paint_in_browser(

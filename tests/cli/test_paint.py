@@ -32,11 +32,11 @@ from lightpaint.cli.options.job_options import painted_of, settings_of, values_o
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.paint.background_threads import BackgroundThreads
 from lightpaint.paint.frames import from_frame, to_frame
-from lightpaint.paint.launch import make_subject, make_subjects
 from lightpaint.paint.protocol import VERSION
 from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.store.steps import Identity, Step
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.subject_factory import make_subject, make_subjects
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.version import __version__
 

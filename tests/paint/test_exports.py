@@ -11,8 +11,8 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.paint.launch import make_subject
 from lightpaint.paint.session_exports import answer_png, render_verification
+from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile
 

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Iterator
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -203,6 +204,50 @@ def test_an_observer_neither_paints_nor_takes_the_session(
         assert served.session.heard == []
         paint(page, 2, done=True)
         assert hear(page)["kind"] == "answer"
+
+
+def messages_to_who_paints(served: Served, observers: int) -> list[tuple[str, Any]]:
+    """Paint while so many observe, ask, and try what they may not; return what the page is sent."""
+    with ExitStack() as stack:
+        page = stack.enter_context(served.page())
+        programs = [stack.enter_context(served.program()) for _ in range(observers)]
+        say(page, "hello", version=VERSION)
+        received = [hear(page)]
+        for program in programs:
+            say(program, "observe", version=VERSION)
+            assert hear(program)["kind"] == "state"
+
+        def ask() -> None:
+            for k, kind in enumerate(("fetch", "take_over", "hello"), start=1):
+                fields = {"fetch": {"name": "present"}, "hello": {"version": VERSION}}
+                for program in programs:
+                    say(program, kind, 10 + k, **fields.get(kind, {}))
+
+        for seq in range(2, 10):
+            paint(page, seq, done=seq % 4 == 1)
+            received.append(hear(page))
+            ask()
+            served.session.on_message(fake_progress("basis", seq))  # type: ignore[misc]
+            received.append(hear(page))
+        # All that observers have asked for is answered before nothing more can come.
+        for program in programs:
+            say(program, "fetch", 99, name="present")
+            while hear(program).get("reply") != 99:
+                pass
+        say(page, "undo", 50)
+        received += [hear(page), hear(page)]
+        assert received[-2]["reply"] == 50
+    return [(one["kind"], one.get("reply")) for one in received]
+
+
+def test_who_paints_is_sent_the_same_however_many_observe(served: Served) -> None:
+    """An observer costs a stroke no message, and takes no session."""
+    alone = messages_to_who_paints(served, 0)
+    strokes = [request for request in served.session.heard if request.kind == "paint"]
+    assert len(strokes) == 8
+    assert messages_to_who_paints(served, 3) == alone
+    again = [request for request in served.session.heard if request.kind == "paint"]
+    assert len(again) == 2 * len(strokes)
 
 
 def test_who_has_the_session_does_not_become_an_observer(served: Served) -> None:

@@ -18,12 +18,12 @@ from lightpaint.basis.render.render import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
-from lightpaint.paint.launch import make_subject
 from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.session_file import session_identity
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile
 

@@ -20,10 +20,10 @@ from weakref import ref
 
 import numpy as np
 import pytest
-from renderer import REPOSITORY
+from renderer import LIGHTS, REPOSITORY, write_room
 
 import lightpaint as lp
-from lightpaint.errors import OutputError, PaintError
+from lightpaint.errors import ConstraintError, OutputError, PaintError
 from lightpaint.paint import background_threads as beside
 from lightpaint.paint import protocol, studio
 from lightpaint.paint.notebook import widget_arguments as cells
@@ -633,6 +633,22 @@ def test_junk_is_answered(basis: lp.Basis, open_: Any, monkeypatch: Any, capsys:
     monkeypatch.undo()
     other = page.say("hello", version=protocol.VERSION + 1)
     assert (other["kind"], other["reason"]) == ("closed", "version")
+
+
+def test_constraints_that_cannot_be_met_are_refused_in_their_cell(tmp_path: Path) -> None:
+    """Before anything of the scene is rendered."""
+    scene = lp.load_scene(write_room(tmp_path, lights=LIGHTS["bulb"]))
+    constraints = lp.Constraints.of({"no such light": {"off": True}})
+    with pytest.raises(ConstraintError, match="no light 'no such light'"):
+        lp.Painter(scene, constraints=constraints, folder=tmp_path)
+
+
+def test_what_cannot_begin_is_told_to_who_asked(open_: Any) -> None:
+    """Also where nobody has begun, and by a page of a version that says more."""
+    painter = open_()
+    told = Page(painter).say("hello", version=protocol.VERSION + 1, with_news=True)
+    assert (told["kind"], told["reason"]) == ("closed", "version")
+    assert Page(painter, OTHER).say("nothing")["kind"] == "failed"
 
 
 def test_who_is_shown_last_has_it(basis: lp.Basis, open_: Any) -> None:

@@ -51,8 +51,9 @@ def paint(
 ) -> CommandOutcome:
     """`lightpaint paint SCENE|BASIS|LIGHTS`, of one view or of several."""
     # The server and the session file bring much that no other command needs.
-    from lightpaint.paint.launch import make_subjects, paint_in_browser
+    from lightpaint.paint.launch import paint_in_browser
     from lightpaint.paint.server.server import check_installed
+    from lightpaint.paint.subject_factory import make_subjects
 
     check_installed()
     from lightpaint.cli.commands.session_options import solve_command

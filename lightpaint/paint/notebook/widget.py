@@ -141,13 +141,12 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
-        options = {
-            "settings": widget_arguments.read_settings(settings, ARGUMENT_NAMES),
-            "constraints": constraints,
-        }
-        transform = transform or widget_arguments.transform_of_targets(target)
         subjects = widget_arguments.widget_subjects(
-            scene, folder=folder, transform=transform, **options
+            scene,
+            folder=folder,
+            settings=widget_arguments.read_settings(settings, ARGUMENT_NAMES),
+            constraints=constraints,
+            transform=transform or widget_arguments.transform_of_targets(target),
         )
         if target is not None:
             widget_arguments.check_target_sizes(target, subjects)

@@ -13,20 +13,16 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
-from lightpaint.files import called
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.loss.painting import what_counts
-from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.session.session import Session
-from lightpaint.paint.session_file import check_view_names
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.database import OTHER_FOLDER, START_AFRESH
 from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import check_nothing_idle
-from lightpaint.scene.presets import on_film
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.target.target import Target
 
@@ -213,28 +209,32 @@ def store_path(store: Any) -> Path | None:
     return None if store is None else Path(store)
 
 
-def widget_subjects(value: Paintable | Sequence[Paintable], **options: Any) -> tuple[Subject, ...]:
-    """Return what is to be painted, of one view or of several. options: as of `_make_subject`.
+def widget_subjects(
+    value: Paintable | Sequence[Paintable],
+    *,
+    folder: str | Path | None,
+    settings: Settings,
+    constraints: Constraints | None,
+    transform: ViewTransform | TransformChoice | None,
+) -> tuple[Subject, ...]:
+    """Return what is to be painted, of one view or of several.
 
     Raises LightpaintError for what cannot be painted.
     """
-    _check_types(**options)
+    _check_types(constraints=constraints, transform=transform)
     several = list(value) if isinstance(value, list | tuple) else [value]
     if not several:
         raise PaintError("lp.Painter paints at least one view: give a basis, or a scene")
-    made = tuple(_make_subject(one, view_count=len(several), **options) for one in several)
-    if len(made) > 1 and len({subject.scene is None for subject in made}) > 1:
-        raise PaintError("scenes and bases at once: give one kind for all views")
-    if len(made) > 1 and any(subject.groups is not None for subject in made):
-        raise PaintError("light groups have one view only: give bases, or scenes")
-    check_view_names([subject.sensor for subject in made])
-    bases = [subject.basis for subject in made if subject.basis is not None]
-    for basis in bases[1:]:
-        check_same_lights(bases[0], basis)
-    return made
+    return make_subjects(
+        [_loaded(one) for one in several],
+        None if folder is None else Path(folder).absolute(),
+        settings=settings,
+        constraints=constraints,
+        choice=TransformChoice.of(transform),
+    )
 
 
-def _check_types(*, constraints: Any, transform: Any, **_: Any) -> None:
+def _check_types(*, constraints: Any, transform: Any) -> None:
     if not isinstance(constraints, Constraints | None):
         kind = type(constraints).__name__
         raise PaintError(f"the constraints are a {kind}: give lp.Constraints.of(...)")
@@ -244,44 +244,16 @@ def _check_types(*, constraints: Any, transform: Any, **_: Any) -> None:
         )
 
 
-def _make_subject(
-    value: Any,
-    folder: str | Path | None,
-    settings: Settings,
-    constraints: Constraints | None,
-    transform: ViewTransform | TransformChoice | None,
-    view_count: int,
-) -> Subject:
-    """Return what is to be painted in one view. Raises LightpaintError for what cannot be
-    painted.
-    """
-    about: dict[str, Any] = {
-        "settings": settings,
-        "constraints": constraints or Constraints(),
-        "choice": TransformChoice.of(transform),
-        "view_count": view_count,
-    }
+def _loaded(value: Any) -> Basis | Scene | LightGroups:
+    """Return what is painted, of a path the scene. Raises LightpaintError for anything else."""
     if isinstance(value, str | Path):
         if Path(value).suffix.lower() == ".exr":
             raise PaintError(
                 f"{value} is no scene: give lp.read_basis({str(value)!r}) or, of another "
                 f"renderer's light groups, lp.read_light_groups({str(value)!r})"
             )
-        value = load_scene(value)
-    if isinstance(value, Scene):
-        scene = on_film(value, settings.quality, settings.resolution)
-        name = str(scene.path)
-        about |= {"scene": scene}
-    elif isinstance(value, LightGroups):
-        name = str(value.path)
-        about |= {"basis": value.basis, "groups": value}
-    elif isinstance(value, Basis):
-        name = value.source or value.origin.scene
-        about |= {"basis": value}
-    else:
-        kind = type(value).__name__
-        raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")
-    if not isinstance(value, Scene):
-        check_nothing_idle(settings, value)
-    place = Path(f"{called(Path(name))}.paint") if folder is None else Path(folder)
-    return Subject(source=name, folder=place.absolute(), **about)
+        return load_scene(value)
+    if isinstance(value, Basis | Scene | LightGroups):
+        return value
+    kind = type(value).__name__
+    raise PaintError(f"lp.Painter paints a basis, a scene or light groups, not {kind}")

@@ -5,17 +5,13 @@ from threading import RLock
 from typing import Any
 
 from lightpaint.paint.background_threads import error_text, error_tone
-from lightpaint.paint.frames import parse_request
-from lightpaint.paint.protocol import (
-    VERSION,
-    AnyRequest,
-    Closing,
-    Failure,
-    Hello,
-    Message,
-    TakeOver,
-)
+from lightpaint.paint.frames import is_other_version, parse_request
+from lightpaint.paint.protocol import Closing, Failure, Hello, Message, TakeOver
+from lightpaint.paint.session_owner import SessionOwner
 from lightpaint.paint.studio import Studio
+
+#: Told to a place that does not have the session, or no more.
+TAKEN = Closing(reason="taken", text="the painter is open at another place")
 
 #: Message numbers of one view, which is view `seq // MESSAGES_PER_VIEW`.
 MESSAGES_PER_VIEW = 2**32
@@ -31,45 +27,35 @@ class WidgetViews:
         self, studio: Studio, lock: RLock, send: Callable[[dict[str, Any], list[bytes]], None]
     ) -> None:
         self._studio, self._lock, self._send = studio, lock, send
-        self._page = 0
+        self._owner = SessionOwner[int]()
 
     def receive(self, content: Any, buffers: Any) -> None:
         """Answer a page, whatever it sends."""
         seq = content.get("seq") if isinstance(content, dict) else None
         try:
-            seq, request, arrays = parse_request(content, [bytes(x) for x in buffers or ()])
-            page = seq // MESSAGES_PER_VIEW
-            with self._lock:
-                if (answers := self._handle(page, request, arrays)) is None:
-                    self._send_taken(page, seq)
-                    return
+            answers = self._answer(content, [bytes(x) for x in buffers or ()])
         except Exception as error:  # of our own, too, which anywidget would say nothing of
             answers = [Failure(text=error_text(error), tone=error_tone(error))]
+        page = seq // MESSAGES_PER_VIEW if type(seq) is int else None
         for k, message in enumerate(answers):
-            self.send(message, seq if k == 0 else None)
+            self.send(message, seq if k == 0 else None, page=page)
 
-    def _handle(self, page: int, request: AnyRequest, arrays: Any) -> list[Message] | None:
-        """Return the answers to a request; None for a page that does not have the session."""
-        if isinstance(request, Hello) and request.version != VERSION:
+    def _answer(self, content: Any, buffers: list[bytes]) -> list[Message]:
+        """Return the answers to a message. Raises LightpaintError."""
+        if is_other_version(content):
             text = "lightpaint has been updated: run the cell again"
             return [Closing(reason="version", text=text)]
-        if isinstance(request, Hello | TakeOver):
-            is_back = page == self._page
-            self._hand_over(page)
-            return [self._studio.greet(is_back=is_back)]
-        return self._studio.handle(request, arrays) if page == self._page else None
-
-    def _hand_over(self, page: int) -> None:
-        """Give the session to the page that was shown last, and tell the one that had it."""
-        before, self._page = self._page, page
-        if before not in (0, page):
-            self._send_taken(before)
-
-    def _send_taken(self, page: int, reply: int | None = None) -> None:
-        text = "the painter is open at another place"
-        self.send(Closing(reason="taken", text=text), reply, page=page)
+        seq, request, arrays = parse_request(content, buffers)
+        page = seq // MESSAGES_PER_VIEW
+        with self._lock:
+            if isinstance(request, Hello | TakeOver):
+                is_back, displaced = self._owner.give(page)
+                if displaced is not None:
+                    self.send(TAKEN, page=displaced)
+                return [self._studio.greet(is_back=is_back)]
+            return self._studio.handle(request, arrays) if page == self._owner.page else [TAKEN]
 
     def send(self, message: Message, reply: int | None = None, *, page: int | None = None) -> None:
         """Send a message to the page that has the session, or to `page`."""
-        about = {"page": self._page if page is None else page}
+        about = {"page": self._owner.page if page is None else page}
         self._send(message.content(reply) | about, message.buffers())

@@ -8,9 +8,8 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from lightpaint.errors import PaintError
-from lightpaint.paint.frames import from_frame, parse_request, to_frame
+from lightpaint.paint.frames import from_frame, is_other_version, parse_request, to_frame
 from lightpaint.paint.protocol import (
-    VERSION,
     AnswerUpdate,
     AnyRequest,
     Closing,
@@ -222,7 +221,7 @@ def _parse_frame(frame: bytes | None) -> IncomingMessage:
         if frame is None:
             raise PaintError("messages are binary frames")
         content, buffers = from_frame(frame)
-        if _is_other_version(content):
+        if is_other_version(content):
             text = "lightpaint has been updated: load this page again"
             return IncomingMessage(
                 _sequence_numbers(content), None, {}, Closing(reason="version", text=text)
@@ -231,16 +230,6 @@ def _parse_frame(frame: bytes | None) -> IncomingMessage:
         return IncomingMessage([seq], request, arrays)
     except PaintError as error:
         return IncomingMessage(_sequence_numbers(content), None, {}, Failure(text=str(error)))
-
-
-def _is_other_version(content: Mapping[str, Any]) -> bool:
-    """Return whether this is the first message of a page of another version, whatever else it
-    holds.
-    """
-    version = content.get("version")
-    return (
-        content.get("kind") in ("hello", "observe") and type(version) is int and version != VERSION
-    )
 
 
 def _sequence_numbers(content: Mapping[str, Any]) -> list[int]:

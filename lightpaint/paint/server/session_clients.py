@@ -44,6 +44,7 @@ from lightpaint.paint.protocol import (
     VerificationResult,
 )
 from lightpaint.paint.server.client import Client, IncomingMessage
+from lightpaint.paint.session_owner import SessionOwner
 from lightpaint.paint.store.store import Store
 from lightpaint.progress import while_wanted
 
@@ -106,8 +107,7 @@ class Connections:
     ) -> None:
         self.session, self.store, self.report = session, store, report
         self.generations: dict[str, int] = {}
-        self._holder: Client | None = None
-        self._last: Client | None = None
+        self._owner = SessionOwner[Client](_is_same_page)
         self._clients: set[Client] = set()
         self.farewell = "the painter has ended; what was painted is kept"
         self._worker = ThreadPoolExecutor(1, "lightpaint-session")
@@ -129,7 +129,7 @@ class Connections:
     @property
     def has_page(self) -> bool:
         """True if a page has the session, and its state."""
-        return self._holder is not None
+        return self._owner.page is not None
 
     async def close(self) -> None:
         """Answer the queued requests, tell the pages, and finish the session's work."""
@@ -158,8 +158,7 @@ class Connections:
             last.cancel()
         finally:
             self._clients.discard(client)
-            if self._holder is client:
-                self._holder = None
+            if self._owner.release(client):
                 self._brush_up.set()
             client.abandon()  # a task may be at the end of a wait, which swallows the cancelling
             for task in (sending, live_answer):
@@ -195,7 +194,7 @@ class Connections:
             answers = await self._handle(client, incoming)
             for message in answers:
                 self._update_generations(message)
-                if client is self._holder and not isinstance(message, SessionState):
+                if client is self._owner.page and not isinstance(message, SessionState):
                     self._send_to_observers(message)
             first, *others = answers or [Acknowledgement()]
             for seq in incoming.replies or (None,):
@@ -211,15 +210,12 @@ class Connections:
             if isinstance(incoming.request, Observe) or client.is_observer:
                 return await self._handle_observer(client, incoming.request)
             if incoming.asks_for_session:
-                holder = await self._current_holder(client)
-                if holder not in (None, client) and not (
-                    incoming.takes_over or _is_same_page(holder, client)
-                ):
+                await self._release_disconnected(client)
+                if not (incoming.takes_over or self._owner.is_free_for(client)):
                     return [_taken_message("the painter is open in another tab")]
-                is_back = self._last is client or _is_same_page(self._last, client)
-                self._hand_over(client)
+                is_back = self._hand_over(client)
                 return [await self._run(partial(self.session.greet, is_back=is_back))]
-            if self._holder is not client:
+            if self._owner.page is not client:
                 return [_taken_message("this tab does not have the session")]
             assert incoming.request is not None
             is_live = isinstance(incoming.request, Paint | Ask) and not incoming.request.done
@@ -238,7 +234,7 @@ class Connections:
         Raises LightpaintError for what observers may not do.
         """
         if isinstance(request, Observe):
-            if client is self._holder:
+            if client is self._owner.page:
                 raise PaintError("this client has the session: observe with a client of its own")
             others = [one for one in self._clients if one.is_observer and one is not client]
             if len(others) >= MAX_OBSERVERS:
@@ -254,12 +250,12 @@ class Connections:
         await self._brush_up.wait()
         answers = await self._run(self.session.handle, request, {})
         if isinstance(request, Propose):
+            notice = Notice(text=f"{request.name[:80]} was proposed: see the looks")
             for message in answers:
                 self._send_to_observers(message, but=client)
-                if self._holder is not None:
-                    self._holder.send(message)
-            if self._holder is not None:
-                self._holder.send(Notice(text=f"{request.name[:80]} was proposed: see the looks"))
+            if (page := self._owner.page) is not None:
+                for message in (*answers, notice):
+                    page.send(message)
         return answers
 
     async def wait_for_rest(self) -> None:
@@ -275,33 +271,32 @@ class Connections:
                 if client.is_observer and client is not but:
                     client.send(event)
 
-    async def _current_holder(self, client: Client) -> Client | None:
-        """Return the client that has the session, after all requests of one that has
-        disconnected.
-        """
-        while (holder := self._holder) not in (None, client) and holder.is_disconnected:
-            await holder.wait_answered()
-            if self._holder is holder:
-                self._holder = None
-        return holder
+    async def _release_disconnected(self, client: Client) -> None:
+        """Take the session from another client that has disconnected, after all its requests."""
+        while (page := self._owner.page) not in (None, client) and page.is_disconnected:
+            await page.wait_answered()
+            self._owner.release(page)
 
-    def _hand_over(self, client: Client) -> None:
-        """Give the session to `client`, and tell the client that had it."""
-        before, self._holder, self._last = self._holder, client, client
+    def _hand_over(self, client: Client) -> bool:
+        """Give the session to `client`, and tell the client that had it.
+
+        Returns whether it is back: it had the session before, and nobody since.
+        """
+        is_back, displaced = self._owner.give(client)
         self._brush_up.set()
-        if before is None or before is client:
-            return
-        if _is_same_page(before, client):  # it is at the other end of a lost connection
-            self._leaving = asyncio.ensure_future(before.close(1001))
-        else:
-            before.send(_taken_message("another tab has taken this session over"))
+        if displaced is not None and _is_same_page(displaced, client):
+            # It is at the other end of a lost connection.
+            self._leaving = asyncio.ensure_future(displaced.close(1001))
+        elif displaced is not None:
+            displaced.send(_taken_message("another tab has taken this session over"))
+        return is_back
 
     def _publish(self, message: Message) -> None:
         """Send an event of the session to its page and its observers."""
         self._update_generations(message)
         self._send_to_observers(message)
-        if self._holder is not None:
-            self._holder.send(message)
+        if self._owner.page is not None:
+            self._owner.page.send(message)
 
     def _update_generations(self, message: Message) -> None:
         """Store the numbers of the pictures that there are by now."""
@@ -324,9 +319,9 @@ def _taken_message(text: str) -> Message:
     return Closing(reason="taken", text=text)
 
 
-def _is_same_page(holder: Client | None, client: Client) -> bool:
-    """Return whether `client` is the holder's page, back after its connection was dropped."""
-    return holder is not None and client.page != "" and holder.page == client.page
+def _is_same_page(one: Client, other: Client) -> bool:
+    """Return whether two connections are of one page, back after the first was dropped."""
+    return one is other or (one.page != "" and one.page == other.page)
 
 
 async def picture_message(connections: Connections, name: str) -> Message:

@@ -23,12 +23,12 @@ from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
-from lightpaint.paint.launch import make_subject
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.steps import name_in_view
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.sources import BasisFile
 
 H, W, N = 54, 96, 3

@@ -1,0 +1,129 @@
+"""From what somebody names, or has in memory, to what is painted: checked before it is rendered."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lights import Lights
+from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.errors import PaintError, SceneError
+from lightpaint.files import called, file_length
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints_file import constraints_of
+from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.views import check_same_lights
+from lightpaint.paint.lazy_scene import LazyScene
+from lightpaint.paint.session_file import check_view_names, session_identity
+from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.subject import Subject
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import (
+    BasisFile,
+    GroupsFile,
+    SceneFile,
+    check_nothing_idle,
+    content,
+)
+from lightpaint.scene.presets import on_film
+from lightpaint.scene.scene import Scene
+
+#: What can be painted: files, which are read when they are needed, and what has been read.
+Paintable = SceneFile | BasisFile | GroupsFile | Scene | Basis | LightGroups
+
+
+def make_subjects(
+    sources: Sequence[Paintable], folder: Path | None = None, **options: Any
+) -> tuple[Subject, ...]:
+    """Return the views of one lighting, to be painted together.
+
+    options: parameters of `make_subject`. Raises LightpaintError for what cannot be painted, alone
+    or together, as far as that is known.
+    """
+    subjects = tuple(
+        make_subject(source, folder, view_count=len(sources), **options) for source in sources
+    )
+    if len({subject.scene is None for subject in subjects}) > 1:
+        raise PaintError("scenes and bases at once: give one kind for all views")
+    if len(subjects) > 1 and any(subject.groups is not None for subject in subjects):
+        raise PaintError("light groups have one view only: give bases, or scenes")
+    if (identity := session_identity(subjects)) is not None:
+        check_view_names([view.sensor for view in identity.views])
+    bases = [subject.basis for subject in subjects if subject.basis is not None]
+    for basis in bases[1:]:
+        check_same_lights(bases[0], basis)
+    return subjects
+
+
+def make_subject(
+    source: Paintable,
+    folder: Path | None = None,
+    *,
+    settings: Settings | None = None,
+    constraints: Constraints | None = None,
+    choice: TransformChoice | None = None,
+    command: Callable[[Mapping[str, str], LightRequests], str] = lambda paintings, requests: "",
+    view_count: int = 1,
+) -> Subject:
+    """Return one view to be painted, checked as far as that needs no renderer.
+
+    folder: one beside what is painted, named after it, by default. Others as of `Subject`. Raises
+    LightpaintError for what cannot be painted, and for constraints that its lights cannot meet.
+    """
+    settings, constraints = settings or Settings(), constraints or Constraints()
+    if isinstance(source, SceneFile | Scene):
+        scene = _scene_on_film(source, settings, constraints)
+        about: dict[str, Any] = {"scene": scene}
+    else:
+        check_nothing_idle(settings, source)
+        found = content(source)
+        basis = found.basis if isinstance(found, LightGroups) else found
+        _check_constraints(basis.lights, constraints)
+        groups = found if isinstance(found, LightGroups) else None
+        about = {"basis": basis, "groups": groups}
+    name = _name_of(source)
+    return Subject(
+        source=name,
+        folder=Path(f"{called(Path(name))}.paint").absolute() if folder is None else folder,
+        settings=settings,
+        constraints=constraints,
+        choice=choice or TransformChoice(),
+        command=command,
+        view_count=view_count,
+        **about,
+    )
+
+
+def _scene_on_film(
+    source: SceneFile | Scene, settings: Settings, constraints: Constraints
+) -> Scene | LazyScene:
+    """Return a scene on the film of its basis, or one that is loaded when it is needed."""
+
+    def check(scene: Scene) -> None:
+        from lightpaint.basis.render.render import basis_lights
+
+        _check_constraints(basis_lights(scene), constraints)
+
+    if isinstance(source, Scene):
+        check(source)
+        return on_film(source, settings.quality, settings.resolution)
+    # What can be seen without the renderer is said before anything is opened.
+    file_length(Path(source.path), "scene file", SceneError)
+    scene = LazyScene(source, settings)
+    if scene.record is not None:
+        _check_constraints(scene.record.lights, constraints)
+    scene.checks.append(check)
+    return scene
+
+
+def _check_constraints(lights: Lights, constraints: Constraints) -> None:
+    """Raise ConstraintError unless lights can meet these and what their lights file requests."""
+    reduce_to(constraints_of(lights.requests).and_then(constraints), lights)
+
+
+def _name_of(source: Paintable) -> str:
+    """Return the path of what is painted, as it was given or as the object knows it."""
+    if isinstance(source, Basis):
+        return source.source or source.origin.scene
+    return str(source.path)
