@@ -18,17 +18,15 @@ from lightpaint.batch.gallery.small_planes import drop_planes, planes_name
 from lightpaint.batch.gallery.summary import (
     SummaryRow,
     drop_pictures,
-    is_summary,
     rows_of,
     summary_csv,
     summary_json,
     view_folders,
 )
-from lightpaint.batch.manifest.folder_names import FILES
+from lightpaint.batch.manifest.folder_names import SUMMARY
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan
 from lightpaint.batch.work.task import Kind
-from lightpaint.errors import OutputError
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.report.comparison import fitted
@@ -43,16 +41,6 @@ MAX_PICTURES, COLUMNS, WIDTH, GAP, CAPTION_HEIGHT = 120, 6, 240, 14, 22
 GROUND, TEXT, FAINT, WARNING = (24, 24, 26), (226, 226, 226), (142, 142, 146), (255, 140, 120)
 
 
-def check_gallery(folder: Path, *, force: bool = False) -> None:
-    """Raise OutputError where a gallery would take the place of somebody else's files."""
-    there = [folder / name for name in FILES if (folder / name).exists()]
-    if there and not force and not is_summary(folder / "summary.json"):
-        raise OutputError(
-            f"{there[0]} is there, and of no batch: name another folder (folder=...), or replace "
-            "it (force=True)"
-        )
-
-
 def write_gallery(
     folder: Path, plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]
 ) -> list[SummaryRow]:
@@ -65,7 +53,7 @@ def write_gallery(
     drop_pictures(folder, rows)
     bases = bases_of_rows(folder, plan)
     drop_planes(folder, set(bases.values()))
-    write_text(folder / "summary.json", summary_json(rows))
+    write_text(folder / SUMMARY, summary_json(rows))
     write_text(folder / "summary.csv", summary_csv(rows))
     write_text(folder / "index.html", gallery_page(folder, plan.manifest.name, rows, bases))
     write_bytes(folder / "contact.png", png_bytes(contact_sheet(folder, rows)))

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from lightpaint.arrays import RGB
-from lightpaint.batch.manifest.folder_names import THUMBNAILS
+from lightpaint.batch.manifest.folder_names import SUMMARY_FORMAT, THUMBNAILS
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.work.task import EXPORT, Kind
@@ -31,8 +31,6 @@ from lightpaint.pipeline.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
-
-FORMAT = "lightpaint-batch 1"
 
 #: Pixels of a picture in the gallery from left to right, at most: of a few looks, which are
 #: compared as large as a window, and of more of them; quality of its JPEG.
@@ -251,12 +249,7 @@ def summary_document(rows: Iterable[SummaryRow]) -> dict[str, Any]:
     """Return the content of summary.json: all rows, with their lights."""
     looks = [{k: v for k, v in asdict(row).items() if v not in (None, "", ())} for row in rows]
     counts = {state: sum(x["state"] == state for x in looks) for state in ("done", "failed")}
-    return {"format": FORMAT, "lightpaint": __version__, **counts, "looks": looks}
-
-
-def is_summary(path: Path) -> bool:
-    """Return whether a file is a summary.json of lightpaint."""
-    return _json(path).get("format") == FORMAT
+    return {"format": SUMMARY_FORMAT, "lightpaint": __version__, **counts, "looks": looks}
 
 
 def summary_json(rows: Iterable[SummaryRow]) -> str:

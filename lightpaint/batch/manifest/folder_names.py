@@ -2,9 +2,18 @@
 
 import unicodedata
 from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from lightpaint.errors import LightpaintError, OutputError
+from lightpaint.files import read_text
+from lightpaint.storage.json_records import strict_json
+
+#: The summary for programs, and the format that it names.
+SUMMARY, SUMMARY_FORMAT = "summary.json", "lightpaint-batch 1"
 
 #: Files that a batch writes beside its looks, and may replace.
-FILES = ("index.html", "contact.png", "summary.csv", "summary.json")
+FILES = ("index.html", "contact.png", "summary.csv", SUMMARY)
 
 #: Name of the journal in the folder of a batch; and how the name of a part's journal begins.
 JOURNAL, JOURNAL_PART = "journal.jsonl", "journal-"
@@ -38,3 +47,21 @@ def name_clashes(names: Iterable[str]) -> list[list[str]]:
     for name in names:
         alike.setdefault(folded(name), []).append(name)
     return [list(dict.fromkeys(same)) for same in alike.values() if len(same) > 1]
+
+
+def check_gallery(folder: Path, *, force: bool = False) -> None:
+    """Raise OutputError where a gallery would take the place of somebody else's files."""
+    there = [folder / name for name in FILES if (folder / name).exists()]
+    if there and not force and not _is_summary(folder / SUMMARY):
+        raise OutputError(
+            f"{there[0]} is there, and of no batch: name another folder (folder=...), or replace "
+            "it (force=True)"
+        )
+
+
+def _is_summary(path: Path) -> bool:
+    """Return whether a file is the summary of a batch."""
+    with suppress(LightpaintError, ValueError):
+        record = strict_json(read_text(path, "summary", LightpaintError))
+        return isinstance(record, dict) and record.get("format") == SUMMARY_FORMAT
+    return False

@@ -1,16 +1,14 @@
 """Estimates of a plan's time and memory, from constants that were measured.
 
-Samples as docs/benchmarks.md has them of the gallery, on two cores. Looks by processor seconds in
-benchmarks/batch.py's own batches, some looks each on a machine that had other work: a rough guide.
+Looks by processor seconds in benchmarks/batch.py's own batches, some looks each on a machine that
+had other work: a rough guide.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook
-
-#: Seconds of a sample of one pixel, all lights together, and for each light that it is added to.
-SAMPLE_S, LIGHT_SAMPLE_S = 9.6e-7, 1e-8
+from lightpaint.batch.work.render_cost import SAMPLE_S, render_seconds
 
 #: Seconds of a look: of any; of what is solved for each pixel, and for each pixel and light; and of
 #: a report for each pixel.
@@ -46,11 +44,6 @@ def estimate(plan: Plan) -> CostEstimate:
         sum(look_seconds(look, plan) for look in left),
         max((cost.memory for cost in costs), default=0),
     )
-
-
-def render_seconds(samples: int, lights: int) -> float:
-    """Return the seconds for so many samples of a basis."""
-    return samples * (SAMPLE_S + LIGHT_SAMPLE_S * lights)
 
 
 def look_seconds(look: PlannedLook, plan: Plan) -> float:

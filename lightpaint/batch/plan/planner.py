@@ -9,8 +9,8 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render import memory_needed
-from lightpaint.batch.gallery.gallery import check_gallery
 from lightpaint.batch.manifest.entries import LookEntry
+from lightpaint.batch.manifest.folder_names import check_gallery
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.manifest.look_list import entries_of
 from lightpaint.batch.manifest.manifest import Manifest, read_manifest

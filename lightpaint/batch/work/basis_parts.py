@@ -13,8 +13,8 @@ from lightpaint.basis.render.render import (
     render_basis,
     with_first_hits,
 )
-from lightpaint.batch.plan.cost_estimate import render_seconds
 from lightpaint.batch.work.engine import Engine
+from lightpaint.batch.work.render_cost import render_seconds
 from lightpaint.batch.work.spool import Spool
 from lightpaint.batch.work.work_items import Lesson, PartOfBasis, SceneFilm
 from lightpaint.errors import BasisError

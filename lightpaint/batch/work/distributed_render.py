@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.batch.plan.cost_estimate import SAMPLE_S
 from lightpaint.batch.work.engine import Engine
+from lightpaint.batch.work.render_cost import SAMPLE_S
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import Passes
 from lightpaint.errors import SceneError

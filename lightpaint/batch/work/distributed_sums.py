@@ -6,9 +6,9 @@ from typing import Any
 
 from lightpaint.basis.render.parts import Part, plan_parts
 from lightpaint.basis.render.render import basis_lights
-from lightpaint.batch.plan.cost_estimate import render_seconds
 from lightpaint.batch.work.basis_parts import obtain_lesson
 from lightpaint.batch.work.engine import Engine
+from lightpaint.batch.work.render_cost import render_seconds
 from lightpaint.batch.work.spool import Spool
 from lightpaint.batch.work.sums_answer import write_solved_lights
 from lightpaint.batch.work.task import Task

@@ -14,8 +14,7 @@ from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
 from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, write_derived
-from lightpaint.batch.work.row_sums import sums_of_rows
-from lightpaint.batch.work.sums_answer import answer_by_sums
+from lightpaint.batch.work.sums_answer import answer_by_sums, sums_of_rows
 from lightpaint.batch.work.task import EXPORT, Task
 from lightpaint.batch.work.work_items import (
     ItemResult,
