@@ -17,6 +17,7 @@ from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.errors import BatchError, TargetError
 from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
@@ -113,6 +114,10 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def lighting_of(answer: Lighting) -> np.ndarray:
+    return np.array(list(answer.emission.values()))
+
+
 def hearing(labels: list[str]) -> Any:
     return lambda label, *_: labels.append(label)
 
@@ -136,15 +141,14 @@ def test_a_batch_of_lightings(here: Path, monkeypatch: pytest.MonkeyPatch) -> No
         outcome = run_batch(plan(here / "looks.toml", out))
         assert not outcome.failed
         assert run_batch(plan(here / "looks.toml", out)).done == []
-        found[want] = {
-            name: np.array(list(read_lighting(out / name / "lighting.json").emission.values()))
-            for name in ("bright", "dark")
-        }
+        answers = {name: read_lighting(out / name / "lighting.json") for name in ("bright", "dark")}
+        found[want] = {name: lighting_of(answer) for name, answer in answers.items()}
     written = {file.name for file in (here / "lights" / "bright").iterdir()}
     assert written == {"lighting.json", "relit.xml", "result.json"}
     for name, lights in found["lights"].items():
-        # Sums of float64 in another order.
-        np.testing.assert_allclose(lights, found["solve"][name], rtol=1e-9)
+        # A basis in a file is rounded where a sixteenth of its noise hides it; sums are not.
+        errors = np.array([light.standard_error for light in answers[name].lights])
+        assert (np.abs(lights - found["solve"][name]) < errors / 8).all()
     # Of a basis that is kept by now the same comes without rendering.
     text = LOOKS.replace("WANT", "lights")
     (here / "looks.toml").write_text(text, encoding="utf-8")
@@ -153,8 +157,9 @@ def test_a_batch_of_lightings(here: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert outcome.done == ["bright", "dark"]
     assert "basis" not in heard
     for name in ("bright", "dark"):
-        kept = read_lighting(here / "kept" / name / "lighting.json").emission
-        np.testing.assert_allclose(np.array(list(kept.values())), found["lights"][name], rtol=1e-9)
+        kept = lighting_of(read_lighting(here / "kept" / name / "lighting.json"))
+        # Sums of float64 in another order.
+        np.testing.assert_allclose(kept, found["solve"][name], rtol=1e-9)
     # Of one that nobody has, nothing is kept.
     cache = [file for file in (here / "cache").rglob("*.basis.exr") if file.is_file()]
     assert len(cache) == 1
