@@ -1,6 +1,7 @@
 """The mixer of a report, opened from a disk with the network off: its pixels are Σ w Φ."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -51,15 +52,23 @@ def report(basis: lp.Basis, **how: Any) -> str:
     return report_page(basis=basis, verification=None, command="lightpaint solve", **about)
 
 
-@pytest.fixture
-def opened(browser: Any, tmp_path: Path) -> Any:
-    """Opens a page from a file; whatever goes wrong in it fails the test."""
+@pytest.fixture(scope="module")
+def offline_tab(browser: Any) -> Iterator[tuple[Any, list[str]]]:
+    """One tab without a network for all tests, and whatever goes wrong in it."""
     wrong: list[str] = []
     context = browser.new_context(offline=True, viewport={"width": 1100, "height": 800})
     page = context.new_page()
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda line: wrong.append(line.text) if line.type == "error" else None)
     page.on("requestfailed", lambda request: wrong.append(request.url))
+    yield page, wrong
+    context.close()
+
+
+@pytest.fixture
+def opened(offline_tab: tuple[Any, list[str]], tmp_path: Path) -> Any:
+    """Opens a page from a file; whatever goes wrong in it fails the test."""
+    page, wrong = offline_tab
 
     def open_(text: str) -> Any:
         path = tmp_path / "report.html"
@@ -69,8 +78,10 @@ def opened(browser: Any, tmp_path: Path) -> Any:
         return page
 
     yield open_
-    assert wrong == []
-    context.close()
+    page.goto("about:blank")
+    page.set_viewport_size({"width": 1100, "height": 800})
+    left, wrong[:] = wrong[:], []
+    assert left == []
 
 
 def pixels(page: Any) -> Any:
