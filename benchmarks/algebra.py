@@ -24,8 +24,8 @@ from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import reduce_to
-from lightpaint.lighting.fit import Fit, meant_by
-from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.fit import Fit, resolve_for_targets
+from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.problem import Problem
@@ -124,7 +124,7 @@ def constrained(repeats: int) -> None:
         cells = []
         for asked in ASKED.values():
             problem = Problem.of(basis, target, constraints=Constraints.of(**asked))
-            equations, start = problem.pulled(problem.equations), problem.start
+            equations, start = problem.with_pull(problem.equations), problem.start
             solve = partial(solve_reduced, equations, problem.reduction, start)
             cells.append(f"{pair(timed(solve, 4 * repeats)):>18s}")
         print(f"{n:8d}{''.join(cells)}")
@@ -138,7 +138,9 @@ def strokes(count: int) -> None:
         basis, target = scene(n)
         image, importance = target.image.copy(), target.importance.copy()
         view = LiveView(basis, image, importance)
-        live = Live([view], fit=meant_by(Fit(), [target]), constraints=Constraints())
+        live = LiveSolver(
+            [view], fit=resolve_for_targets(Fit(), [target]), constraints=Constraints()
+        )
         rng = np.random.default_rng(1)
         # The first answer builds the tiles.
         weights = live.answer(basis.present_weights)
@@ -152,7 +154,7 @@ def strokes(count: int) -> None:
                     image[region] = rng.random(3)
                 else:
                     importance[region] = rng.random()
-                view.painted(region, with_importance=kind == "importance")
+                view.update(region, with_importance=kind == "importance")
                 between = time.perf_counter()
                 weights = live.answer(weights)
                 updates.append(between - start)

@@ -48,7 +48,7 @@ def main() -> None:
         view = lp.ViewTransform(name, stops)
         sampled, all_pixels = [], []
         for _ in range(options.repeats):
-            sampled.append(timed(basis, target, view, sample=warm_start.SAMPLE))
+            sampled.append(timed(basis, target, view, sample=warm_start.MIN_SAMPLE))
             all_pixels.append(timed(basis, target, view, sample=10**12))
         (a, found), (b, expected) = (
             min(each, key=lambda x: x[0]) for each in (sampled, all_pixels)
@@ -69,13 +69,13 @@ def main() -> None:
 
 def timed(basis: lp.Basis, target: lp.Target, view: Any, *, sample: int) -> tuple[float, Solution]:
     """Seconds of the processor, and the solution."""
-    usual, warm_start.SAMPLE = warm_start.SAMPLE, sample
+    usual, warm_start.MIN_SAMPLE = warm_start.MIN_SAMPLE, sample
     try:
         start = time.process_time()
         solution = lp.solve(basis, target, transform=view)
         return time.process_time() - start, solution
     finally:
-        warm_start.SAMPLE = usual
+        warm_start.MIN_SAMPLE = usual
 
 
 def loss_of(solution: Solution) -> float:

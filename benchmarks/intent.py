@@ -174,7 +174,7 @@ def loosened(name: str, options: argparse.Namespace) -> None:
                 continue
             holds = [solution.problem.fit.hold]
             for share in SHARES:
-                held_back.GRADUALLY = share
+                held_back.LOOSENED_SHARE = share
                 hold = next(x for x in held_back.reasons_of(solution) if x.kind == "hold")
                 holds.append(hold.loosening.hold if hold.loosening else holds[0])
             answers = [answer(basis, case, {"hold": hold}) for hold in [*holds, 0.0]]

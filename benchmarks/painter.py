@@ -46,7 +46,7 @@ import lightpaint as lp
 from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.fit import resolve_fit
-from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.launch import low_latency
 from lightpaint.paint.server.server import Server
@@ -187,7 +187,7 @@ def stroke_ms(
     importance[: height // 2] = 0.5
     meant = resolve_fit(Settings(**fit), over_look=True, through_view=True)
     view = LiveView(basis, image, importance)
-    live = Live([view], fit=meant, constraints=lp.Constraints.of(asked))
+    live = LiveSolver([view], fit=meant, constraints=lp.Constraints.of(asked))
     weights, times = live.answer(basis.present_weights), []
     for k in range(40):
         region = slice(8 + 3 * k, 72 + 3 * k), slice(8 + 5 * k, 72 + 5 * k)
@@ -195,7 +195,7 @@ def stroke_ms(
         image[region] *= paint
         if with_importance:
             importance[region] = 0.5 + 0.01 * k
-        view.painted(region, with_importance=with_importance)
+        view.update(region, with_importance=with_importance)
         weights = live.answer(weights)
         times.append(1e3 * (time.perf_counter() - begin))
     return float(np.median(times))

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint import Basis, Target, load_scene, read_target, render_basis, solve
-from lightpaint.lighting.loss.painting import squares_of
+from lightpaint.lighting.loss.painting import target_squares
 from lightpaint.lighting.problem import Problem
 from lightpaint.scene.scene import Scene
 
@@ -120,7 +120,7 @@ def descend(
     import drjit as dr
     import mitsuba as mi
 
-    squares = squares_of(basis, target)
+    squares = target_squares(basis, target)
     loaded = scene.load()
     parameters = mi.traverse(loaded)
     keys = {light.name: key_of(parameters, loaded, light.name) for light in scene.lights}

@@ -20,7 +20,7 @@ from lightpaint.batch.manifest.keys import MAX_FRAMES
 from lightpaint.cli.commands.rooms import template_lines
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
-from lightpaint.lighting.fit import HOLD
+from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
 from lightpaint.paint.server.http_connections import MAX_UNAUTHENTICATED
@@ -158,7 +158,7 @@ def _options() -> set[str]:
 
 #: Of options whose help has a number that is not that of the parser itself: what the code has.
 DEFAULTS = {
-    "--hold": f"{HOLD:g} where it was painted over the current look, else 0",
+    "--hold": f"{DEFAULT_HOLD:g} where it was painted over the current look, else 0",
     "--port": f"{DEFAULT_PORT}, or any if that is taken",
     "--exposure": "0",
     "--space": "8 and 16 bits",
@@ -196,9 +196,9 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
 def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
     page = (ROOT / "lightpaint/paint/page/ui/settings.js").read_text()
     solving, method = ((ROOT / "docs" / name).read_text() for name in ("solving.md", "method.md"))
-    assert f"const HOLD = {HOLD:g};" in page
-    assert f"`--hold {HOLD:g}`" in solving
-    assert f"It is {HOLD:g} by default where something was painted over" in method
+    assert f"const HOLD = {DEFAULT_HOLD:g};" in page
+    assert f"`--hold {DEFAULT_HOLD:g}`" in solving
+    assert f"It is {DEFAULT_HOLD:g} by default where something was painted over" in method
     for text in (page, solving):
         assert f"{LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K" in text
     assert f"`--kelvin '*={LAMP_KELVINS[0]}:{LAMP_KELVINS[1]}'`" in method

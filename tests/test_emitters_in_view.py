@@ -12,7 +12,7 @@ from command import refused, run, succeed
 
 import lightpaint as lp
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
-from lightpaint.report.visible_emitters import emitters_in_view
+from lightpaint.report.visible_emitters import emitter_remarks
 
 SIZE = (12, 10)
 TIMES = 350.0
@@ -39,7 +39,7 @@ def _said(basis: lp.Basis, target: lp.Target, **fit: Any) -> tuple[float, list[s
     """How bright the bulb is, and what is said of it."""
     solution = lp.solve(basis, target, **fit)
     predicted = lp.combine(basis, solution.lighting)
-    return solution.lighting["bulb"].emission[1], emitters_in_view(target, solution, predicted)
+    return solution.lighting["bulb"].emission[1], emitter_remarks(target, solution, predicted)
 
 
 ALL, PAINTED = None, np.ones(SIZE)

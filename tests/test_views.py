@@ -303,7 +303,7 @@ def test_paintings_of_two_views_seen_through_two_transforms(room: Path, tmp_path
         replace(painting(render_basis(s, spp=4), np.ones((4, 3)), "x"), transform=view)
         for s, view in zip(scenes, shown, strict=True)
     ]
-    with pytest.raises(TargetError, match=r"seen through agx at \+1 stops and srgb"):
+    with pytest.raises(TargetError, match=r"painted through agx at \+1 stops and srgb"):
         paint_with_light(scenes, targets, tmp_path / "out", spp=4, space="display")
     looks = paint_with_light(
         scenes, targets, tmp_path / "out", spp=4, space="display", transform=ViewTransform("srgb")

@@ -18,7 +18,7 @@ from lightpaint.errors import BasisError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
-from lightpaint.scene.lights.lights_file import LightRequests
+from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.screen import Shown, some_names, some_of
 from lightpaint.version import __version__
 
@@ -204,7 +204,7 @@ class Basis(Shown):
         """The noise of all planes as one array, (n, h, w, 3) float32."""
         return self.noise.array()
 
-    def with_requests(self, requests: LightRequests) -> "Basis":
+    def with_requests(self, requests: SceneRequests) -> "Basis":
         """This basis, of whose lights that is asked."""
         return (
             self
@@ -213,7 +213,7 @@ class Basis(Shown):
         )
 
     @property
-    def requests(self) -> LightRequests:
+    def requests(self) -> SceneRequests:
         """The wishes of its scene's lights file, by light."""
         return self.lights.requests
 

@@ -28,7 +28,7 @@ from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
 from lightpaint.scene.checks.tokens import attributes, markup
-from lightpaint.scene.lights.lights_file import LightRequests
+from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.scene.scene import Scene
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.version import __version__
@@ -87,7 +87,7 @@ def recall(key: str) -> Known | None:
                 its = said["known"]
                 its |= {name: tuple(its[name]) for name in ("size", "remarks")}
                 lights = tuple(read_record(BasisLight, light) for light in its["lights"]["each"])
-                requests = LightRequests(**its["lights"]["requests"])
+                requests = SceneRequests(**its["lights"]["requests"])
                 return Known(**{**its, "lights": Lights(lights, requests)})
     return None
 

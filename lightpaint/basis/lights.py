@@ -10,7 +10,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Bools, Doubles, read_only
 from lightpaint.errors import BasisError
-from lightpaint.scene.lights.lights_file import LightRequests
+from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.screen import Listed, some_names
 from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
@@ -73,7 +73,7 @@ class Lights(Sequence[BasisLight]):
     """
 
     each: tuple[BasisLight, ...]
-    requests: LightRequests = field(default_factory=LightRequests)
+    requests: SceneRequests = field(default_factory=SceneRequests)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "each", Listed(self.each))
@@ -101,7 +101,7 @@ class Lights(Sequence[BasisLight]):
     def __getitem__(self, k: int | slice) -> BasisLight | tuple[BasisLight, ...]:
         return self.each[k]
 
-    def with_requests(self, requests: LightRequests) -> "Lights":
+    def with_requests(self, requests: SceneRequests) -> "Lights":
         """Return these lights with these requests."""
         return self if self.requests == requests else replace(self, requests=requests)
 

@@ -1,1 +1,1 @@
-"""Which lighting comes closest? `Basis` and `Target` become a `Solution`."""
+"""The room of lightings: `Basis` and `Target` become a `Solution`."""

@@ -1,4 +1,4 @@
-"""What it is to be close to a painting, and how the closest lighting is found."""
+"""Options of a fit: the measure of closeness, and the method that finds the closest lighting."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,54 +12,54 @@ from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.target.target import Target
 from lightpaint.validation import SWITCH, Check, a, check_fields, number, one_of
 
-#: What is compared with the painting: light, or what a display shows of it.
+#: The space of the comparison with the painting: light, or display values.
 Space = Literal["linear", "display"]
 
-#: Which colours lamps may take: any; those they have unless the painting clearly asks for others;
-#: whites only.
+#: The colours that lamps may take: any; their own unless the painting clearly needs others; whites.
 Colors = Literal["free", "gentle", "white"]
 
-#: Weight of all that is not painted beside all that is, where it was painted over the current look:
-#: benchmarks/intent.py has what others do.
-HOLD = 3.0
+#: Weight of all unpainted pixels relative to all painted ones, for a painting over the current
+#: look: benchmarks/intent.py compares other values.
+DEFAULT_HOLD = 3.0
 
 F = TypeVar("F", bound="Fit")
 
-#: Whether pixels count in which the camera sees an emitter: where somebody said what was painted
-#: (by alpha, mask or template), wherever they are painted, or never.
+#: Whether pixels with a visible emitter count: if alpha, mask or template say what is painted,
+#: wherever they are painted, or never.
 Emitters = Literal["auto", "count", "skip"]
 
 
 @keywords()
 @dataclass(frozen=True)
 class Fit:
-    """How close is measured, and how the closest is found.
+    """Options of a fit: the measure of closeness, and the method that finds the closest lighting.
 
-    What is None follows from how the target was painted. Over the current look: the rest is held to
-    it, and lamps keep their colour. Through a view of a display: lamps keep their colour, and the
-    two are compared as the display shows them. A float EXR with a mask of its own and nothing under
-    it is taken at its word: light, each channel for itself.
+    None is resolved by the way the target was painted. Over the current look: the fit holds the
+    rest to it, and lamps keep their colour. Through a view of a display: lamps keep their colour,
+    and the fit compares display values. A float EXR with a mask of its own and nothing under it is
+    fitted
+    literally: as light, each channel by itself.
 
     Attributes:
         space: `linear`, or `display` to come closest in what a display shows.
-        hold: Weight of all that is not painted, against the current look, beside that of all that
-            is. 0 lets it go.
-        colors: `free`; `gentle`, to leave a lamp's present colour only as far as the painting gains
-            by it, and for no colour but whites and what is painted; `white`, on Planck's locus
+        hold: Weight of all unpainted pixels, which it holds to the current look, relative to that
+            of all painted ones. 0 releases them.
+        colors: `free`; `gentle`, to leave a lamp's present colour only as far as the fit gains by
+            it, and only for whites and painted colours; `white`, on Planck's locus
             between 2200 and 9000 K.
-        unpainted: Instead of `hold`, the weight of each pixel that is not painted.
-        literal: Whether every target is taken at its word, but for what is said here.
+        unpainted: Instead of `hold`, the weight of each unpainted pixel.
+        literal: Whether every target is fitted literally, except for options set here.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's iteration alone,
             which may run out of sweeps; the certificate of the answer then says that it has not
             converged.
-        transform: The view transform through which the two are compared in `display`; None for that
-            of the painting or, where it holds light, sRGB at an exposure that shows something.
-        emitters: Whether pixels in which the camera sees an emitter count: `auto`, where somebody
-            said what was painted; `count`, always, which holds the emitters themselves to how
-            bright they are painted; `skip`, never.
+        transform: The view transform of a comparison in `display`; None for that of the painting
+            or, if it holds light, sRGB at a fitting exposure.
+        emitters: Whether pixels with a visible emitter count: `auto`, if alpha, mask or template
+            say what is painted; `count`, always, which holds the emitters themselves to their
+            painted brightness; `skip`, never.
 
     Raises:
-        LightpaintError: For a value that means nothing.
+        LightpaintError: For an invalid value.
 
     Examples:
         >>> lp.Fit(hold=0.5, colors="white").hold
@@ -88,7 +88,7 @@ class Fit:
 
     @property
     def brightness(self) -> float:
-        """By how much the view transform brightens the squares of light."""
+        """The factor by which the view transform brightens squares of light."""
         return 1.0 if self.transform is None else float(4.0**self.transform.stops)
 
     def __post_init__(self) -> None:
@@ -100,17 +100,16 @@ class Fit:
             )
 
 
-def meant_by(fit: F, targets: Sequence[Target]) -> F:
-    """`fit` with all that it leaves open decided, as `targets` were painted.
+def resolve_for_targets(fit: F, targets: Sequence[Target]) -> F:
+    """Resolve all open options of `fit` by the way `targets` were painted.
 
-    Raises TargetError if they were seen through different transforms, and it does not say which
-    counts.
+    Raises TargetError if they were painted through different transforms, and `fit` chooses none.
     """
     return resolve_fit(
         fit,
         over_look=any(target.over_look for target in targets),
         through_view=any(target.through_view for target in targets),
-        display=lambda: _display_of(targets),
+        display=lambda: _common_transform(targets),
     )
 
 
@@ -121,10 +120,10 @@ def resolve_fit(
     through_view: bool = False,
     display: Callable[[], ViewTransform] = ViewTransform,
 ) -> F:
-    """Return `fit` with all that it leaves open decided, by how something is painted.
+    """Resolve all open options of `fit` by the way of painting.
 
-    over_look: over the current look. through_view: through a view of a display. display: the view
-    transform, asked for where it matters.
+    over_look: over the current look. through_view: through a view of a display. display: returns
+    the view transform; called if it matters.
     """
     over_look = over_look and not fit.literal
     on_display = through_view and not fit.literal
@@ -133,19 +132,18 @@ def resolve_fit(
     return replace(
         fit,
         space=space,
-        hold=fit.hold if fit.hold is not None else HOLD * (over_look and not fit.unpainted),
+        hold=fit.hold if fit.hold is not None else DEFAULT_HOLD * (over_look and not fit.unpainted),
         colors=fit.colors or ("gentle" if over_look or on_display else "free"),
         transform=None if space == "linear" else fit.transform or display(),
     )
 
 
-def _display_of(targets: Sequence[Target]) -> ViewTransform:
-    """The one view that all were painted through."""
+def _common_transform(targets: Sequence[Target]) -> ViewTransform:
+    """Return the one view that all targets were painted through."""
     seen = {target.transform for target in targets if target.transform is not None}
     if len(seen) > 1:
-        told = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
+        names = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
         raise TargetError(
-            f"the paintings were seen through {told}: say with transform=... which of them is to "
-            "be fitted"
+            f"the paintings were painted through {names}: choose one of them with transform=..."
         )
     return next(iter(seen), None) or ViewTransform("srgb", choose_exposure(targets[0].image))

@@ -1,4 +1,4 @@
-"""Problems that squares stand for: what their solve asks of them, which is no pixel."""
+"""Linear problems: squares, and all that their solve needs without pixels."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,18 +12,19 @@ from lightpaint.lighting.constraints.gamuts import Gamuts
 from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss.weight_penalty import pull_of
+from lightpaint.lighting.loss.weight_penalty import weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.screen import shortly
 
 
 class LinearProblem:
-    """Squares by their sums, and what the lights may do: the frozen dataclass adds the fields.
+    """A linear problem by its sums, with the freedom of the lights: the frozen dataclass adds
+    fields.
 
-    equations: M and b of the squares; corrected: the same without that part of the noise which is
-    not in `noise_removed`, None where none was taken out. constraints: what is asked of the lights.
-    reduction: what is left to solve for; full: the same with all lights that `sparse` has not
-    chosen. fit: with nothing left open. dimming: as of `pull_of`.
+    equations: M and b of the squares; corrected: the same without the share `noise_removed` of the
+    noise, None if none was removed. constraints: on the lights. reduction: the unknowns that these
+    leave; full: the same with the lights that `sparse` has not chosen. fit: with nothing left open.
+    dimming: see `weight_pull`.
     """
 
     equations: NormalEquations
@@ -43,59 +44,64 @@ class LinearProblem:
 
         @property
         def lights(self) -> Lights:
-            """The lights that are to be set."""
+            """The lights of the problem."""
 
         @property
         def power(self) -> Doubles:
-            """‖Φᵢ‖² over the picture, (n, 3), as of `Basis`."""
+            """‖Φᵢ‖² over the picture, (n, 3), as in `Basis`."""
 
         @property
         def transform(self) -> ViewTransform | None:
-            """The view transform through which the loss is seen; None for linear light."""
+            """The view transform of the loss; None for linear light."""
 
         @property
         def painted_share(self) -> float:
-            """Importance of all that is painted, beside the number of pixels."""
+            """The total importance, relative to the number of pixels."""
 
         @property
         def scene_identity(self) -> str:
-            """The scene that the lights are of, as of `Origin`."""
+            """The identity of the lights' scene, as in `Origin`."""
 
         @property
         def spp(self) -> int | None:
-            """Samples per pixel that the sums are of; None where nobody knows of any."""
+            """Samples per pixel behind the sums; None if unknown."""
 
         @property
         def norm2(self) -> Doubles:
-            """(3,), what a black picture would miss, to hold the objective against."""
+            """(3,), the loss of a black picture, as a scale for the objective."""
 
     def objective(self, weights: Doubles) -> Doubles:
-        """(3,), what weights (n, 3) miss."""
+        """Return the loss of weights (n, 3), (3,)."""
         raise NotImplementedError
 
-    def without_traces(self, weights: Doubles, is_asked: Bools) -> Doubles:
-        """Weights (n, 3) without what rounding alone has made. is_asked: (n,), whose are kept."""
+    def remove_traces(self, weights: Doubles, is_constrained: Bools) -> Doubles:
+        """Return weights (n, 3) without those that round-off made. is_asked: (n,), lights to leave
+        alone. is_asked: (n,), whose are kept.
+        """
         raise NotImplementedError
 
     @property
     def solved(self) -> NormalEquations:
-        """The equations that the weights are to solve, noise taken out where that was asked."""
+        """The equations to solve: without noise if it was removed."""
         return self.equations if self.corrected is None else self.corrected
 
     @property
     def pull_strength(self) -> float:
-        """That of the pull to the present, of light as bright as the view transform makes it."""
+        """Strength of the pull to the present, for light as bright as the view transform makes
+        it."""
         return self.constraints.prefer_current * self.fit.brightness
 
     @property
     def keeps_color(self) -> Bools:
-        """(n,), the lights that are pulled to their colour: free to leave it, and seen to."""
+        """(n,), the lights with a pull to their colour: those free to leave it that reach
+        something.
+        """
         return self.full.is_free & self.equations.reached.any(axis=1)
 
     @cached_property
     def pull(self) -> NormalEquations | None:
-        """Penalty of leaving the present, or its colours; None where none is asked."""
-        return pull_of(
+        """The penalty for leaving the present, or its colours; None if there is none."""
+        return weight_pull(
             self.power,
             self.lights.present_weights,
             self.fit,
@@ -105,16 +111,16 @@ class LinearProblem:
             dimming=self.dimming,
         )
 
-    def pulled(self, equations: NormalEquations) -> NormalEquations:
-        """`equations` with what pulls at the weights, if something does."""
+    def with_pull(self, equations: NormalEquations) -> NormalEquations:
+        """Return `equations` with the pull on the weights, if there is one."""
         return equations if self.pull is None else equations + self.pull
 
     def with_reduction(self, reduction: Reduction) -> Self:
-        """This problem with that reduction, and the same `full`."""
+        """Return this problem with that reduction, and the same `full`."""
         return replace(self, reduction=reduction)  # type: ignore[type-var]
 
-    def reduced(self, reduction: Reduction) -> Self:
-        """This problem with that reduction, which differs in the whites that lights came to."""
+    def with_whites(self, reduction: Reduction) -> Self:
+        """Return this problem with a reduction that differs in the whites of its lights."""
         if self.reduction is self.full:
             full = reduction
         else:
@@ -125,9 +131,9 @@ class LinearProblem:
 
 @dataclass(frozen=True, kw_only=True)
 class SummedProblem(LinearProblem):
-    """A painting taken at its word in linear light, of which nothing but sums is known.
+    """A literal problem in linear light, of which only the sums are known.
 
-    name, lights, power, scene_identity, spp: as of `LinearProblem`. start: (n, 3), the weights to
+    name, lights, power, scene_identity, spp: see `LinearProblem`. start: (n, 3), the weights to
     begin with: lights that reach nothing keep them.
     """
 
@@ -150,36 +156,35 @@ class SummedProblem(LinearProblem):
 
     @property
     def transform(self) -> None:
-        """None: a display has no sums."""
+        """None: display values have no such sums."""
 
     @property
     def painted_share(self) -> float:
-        """1: nothing of what is solved so is in proportion to it."""
+        """1: nothing in such a problem depends on it."""
         return 1.0
 
     def objective(self, weights: Doubles) -> Doubles:
-        """(3,), what weights (n, 3) miss."""
+        """Return the loss of weights (n, 3), (3,)."""
         return self.equations.objective(weights)
 
     @property
     def norm2(self) -> Doubles:
-        """(3,), what a black picture would miss."""
+        """(3,), the loss of a black picture."""
         return self.equations.target_norm2
 
-    def without_traces(self, weights: Doubles, is_asked: Bools) -> Doubles:
-        """Weights (n, 3) as they are: what shows in a pixel, no sum tells."""
+    def remove_traces(self, weights: Doubles, is_constrained: Bools) -> Doubles:
+        """Return weights (n, 3) as they are: sums do not tell what a pixel shows."""
         return weights
 
 
-def reduced_by(
-    asked: Constraints, lights: Lights, fit: Fit, gamuts: Gamuts | None = None
+def reduce_lights(
+    constraints: Constraints, lights: Lights, fit: Fit, gamuts: Gamuts | None = None
 ) -> Reduction:
-    """Reduce the lights to the unknowns that constraints and the fit of their colours leave.
+    """Reduce the lights to the unknowns that constraints and the options for colours leave.
 
-    gamuts: as of `gamuts_for`. Raises ConstraintError for a light that is to be white and cannot be
-    what else is asked of it.
+    gamuts: see `gamuts_for`. Raises ConstraintError for a light whose constraints exclude white.
     """
     if fit.colors == "white":
-        asked = whiten_open_lights(asked, lights)
-    reduction = replace(reduce_to(asked, lights), is_joined=fit.colors == "gentle")
+        constraints = whiten_open_lights(constraints, lights)
+    reduction = replace(reduce_to(constraints, lights), is_joined=fit.colors == "gentle")
     return reduction if gamuts is None else reduction.with_gamuts(gamuts)

@@ -1,4 +1,4 @@
-"""The solve of a linear problem: weights, what shows that they are best, and the lighting."""
+"""The solve of a linear problem: its weights, their certificate, and the lighting."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,17 +17,17 @@ from lightpaint.lighting.constraints.white_neighbours import solve_on_locus
 from lightpaint.lighting.linear_problem import LinearProblem
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Gradient, of a problem with unit diagonal and relative to b, that counts as a pull.
-PULL = 1e-7
+#: Gradient, with a unit diagonal and relative to b, from which a constraint has an effect.
+MIN_PULL = 1e-7
 
 _Problem = TypeVar("_Problem", bound=LinearProblem)
 
 
 @dataclass(frozen=True)
-class Answer(Generic[_Problem]):
+class LinearAnswer(Generic[_Problem]):
     """The lighting that solves the squares of a problem.
 
-    problem: with the lights that `sparse` has chosen. weights: (n, 3). tried: as of `Solution`.
+    problem: with the lights that `sparse` has chosen. weights: (n, 3). tried: see `Solution`.
     """
 
     problem: _Problem
@@ -36,19 +36,21 @@ class Answer(Generic[_Problem]):
     tried: tuple[tuple[int, Doubles], ...] = ()
 
 
-def solve_linear(problem: _Problem, start: Doubles) -> Answer[_Problem]:
-    """Solve the squares, from weights (n, 3). With `sparse`, of the best lights in it."""
+def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
+    """Solve the squares from weights (n, 3); with `sparse`, for the best lights in it. With
+    `sparse`, of the best lights in it.
+    """
     count = problem.constraints.sparse
     if count is None or not problem.full.knobs:
         return solve_reduction(problem, start)
-    equations, curve = problem.pulled(problem.solved), []
+    equations, curve = problem.with_pull(problem.solved), []
     path = choose_knobs(reduced_problems(equations, problem.full), problem.full, count)
     for chosen in path:
         _, found = solve_on_locus(equations, only_knobs(problem.full, chosen), start)
         curve.append((len(chosen), found.weights))
     best = max((chosen for chosen in path if len(chosen) <= count), key=len)
     answer = solve_reduction(problem.with_reduction(only_knobs(problem.full, best)), start)
-    # What was chosen and has come out dark is left out as well.
+    # Chosen lights that come out dark are left out as well.
     on = [k for k, x in enumerate(problem.full.knobs) if answer.weights[list(x.lights)].any()]
     left = answer.problem.with_reduction(only_knobs(answer.problem.full, on))
     norm = np.where(problem.norm2 > 0, problem.norm2, 1).sum()
@@ -61,29 +63,31 @@ def solve_linear(problem: _Problem, start: Doubles) -> Answer[_Problem]:
 
 def solve_reduction(
     problem: _Problem, start: Doubles, reached: Bools | None = None
-) -> Answer[_Problem]:
-    """Solve the squares as the reduction has the lights. reached: as of `answer_of`."""
-    equations, method = problem.pulled(problem.solved), problem.fit.method
+) -> LinearAnswer[_Problem]:
+    """Solve the squares under the present reduction. reached: see `answer_of`. reached: as of
+    `answer_of`.
+    """
+    equations, method = problem.with_pull(problem.solved), problem.fit.method
     reduction, optimum = solve_on_locus(equations, problem.reduction, start, method=method)
-    return answer_of(problem.reduced(reduction), optimum, optimum.weights, equations, reached)
+    return make_answer(problem.with_whites(reduction), optimum, optimum.weights, equations, reached)
 
 
-def answer_of(
+def make_answer(
     problem: _Problem,
     optimum: ReducedOptimum,
     weights: Doubles,
     equations: NormalEquations,
     reached: Bools | None = None,
-) -> Answer[_Problem]:
-    """Return weights (n, 3) as an answer. optimum: of `equations`, the problem with its pull.
+) -> LinearAnswer[_Problem]:
+    """Make an answer of weights (n, 3). optimum: of `equations`, the problem with its pull.
 
-    reached: (n, 3), what lights reach where that is known from before: in the last linear problem
-    of a loss it may be less.
+    reached: (n, 3), the channels in which lights reach something, if known from before: in the last
+    linear problem of a loss they may reach less.
     """
     reached = optimum.reached if reached is None else reached
     transform, names = problem.transform, problem.lights.names
     labels = problem.reduction.labels
-    weights = problem.without_traces(weights, np.array([bool(x) for x in labels], dtype=bool))
+    weights = problem.remove_traces(weights, np.array([bool(x) for x in labels], dtype=bool))
     certificate = Certificate(
         kkt_residual=as_rgb(optimum.kkt_residual),
         objective=(0, 0, 0),
@@ -97,27 +101,29 @@ def answer_of(
         noise_removed=problem.noise_removed,
         software=Software.here(),
         basis_spp=problem.spp,
-    ).of(problem.objective(weights), problem.norm2)
-    asked = _labels_held_back(problem, equations, optimum.weights)
+    ).with_objective(problem.objective(weights), problem.norm2)
+    labels_and_effects = _labels_and_effects(problem, equations, optimum.weights)
     about: dict[str, Any] = {"target": problem.name, "certificate": certificate}
     about["scene_identity"] = problem.scene_identity
-    lighting = Lighting.of_weights(problem.lights, weights, asked=asked, reached=reached, **about)
-    return Answer(problem, lighting, weights)
+    lighting = Lighting.of_weights(
+        problem.lights, weights, labels=labels_and_effects, reached=reached, **about
+    )
+    return LinearAnswer(problem, lighting, weights)
 
 
-def _labels_held_back(
+def _labels_and_effects(
     problem: LinearProblem, equations: NormalEquations, weights: Doubles
 ) -> Sequence[tuple[str, bool]]:
-    """Return of each light what is asked of it, and whether it would change if it were let go."""
+    """Return the constraint on each light, and whether the light would change without it."""
     labels = problem.reduction.labels
     if not any(labels):
         return [(label, False) for label in labels]
-    held = _held_back(equations, problem.lights.is_scalar, weights)
+    held = _has_effect(equations, problem.lights.is_scalar, weights)
     return [(label, bool(label) and bool(h)) for label, h in zip(labels, held, strict=True)]
 
 
-def _held_back(equations: NormalEquations, scalar: Bools, weights: Doubles) -> Bools:
-    """(n,), whether a light would change if it alone were let go.
+def _has_effect(equations: NormalEquations, scalar: Bools, weights: Doubles) -> Bools:
+    """Return, (n,), whether a light would change if it alone were released.
 
     scalar: (n,), of which there is one weight for all channels. The gradient g = M w − b must
     vanish for a free light that is on, and may not be negative for one that is off; where it does
@@ -127,8 +133,8 @@ def _held_back(equations: NormalEquations, scalar: Bools, weights: Doubles) -> B
     power = np.where(lit, np.einsum("cii->ic", equations.M), 0)
     g = np.where(lit, equations.gradient(weights), 0)
     size = np.abs(equations.b.T[lit] / np.sqrt(power[lit])).max(initial=0) or 1.0
-    # Of what has one weight for all channels they pull together.
+    # The channels of a light with one weight pull together.
     g[scalar], power[scalar] = (x[scalar].sum(axis=1, keepdims=True) for x in (g, power))
     root = np.sqrt(np.where(power > 0, power, 1))
     violation = np.abs(np.minimum(weights * root, g / root))
-    return np.asarray((violation > PULL * size).any(axis=1))
+    return np.asarray((violation > MIN_PULL * size).any(axis=1))

@@ -1,4 +1,4 @@
-"""What is to be solved: which pictures are to come close to what, by which lights, held how."""
+"""The problem to solve: pictures, their goals, the lights and their constraints."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,70 +19,68 @@ from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.constraints.white_neighbours import tangent_reduction
-from lightpaint.lighting.fit import Fit, Space, meant_by
-from lightpaint.lighting.linear_problem import LinearProblem, reduced_by
+from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
+from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.painting import (
-    brighter_will_do,
+    at_least_mask,
+    choose_loss,
     joint_squares,
-    loss_of,
-    painted_light,
-    weight_of_rest,
-    what_counts,
-    with_emitters_read,
+    resolve_emitter_paint,
+    resolve_importance,
+    target_light,
+    unpainted_weight_of,
 )
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.round_off import without_traces
+from lightpaint.lighting.round_off import remove_traces
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import shortly
 from lightpaint.target.target import Target
 
-#: Mireds by which a light that keeps to a range of white may leave its white, where it is asked how
-#: firmly that is known, or what it is held by.
-REACH = 32.0
+#: Mireds by which a light of a range may leave its white in the analysis of uncertainty and bounds.
+TANGENT_REACH = 32.0
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """What is known of the noise in the last step to an answer (see analysis/refine.py).
+    """The noise in the last step to an answer (see analysis/noise/refinement.py).
 
-    before: (n, 3), the weights that it went from.
-    noise: (h, w, 3), half difference of the prediction there, as far as it decided the step.
-    lacking: (3, n), what is still to be expected to lack in the gradient.
-    share: of the step that the render of the mix decided, 0 to 1; the basis did the rest.
+    before: (n, 3), the weights at its start.
+    noise: (h, w, 3), half difference of the prediction there, as far as it influenced the step.
+    gradient_error: (3, n), the expected error that remains in the gradient.
+    share: of the step that the render of the mix determined, 0 to 1; the basis did the rest.
     """
 
     before: Doubles
     noise: Floats
-    lacking: Doubles
+    gradient_error: Doubles
     share: float
 
 
 @keywords()
 @dataclass(frozen=True)
 class Problem(LinearProblem):
-    """A loss over the pictures that a basis can make, and what the lights may do.
+    """A loss over the pictures that a basis can make, and the freedom of the lights.
 
     Attributes:
-        basis: Of all views together.
+        basis: The basis of all views together.
         views: Basis and target of each view (views.py).
-        loss: What a picture costs.
-        squares: The linear problem that stands for the loss, the loss itself where that is one;
-            before a solve has found better, the painting taken at its word.
-        equations: M and b of these squares, of the basis as it is.
-        constraints: What is asked of the lights, beside what `fit` says of their colours.
-        reduction: What both leave to solve for.
-        full: The same with all lights that `sparse` has not chosen.
+        loss: The loss of a picture.
+        squares: The linear problem that stands for the loss, or the loss itself if it is linear;
+            before a solve, the literal squares of the painting.
+        equations: M and b of these squares, without correction for noise.
+        constraints: Constraints on the lights, besides the colours that `fit` allows.
+        reduction: The unknowns that both leave.
+        full: The same with the lights that `sparse` has not chosen.
         start: (n, 3), the weights to begin with: lights that reach nothing keep them.
-        fit: How close is measured, and how the closest is found.
-        corrected: The equations without that part of the noise; None where none was taken out.
-        noise_removed: The part of the noise in `equations` that is not in `corrected`, where some
-            was taken out.
-        refinement: The last step by which an answer was improved, if one was.
-        dimming: (n,), by how much dimmer lights are than at present in an answer before, which the
-            pull to their colours heeds; None where there was none.
-        block_side: Pixels along the side of the blocks that `corrected` is of; 1 for single pixels.
+        fit: Options of the fit.
+        corrected: The equations without that share of the noise; None if none was removed.
+        noise_removed: The share of the noise in `equations` that `corrected` lacks.
+        refinement: The last step that improved an answer, if there was one.
+        dimming: (n,), the factor by which an earlier answer dims lights, which strengthens the
+            pull to their colours; None without one.
+        block_side: Pixels along the side of the blocks behind `corrected`; 1 for single pixels.
 
     Examples:
         >>> problem = lp.Problem.of(basis, target)
@@ -120,7 +118,8 @@ class Problem(LinearProblem):
         fit: Fit | None = None,
         resize: bool = False,
     ) -> "Problem":
-        """Of one view, or of several: their bases and targets in the same order. As of `solve`.
+        """Make the problem of one view, or of several, with bases and targets in the same order. As
+        of `solve`.
 
         What the bases' scene asks of its lights is heeded; `constraints` go before it.
         """
@@ -131,31 +130,33 @@ class Problem(LinearProblem):
                 f"the constraints are a {type(constraints).__name__}: give Constraints.of(...)"
             )
         whole, parts = joint_basis(bases)
-        asked = constraints_of(whole.requests).and_then(constraints or Constraints())
+        all_constraints = constraints_of(whole.requests).and_then(constraints or Constraints())
         fit = fit or Fit()
         fitted = [
-            what_counts(its.fitted_to(one.size, resize=resize), one.emitters_seen, fit.emitters)
+            resolve_importance(
+                its.fitted_to(one.size, resize=resize), one.emitters_seen, fit.emitters
+            )
             for its, one in zip(targets, parts, strict=True)
         ]
-        fit = meant_by(fit, fitted)
-        read = [with_emitters_read(x, one, fit) for x, one in zip(fitted, parts, strict=True)]
+        fit = resolve_for_targets(fit, fitted)
+        read = [resolve_emitter_paint(x, one, fit) for x, one in zip(fitted, parts, strict=True)]
         views = Views(parts, tuple(read))
-        word = joint_squares(views, unpainted=weight_of_rest(views, fit))
-        loss = loss_of(
+        word = joint_squares(views, unpainted=unpainted_weight_of(views, fit))
+        loss = choose_loss(
             word,
-            brighter_will_do(views),
+            at_least_mask(views),
             fit.transform,
-            painted=lambda: painted_light(views),
+            painted=lambda: target_light(views),
             current=lambda: whole.mix(whole.present_weights),
         )
-        reduction = reduced_by(asked, whole.lights, fit, gamuts_for(whole, views, fit))
+        reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts_for(whole, views, fit))
         return cls(
             basis=whole,
             views=views,
             loss=loss,
             squares=word,
             equations=NormalEquations.of(whole, word.image, word.weight),
-            constraints=asked,
+            constraints=all_constraints,
             reduction=reduction,
             full=reduction,
             start=whole.present_weights if start is None else start,
@@ -164,12 +165,12 @@ class Problem(LinearProblem):
 
     @property
     def name(self) -> str:
-        """What was painted, for people."""
+        """Name of the painting, for people."""
         return " + ".join(target.name for target in self.views.targets)
 
     @property
     def lights(self) -> Lights:
-        """Those of the basis."""
+        """The lights of the basis."""
         return self.basis.lights
 
     @property
@@ -179,63 +180,65 @@ class Problem(LinearProblem):
 
     @property
     def scene_identity(self) -> str:
-        """The scene that the basis is of."""
+        """The identity of the basis's scene."""
         return self.basis.origin.scene_identity
 
     @property
     def spp(self) -> int | None:
-        """Samples per pixel of the basis, of the first of several; None where nobody knows."""
+        """Samples per pixel of the basis, of the first of several; None if unknown."""
         return self.basis.origin.spp if self.basis.knows_noise else None
 
     @property
     def transform(self) -> ViewTransform | None:
-        """The view transform through which the loss is seen; None for linear light."""
+        """The view transform of the loss; None for linear light."""
         return self.loss.transform
 
-    def without_traces(self, weights: Doubles, is_asked: Bools) -> Doubles:
-        """Weights (n, 3) in which what shows in no pixel is 0. is_asked: (n,), whose are kept."""
-        return without_traces(self.basis, weights, self.squares.image, is_asked=is_asked)
+    def remove_traces(self, weights: Doubles, is_constrained: Bools) -> Doubles:
+        """Return weights (n, 3) with 0 for those that show in no pixel. is_asked: (n,), lights to
+        leave alone. is_asked: (n,), whose are kept.
+        """
+        return remove_traces(self.basis, weights, self.squares.image, is_constrained=is_constrained)
 
     @property
     def is_linear(self) -> bool:
-        """Whether its squares are all there is to its loss."""
+        """True if the squares are the whole loss."""
         return self.loss.is_linear
 
     @property
     def space(self) -> Space:
-        """In which the prediction is brought close to the painting."""
+        """The space in which prediction and painting are compared."""
         return "linear" if self.loss.transform is None else "display"
 
     @property
-    def asks(self) -> bool:
-        """Whether anything limits the lights: constraints, or that they are to be white."""
+    def is_constrained(self) -> bool:
+        """True if anything limits the lights: constraints, or whites only."""
         return bool(self.constraints) or self.fit.colors == "white"
 
     @cached_property
-    def about_answer(self) -> Reduction:
-        """`reduction` where an answer is asked about: whites of a range along a straight line."""
-        return tangent_reduction(self.reduction, REACH)
+    def local_reduction(self) -> Reduction:
+        """The reduction for analyses of an answer: whites of a range along a straight line."""
+        return tangent_reduction(self.reduction, TANGENT_REACH)
 
     @cached_property
     def painted_share(self) -> float:
-        """Importance of all that is painted, beside the number of pixels."""
+        """The total importance, relative to the number of pixels."""
         painted = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
         return painted / sum(x.importance.size for x in self.views.targets)
 
     @property
     def norm2(self) -> Doubles:
-        """(3,), what a black picture would miss, to hold the objective against."""
+        """(3,), the loss of a black picture, as a scale for the objective."""
         return self.equations.target_norm2 if self.is_linear else self.loss.norm2
 
     def objective(self, weights: Doubles) -> Doubles:
-        """(3,), what weights (n, 3) miss."""
+        """Return the loss of weights (n, 3), (3,)."""
         if self.is_linear:
             return self.equations.objective(weights)
         lit = LitPixels.whole(self.basis, self.loss)
         return lit.pixels.objective(lit.predicted(weights))
 
-    def of_view(self, k: int) -> "Problem":
-        """The problem of view k alone: its pixels of the same squares."""
+    def view_problem(self, k: int) -> "Problem":
+        """Return the problem of view k alone: its pixels of the same squares."""
         if len(self.views) == 1:
             return self
 
@@ -255,28 +258,29 @@ class Problem(LinearProblem):
 
 
 def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
-    """Of each light the colours that it may take; None where `fit` does not limit them."""
+    """Return the colours that each light may take; None if `fit` does not limit them."""
     if fit.colors != "gentle":
         return None
     its = [
-        (one, target.image, _with_colour(target))
+        (one, target.image, _color_importance(target))
         for one, target in zip(views.bases, views.targets, strict=True)
     ]
     return Gamuts(partial(PaintedLight.of, its), basis.power, basis.present_weights)
 
 
-def _with_colour(target: Target) -> Floats:
-    """(h, w), the importance of what has a colour: not where a channel may be more than it is."""
+def _color_importance(target: Target) -> Floats:
+    """Return the importance (h, w) of pixels whose colour counts: not those that mean "at
+    least"."""
     if target.at_least is None:
         return target.importance
     return np.where(target.at_least.any(axis=-1), np.float32(0), target.importance)
 
 
-def _bases(given: Any) -> list[Basis]:
-    if isinstance(given, Sequence) and given and all(isinstance(x, Basis) for x in given):
-        return list(given)
+def _bases(bases: Any) -> list[Basis]:
+    if isinstance(bases, Sequence) and bases and all(isinstance(x, Basis) for x in bases):
+        return list(bases)
     raise BasisError(
-        f"the basis is a {type(given).__name__}: give what render_basis or read_basis returns, or "
+        f"the basis is a {type(bases).__name__}: give what render_basis or read_basis returns, or "
         "the .basis of light groups"
     )
 

@@ -1,7 +1,7 @@
-"""A linear problem by its sums alone: M, b and norms, without the images that they are sums of.
+"""Linear problems by their sums alone: M, b and norms, without images.
 
-Where a painting is taken at its word in linear light, nothing else is asked of a basis. Sums of
-parts of a picture add, so that whoever has a part of the basis need not show it.
+A literal fit in linear light needs nothing else of a basis. Sums of parts of a picture add, so that
+each machine can sum its part of the basis and send no image.
 """
 
 from dataclasses import dataclass
@@ -14,16 +14,16 @@ from lightpaint.basis.lights import Lights
 from lightpaint.errors import TargetError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.fit import Fit, meant_by, resolve_fit
-from lightpaint.lighting.linear_problem import SummedProblem, reduced_by
-from lightpaint.lighting.loss.painting import left_out
+from lightpaint.lighting.fit import Fit, resolve_fit, resolve_for_targets
+from lightpaint.lighting.linear_problem import SummedProblem, reduce_lights
+from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.target.target import Target
 
 
 @dataclass(frozen=True)
 class Sums:
-    """Of a part of a picture. power: (n, 3), as of `Basis`."""
+    """Sums over a part of a picture. power: (n, 3), see `Basis`."""
 
     equations: NormalEquations
     power: Doubles
@@ -32,14 +32,14 @@ class Sums:
         return Sums(self.equations + other.equations, self.power + other.power)
 
 
-def why_not_by_sums(target: Target, fit: Fit) -> str:
-    """What of a problem its sums do not say; "" if they say it all."""
-    meant = meant_by(fit, [target])
-    if meant.space != "linear":
+def reason_against_sums(target: Target, fit: Fit) -> str:
+    """Return the reason why sums do not suffice for a problem; "" if they do."""
+    resolved = resolve_for_targets(fit, [target])
+    if resolved.space != "linear":
         return "it is fitted as a display shows it"
-    if meant.hold or meant.unpainted:
+    if resolved.hold or resolved.unpainted:
         return "what is not painted is held"
-    if meant.colors == "gentle":
+    if resolved.colors == "gentle":
         return "lights are held to their colours"
     if target.over_look and not fit.literal:
         return "what paint over emitters means depends on what is around them"
@@ -48,25 +48,27 @@ def why_not_by_sums(target: Target, fit: Fit) -> str:
     return ""
 
 
-def sums_of(basis: Basis, target: Target, rows: slice, fit: Fit) -> Sums:
-    """Those of some rows. basis: of these alone; target: of the whole picture."""
-    importance = importance_of(target, basis.emitters_seen, rows, fit)
+def sum_rows(basis: Basis, target: Target, rows: slice, fit: Fit) -> Sums:
+    """Sum over some rows. basis: of these rows alone; target: of the whole picture."""
+    importance = row_importance(target, basis.emitters_seen, rows, fit)
     equations = NormalEquations.of(basis, target.image[rows], importance)
     return Sums(equations, basis.power)
 
 
-def importance_of(target: Target, seen: Bools, rows: slice, fit: Fit) -> Floats:
-    """How much each pixel of some rows counts. seen: (rows, w), where an emitter is seen."""
+def row_importance(target: Target, seen: Bools, rows: slice, fit: Fit) -> Floats:
+    """Return the weight of each pixel of some rows. seen: (rows, w), where an emitter is visible.
+    seen: (rows, w), where an emitter is seen.
+    """
     its = target.importance[rows]
-    if not its.any():  # of which no target can be made
+    if not its.any():  # a target would refuse that
         return its
     part = Target(
         target.name, target.image[rows], its, everything=target.everything, files=target.files
     )
-    return np.where(left_out(part, seen, fit.emitters), np.float32(0), its)
+    return np.where(ignored_paint(part, seen, fit.emitters), np.float32(0), its)
 
 
-def problem_of_sums(
+def summed_problem(
     lights: Lights,
     name: str,
     sums: Sums,
@@ -76,9 +78,9 @@ def problem_of_sums(
     scene_identity: str = "",
     spp: int | None = None,
 ) -> SummedProblem:
-    """Return the problem whose sums these are.
+    """Make the problem that has these sums.
 
-    name: of the target. scene_identity, spp: as of `LinearProblem`. Raises TargetError if nothing
+    name: of the target. scene_identity, spp: see `LinearProblem`. Raises TargetError if no pixel
     counts.
     """
     if not sums.equations.target_norm2.any() and not sums.equations.M.any():
@@ -86,14 +88,14 @@ def problem_of_sums(
             f"target {name}: no light reaches a painted pixel that counts; paint others, too, or "
             'pass emitters="count"'
         )
-    asked, fit = constraints_of(lights.requests).and_then(constraints), resolve_fit(fit)
-    reduction = reduced_by(asked, lights, fit)
+    all_constraints, fit = constraints_of(lights.requests).and_then(constraints), resolve_fit(fit)
+    reduction = reduce_lights(all_constraints, lights, fit)
     return SummedProblem(
         name=name,
         lights=lights,
         power=sums.power,
         equations=sums.equations,
-        constraints=asked,
+        constraints=all_constraints,
         reduction=reduction,
         full=reduction,
         fit=fit,

@@ -1,7 +1,8 @@
-"""What is left of a light that is off: weights that only rounding has made.
+"""Weights of lights that are off, which are round-off.
 
-Where a painting is a mix of the layers in which a light is off, the solve finds 10⁻⁹ of it instead
-of 0, because numbers in a file are rounded. Whoever reads −28 stops takes that for an answer.
+For a painting that is a mix of the layers without a light, the solve finds 10⁻⁹ of that light
+instead of 0, because numbers in a file are rounded. A reader of −28 stops would take that for an
+answer.
 """
 
 import numpy as np
@@ -10,33 +11,35 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 
 #: Largest relative error of one rounding to float16 and to float32.
-HALF, SINGLE = 2.0**-11, 2.0**-24
+HALF_ROUND_OFF, SINGLE_ROUND_OFF = 2.0**-11, 2.0**-24
 
-#: Roundings that may go the same way: those of the painting, the layers and the sum.
+#: Roundings that may add up: those of the painting, the layers and the sum.
 ROUNDINGS = 4
 
-#: A light at more than this share of what it was is on, however little there is to be seen of it.
-LARGEST = 2.0**-11
+#: A light above this share of its present emission is on, however little it shows.
+MAX_TRACE = 2.0**-11
 
 
-def without_traces(basis: Basis, weights: Doubles, image: Floats, *, is_asked: Bools) -> Doubles:
-    """Weights (n, 3) in which what shows in no pixel is 0.
+def remove_traces(
+    basis: Basis, weights: Doubles, image: Floats, *, is_constrained: Bools
+) -> Doubles:
+    """Return weights (n, 3) with 0 for those that show in no pixel.
 
-    is_asked: (n,), the lights of which something is asked, which keep what they have.
+    is_asked: (n,), lights with constraints, whose weights stay.
 
-    A weight is a trace if it is small and what it adds is in no pixel more than rounding makes of
-    the other lights there, or of the picture in the mean where there are none. The numbers are as
-    coarse as those of the painting, `image`, or of the layers: float16 where all of these are.
-    Of a basis that knows its noise nothing is taken: that is larger, and error bars tell it.
+    A weight is a trace if it is small, and its light in each pixel is below the round-off of the
+    other lights there, or of the picture's mean where there are none. Round-off is that of the
+    painting, `image`, or of the layers: of float16 if all of these are.
+    The weights stay for a basis that knows its noise: that is larger, and error bars show it.
     """
-    small = (weights > 0) & (weights <= LARGEST) & ~(basis.is_fixed | is_asked)[:, None]
+    small = (weights > 0) & (weights <= MAX_TRACE) & ~(basis.is_fixed | is_constrained)[:, None]
     if basis.knows_noise or not small.any():
         return weights
-    # What is kept is a difference, and as fine as that comes out.
+    # The fixed part is a difference, with a round-off of its own.
     is_half = _is_half(image) or all(
         _is_half(plane) for k, plane in enumerate(basis.planes) if not basis.is_fixed[k]
     )
-    resolution = ROUNDINGS * (HALF if is_half else SINGLE)
+    resolution = ROUNDINGS * (HALF_ROUND_OFF if is_half else SINGLE_ROUND_OFF)
     mixed = basis.mix(weights)
     size = np.sqrt(np.square(mixed, dtype=np.float64).mean())
     kept = weights.copy()
@@ -48,6 +51,6 @@ def without_traces(basis: Basis, weights: Doubles, image: Floats, *, is_asked: B
 
 
 def _is_half(image: Floats) -> bool:
-    """Whether all numbers of an image are of float16."""
+    """Return whether float16 holds all numbers of an image."""
     with np.errstate(over="ignore"):
         return bool((image.astype(np.float16) == image).all())

@@ -1,4 +1,4 @@
-"""A problem with the lighting that solves it, and what shows that it does."""
+"""A problem with the lighting that solves it, and its certificate."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,13 +26,13 @@ class Solution(Shown):
     """The lighting that comes closest to a target, and the problem it solves.
 
     Attributes:
-        problem: With the squares that stand for its loss where the lighting is, and the lights that
-            `sparse` has chosen.
+        problem: The problem, with the squares that stand for its loss at the lighting, and the
+            lights that `sparse` has chosen.
         lighting: The emission of each light, with its certificate.
-        tried: With `sparse`, numbers of lights and the weights (n, 3) of the best such.
-        reweighting: How these squares came about, where the loss has others elsewhere.
-        whole: Of one of several views, the solution of all of them: the lighting need not be the
-            best for this view.
+        tried: With `sparse`, numbers of lights and the weights (n, 3) of the best ones.
+        reweighting: The history of these squares, for a loss that is not linear.
+        whole: For one of several views, the solution of all of them: the lighting need not be
+            the best for this view.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -58,68 +58,70 @@ class Solution(Shown):
 
     @property
     def reached(self) -> Bools:
-        """(n, 3), in which channels a light reaches anything that counts."""
+        """(n, 3), the channels in which a light reaches anything that counts."""
         return np.array([light.reached for light in self.lighting.lights], dtype=bool)
 
     @property
     def basis(self) -> Basis:
-        """What it was solved with; of several views, of all together."""
+        """The basis of the solve; of several views, of all together."""
         return self.problem.basis
 
     @property
     def image(self) -> Floats:
-        """(h, w, 3), what was solved for."""
+        """(h, w, 3), the goal of the solve."""
         return self.problem.squares.image
 
     @property
     def weight(self) -> Floats:
-        """Of a pixel's squared residual, (h, w, 1), or (h, w, 3) where channels differ."""
+        """(h, w, 1), the weight of a pixel's squared residual; (h, w, 3) where channels differ."""
         return self.problem.squares.weight
 
     @property
     def importance(self) -> Floats:
-        """(h, w), how much a pixel counts; not the target's where unpainted pixels count."""
+        """(h, w), the weight of a pixel; not the target's if unpainted pixels count."""
         return self.problem.loss.importance
 
     @property
     def equations(self) -> NormalEquations:
-        """Of the basis as it is."""
+        """The equations without correction for noise."""
         return self.problem.equations
 
-    def meant(self, predicted: Floats) -> Floats:
-        """What was to be there, (h, w, 3) linear; `predicted` itself where brighter will do."""
-        return self.problem.loss.meant(predicted)
+    def goal(self, predicted: Floats) -> Floats:
+        """Return the goal (h, w, 3), linear: the painting; `predicted` itself where brighter will
+        do.
+        """
+        return self.problem.loss.goal(predicted)
 
     @property
     def norm2(self) -> Doubles:
-        """(3,), what a black picture would miss, to hold the objective against."""
+        """(3,), the loss of a black picture, as a scale for the objective."""
         return self.problem.norm2
 
     @property
     def energy(self) -> float:
-        """What is missed in the problem that `equations` are, all channels together.
+        """The objective of `equations`, all channels together.
 
-        After reweighting that is the last linear one: gains of its solutions are beside this, and
-        not beside the objective in the certificate, which may be that of a display.
+        After reweighting these are the last linear problem: compare gains of its solutions with
+        this, not with the objective in the certificate, which may be that of a display.
         """
         return float(self.equations.objective(self.weights).sum())
 
     @property
     def space(self) -> Space:
-        """In which the prediction was brought close to the painting."""
+        """The space in which prediction and painting were compared."""
         return self.problem.space
 
     @property
     def certificate(self) -> Certificate:
-        """What shows how good the solve is."""
+        """The proof of how good the solve is."""
         assert self.lighting.certificate is not None
         return self.lighting.certificate
 
     def to_dataframe(self) -> Any:
-        """Return what `Lighting.to_dataframe` does, and how each light was.
+        """Return the table of `Lighting.to_dataframe`, with the former emission of each light.
 
-        was_red, was_green, was_blue: its emission in the scene. stops: by how many its luminance
-        changed, -inf for what is off now. Raises LightpaintError without pandas.
+        was_red, was_green, was_blue: its emission in the scene. stops: the change of its
+        luminance, -inf for a light that is off now. Raises LightpaintError without pandas.
         """
         table = self.lighting.to_dataframe()
         was = np.array([light.emission for light in self.basis.lights], np.float64)
@@ -157,22 +159,24 @@ class Solution(Shown):
             attrs={"target": self.problem.name, "space": self.space},
         )
 
-    def told(self, **about: Any) -> "Solution":
-        """The same, with this in its certificate."""
-        certificate = replace(self.certificate, **about)
+    def with_certificate_fields(self, **fields: Any) -> "Solution":
+        """Return the solution with these values in its certificate."""
+        certificate = replace(self.certificate, **fields)
         return replace(self, lighting=self.lighting.with_certificate(certificate))
 
     @cached_property
     def views(self) -> tuple["Solution", ...]:
-        """The answer to each view: its own problem, and what the one lighting misses of it."""
+        """The answer to each view: its own problem, and the error of the one lighting in it."""
         if len(self.problem.views) == 1:
             return (self,)
-        return tuple(self._of_view(k) for k in range(len(self.problem.views)))
+        return tuple(self._view_solution(k) for k in range(len(self.problem.views)))
 
-    def _of_view(self, k: int) -> "Solution":
-        problem = self.problem.of_view(k)
-        lighting = self.lighting.named(problem.name).with_certificate(
+    def _view_solution(self, k: int) -> "Solution":
+        problem = self.problem.view_problem(k)
+        lighting = self.lighting.for_target(problem.name).with_certificate(
             # The error of the joint objective is not this view's.
-            self.certificate.of(problem.objective(self.weights), problem.norm2, error=None)
+            self.certificate.with_objective(
+                problem.objective(self.weights), problem.norm2, error=None
+            )
         )
         return Solution(problem, lighting, self.tried, self.reweighting, self)

@@ -1,8 +1,8 @@
-"""Several views of a scene as one long picture, so that what holds for one holds for all.
+"""Several views of a scene as one long picture, so that methods for one serve all.
 
-A pixel counts the same in whichever view it is, and neither the normal equations nor the noise
-in them asks where a pixel lies. Put behind each other, the pixels of all views are one picture,
-and the solve, its error bars and its refinement need not know of views at all.
+Pixels of all views count the same, and neither the normal equations nor the noise in them depend
+on where a pixel lies. Put behind each other, the pixels of all views are one picture, and the
+solve, its error bars and its refinement need not know of views at all.
 """
 
 from collections.abc import Sequence
@@ -19,15 +19,15 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.screen import some_names
 from lightpaint.target.target import Target
 
-#: Pixels in a row of the long picture. The last row is filled with pixels that count nothing.
-ROW = 2**10
+#: Pixels in a row of the long picture. Pixels without importance fill the last row.
+ROW_PIXELS = 2**10
 
 
 @dataclass(frozen=True)
 class Views:
-    """What is seen of one design: basis and target of each view, and how their pixels lie.
+    """The views of one design: basis and target of each, and the layout of their pixels.
 
-    bases look at the memory of the joint basis, so that every pixel is held once.
+    The bases share the memory of the joint basis, so that every pixel is stored once.
     """
 
     bases: tuple[Basis, ...]
@@ -37,11 +37,13 @@ class Views:
         return len(self.bases)
 
     def join(self, images: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        """Images (h, w, …) of the views as one, (rows, ROW, …); of a single view itself."""
-        return images[0] if len(self) == 1 else in_rows(images)
+        """Join images (h, w, …) of the views into one, (rows, ROW_PIXELS, …); a single view stays
+        as it is.
+        """
+        return images[0] if len(self) == 1 else join_rows(images)
 
     def part(self, joint: npt.NDArray[Any], k: int) -> npt.NDArray[Any]:
-        """View k of what `join` made, (h, w, …), in the same memory."""
+        """Return view k of a joint image, (h, w, …), in the same memory."""
         if len(self) == 1:
             return joint
         height, width = self.bases[k].size
@@ -51,25 +53,25 @@ class Views:
 
 
 def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
-    """The basis of all views together, n long pictures, and the bases again.
+    """Return the basis of all views together, n long pictures, and the bases of the views.
 
-    Those returned look at the memory of the joint one, so that whoever lets go of those given
-    holds every pixel once. Raises BasisError if their lights are not the same.
+    The returned bases share the memory of the joint one: whoever drops the given ones stores every
+    pixel once. Raises BasisError if their lights are not the same.
     """
     first = bases[0]
     if len(bases) == 1:
         return first, (first,)
     for basis in bases[1:]:
         check_same_lights(first, basis)
-    planes, views_planes = joined_planes([basis.planes for basis in bases], ROW)
-    noise, views_noise = joined_planes([basis.noise for basis in bases], ROW)
+    planes, views_planes = joined_planes([basis.planes for basis in bases], ROW_PIXELS)
+    noise, views_noise = joined_planes([basis.noise for basis in bases], ROW_PIXELS)
     joint = replace(
         first,
         planes=planes,
         noise=noise,
-        emitters_seen=in_rows([basis.emitters_seen for basis in bases]),
+        emitters_seen=join_rows([basis.emitters_seen for basis in bases]),
         learned=None,
-        # Of the views, which are shown one by one.
+        # These belong to single views.
         features=None,
         objects=None,
     )
@@ -81,20 +83,20 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
 
 
 def joint_estimate(estimates: Sequence[Estimate]) -> Estimate:
-    """Renders of all views, in the shape of their joint basis."""
+    """Return renders of all views in the shape of their joint basis."""
     if len(estimates) == 1:
         return estimates[0]
     return Estimate(
-        in_rows([estimate.image for estimate in estimates]),
-        in_rows([estimate.half_difference for estimate in estimates]),
+        join_rows([estimate.image for estimate in estimates]),
+        join_rows([estimate.half_difference for estimate in estimates]),
     )
 
 
-def in_rows(images: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-    """(rows, ROW, …) of images (h, w, …), zero where the last row is filled."""
+def join_rows(images: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Return images (h, w, …) as rows of one, (rows, ROW_PIXELS, …), with zeros at the end."""
     pixels = np.concatenate([x.reshape(-1, *x.shape[2:]) for x in images])
-    fill = np.zeros((-len(pixels) % ROW, *pixels.shape[1:]), pixels.dtype)
-    return np.concatenate([pixels, fill]).reshape(-1, ROW, *pixels.shape[1:])
+    fill = np.zeros((-len(pixels) % ROW_PIXELS, *pixels.shape[1:]), pixels.dtype)
+    return np.concatenate([pixels, fill]).reshape(-1, ROW_PIXELS, *pixels.shape[1:])
 
 
 def check_same_lights(a: Basis, b: Basis) -> None:
@@ -108,14 +110,15 @@ def check_same_lights(a: Basis, b: Basis) -> None:
         for what in ("unit", "members", "is_fixed", "is_scalar", "emission"):
             if (its := getattr(one, what)) != (others := getattr(other, what)):
                 raise BasisError(
-                    f"light {one.name!r} has {_spoken(what, its)} in the basis of "
-                    f"{a.origin.sensor} and {_spoken(what, others)} in that of {b.origin.sensor}: "
+                    f"light {one.name!r} has {_describe(what, its)} in the basis of "
+                    f"{a.origin.sensor} and {_describe(what, others)} in that of "
+                    f"{b.origin.sensor}: "
                     "make both of one scene as it is"
                 )
 
 
-def _spoken(what: str, value: Any) -> str:
-    """A property of a light, as a noun."""
+def _describe(what: str, value: Any) -> str:
+    """Return a property of a light as a noun."""
     if what == "is_fixed":
         return "no weight of its own" if value else "a weight of its own"
     if what == "is_scalar":

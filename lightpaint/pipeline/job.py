@@ -20,7 +20,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
-from lightpaint.lighting.fit import meant_by
+from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.pipeline.answer_folder import answer_files
 from lightpaint.pipeline.remarks import (
     remarks_of_film,
@@ -145,7 +145,7 @@ class Job:
         results.check()
         # The only place that sets what was found; frozen afterwards.
         born = vars(self)
-        fit = meant_by(self.settings, [view.target for view in views])
+        fit = resolve_for_targets(self.settings, [view.target for view in views])
         born.update(views=views, asked=asked, fit=fit, results=results)
         born.update(remarks=tuple(self._remarks(targets, scenes)))
 

@@ -30,7 +30,7 @@ from lightpaint.relit.sample_budget import VerificationBudget, verification_budg
 from lightpaint.relit.sequential_verification import verify_in_stages
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import verify
-from lightpaint.report.basis_memo import ahead
+from lightpaint.report.basis_memo import make_ahead
 from lightpaint.report.page.page import prepare_page
 from lightpaint.scene.presets import samples
 from lightpaint.scene.scene import Scene
@@ -68,7 +68,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     )
     if job.settings.report:
         for basis in problem.views.bases:
-            ahead(basis, prepare_page)
+            make_ahead(basis, prepare_page)
     solution = _improved(job, solution_of(problem), listen)
     analyses = analyse(solution)
     lighting, scene = with_findings(solution, analyses).lighting, job.views[0].scene

@@ -23,14 +23,14 @@ from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import verify
-from lightpaint.report.answer_pictures import residual_of, transform_of
+from lightpaint.report.answer_pictures import report_transform, residual_of
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.page.notebook_html import look_html
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
 from lightpaint.report.verdict import verdict
-from lightpaint.report.visible_emitters import emitters_in_view
+from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.scene_render import Stream
 from lightpaint.scene.surfaces import render_features
@@ -121,7 +121,7 @@ class Look:
     @property
     def remarks(self) -> list[str]:
         """What a person should know of emitters in view: painted pixels that do not count."""
-        return emitters_in_view(self.target, self.solution, self.predicted)
+        return emitter_remarks(self.target, self.solution, self.predicted)
 
     @property
     def lighting(self) -> Lighting:
@@ -192,7 +192,7 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
             larger = render_features(film)
     weights, predicted = look.solution.weights, look.predicted.image
     looks = CleanLooks.clean(look.basis, weights, predicted, verified, larger=larger)
-    transform = transform_of(look.target, look.basis, predicted)
+    transform = report_transform(look.target, look.basis, predicted)
     missed = residual_of(look.solution, predicted, transform=transform)
 
     def comparison() -> None:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.planes import mix
 from lightpaint.lighting.algebra.optimum import minimise
-from lightpaint.lighting.analysis.noise.noise import pseudo_inverse, without_noise
+from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.constraints.reduced_problem import ReducedProblem, reduced_problems
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.placement.candidates import Candidates
@@ -111,7 +111,7 @@ class _Solver:
     def __init__(self, candidates: Candidates, images: Floats, noise: Floats) -> None:
         self.reduction = candidates.reduction
         equations = candidates.equations(images)
-        M = without_noise(equations, candidates.equations(noise).M)
+        M = denoised_matrix(equations, candidates.equations(noise).M)
         equations = NormalEquations(M, equations.b, equations.target_norm2)
         self.equations = equations
         if candidates.pull is not None:

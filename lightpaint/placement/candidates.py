@@ -69,7 +69,7 @@ class Candidates:
             np.concatenate([_shares(basis, len(basis.lights)), _shares(added, count)]),
             image,
             importance,
-            _with_free_lights(solution.problem.about_answer, count),
+            _with_free_lights(solution.problem.local_reduction, count),
             _pull(solution, count),
             count,
         )

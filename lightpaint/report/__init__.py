@@ -1,1 +1,3 @@
-"""What a person looks at: pictures, tables and sentences about a result. It solves nothing."""
+"""Report pages, pictures, tables and sentences about a result; this room solves nothing. It solves
+nothing.
+"""

@@ -1,4 +1,4 @@
-"""The pictures that comparison and report show: what was painted, what is missed, and where.
+"""The pictures of comparison and report: the painting, the error, and its place.
 
 All are (h, w, 3) in display values [0, 1]. Pixels that do not count are shown as the
 current look, grey, dim and hatched, so that they cannot be taken for paint.
@@ -34,25 +34,25 @@ FINEST_SCALE = 0.01
 
 #: Pixels on either side over which a residual may be averaged, and the part of its scale that
 #: noise may have then.
-RADII, FAINT = (0, 1, 2, 3, 4, 6, 8), 0.1
+RADII, NOISE_SHARE = (0, 1, 2, 3, 4, 6, 8), 0.1
 
 
-def transform_of(target: Target, basis: Basis, predicted: Floats) -> ViewTransform:
-    """The one transform for all pictures of a result: that of the painting, if it was seen through
-    one.
+def report_transform(target: Target, basis: Basis, predicted: Floats) -> ViewTransform:
+    """Return the one transform for all pictures of a result.
 
-    Else sRGB at an exposure metered on the prediction, whose emitters in view the basis knows.
+    That is the transform of the painting or, without one, sRGB at an exposure metered on the
+    prediction, whose emitters in view the basis knows.
     """
     return target.transform or ViewTransform("srgb", meter_exposure(predicted, basis))
 
 
 def brighter_than_white(image: Floats, transform: ViewTransform) -> float:
-    """Share of the pixels of a linear picture that a display cannot show."""
+    """Return share of the pixels of a linear picture that a display cannot show."""
     return float((image.max(axis=-1) > transform.white).mean())
 
 
 def coverage(importance: Floats) -> Floats:
-    """How much of a pixel to show as painted, (h, w) in [0, 1].
+    """Return the share of each pixel to show as painted, (h, w) in [0, 1].
 
     Importance itself, as alpha; where all of it is below 1, relative to its largest.
     """
@@ -60,13 +60,13 @@ def coverage(importance: Floats) -> Floats:
     return np.clip(importance / min(1.0, largest), 0, 1) if largest > 0 else 0 * importance
 
 
-def painted(target: Target, solution: Solution) -> Floats:
-    """Coverage of what somebody painted and the solve counted, (h, w) in [0, 1]."""
+def painted_coverage(target: Target, solution: Solution) -> Floats:
+    """Return the coverage of paint that the solve counted, (h, w) in [0, 1]."""
     return np.where(solution.importance > 0, coverage(target.importance), 0)
 
 
 def unpainted_look(current: Floats, *, transform: ViewTransform) -> Floats:
-    """The current look as the background of what counts: grey, dim, with diagonal lines."""
+    """Return the current look as the background of what counts: grey, dim, with diagonal lines."""
     height, width = current.shape[:2]
     grey = luminance(transform.encode(current))
     period = max(6, width // 80)
@@ -79,7 +79,7 @@ def unpainted_look(current: Floats, *, transform: ViewTransform) -> Floats:
 def over_unpainted(
     picture: Floats, share: Floats, current: Floats, *, transform: ViewTransform
 ) -> Floats:
-    """A picture, laid over `unpainted_look` by its share of each pixel, (h, w)."""
+    """Return a picture, laid over `unpainted_look` by its share of each pixel, (h, w)."""
     share = share[..., None]
     return np.asarray(share * picture + (1 - share) * unpainted_look(current, transform=transform))
 
@@ -87,17 +87,17 @@ def over_unpainted(
 def target_picture(
     target: Target, solution: Solution, current: Floats, *, transform: ViewTransform
 ) -> Floats:
-    """The painting, laid over the dimmed current look by its importance.
+    """Return the painting, laid over the dimmed current look by its importance.
 
     current: (h, w, 3) linear, the scene as it is. Fully painted pixels are exactly the
     display encoding of the target.
     """
     paint = transform.encode(target.image)
-    return over_unpainted(paint, painted(target, solution), current, transform=transform)
+    return over_unpainted(paint, painted_coverage(target, solution), current, transform=transform)
 
 
 def importance_picture(importance: Floats, current: Floats, *, transform: ViewTransform) -> Floats:
-    """The current look in pale yellow where it counts; dimmed and hatched where not."""
+    """Return the current look in pale yellow where it counts; dimmed and hatched where not."""
     grey = luminance(transform.encode(current))[..., None]
     counted = (0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70])
     most = max(1.0, float(importance.max(initial=0)))
@@ -106,9 +106,9 @@ def importance_picture(importance: Floats, current: Floats, *, transform: ViewTr
 
 @dataclass(frozen=True)
 class Residual:
-    """What is missed, as a map.
+    """The error of the prediction, as a map.
 
-    values: (h, w), luminance of prediction minus what was solved for, in scene units, averaged over
+    values: (h, w), luminance of prediction minus goal, in scene units, averaged over
     (2 radius + 1)² pixels. limit: end of its scale, its 99th percentile where it counts, rounded
     up.
     """
@@ -119,25 +119,25 @@ class Residual:
 
     @property
     def spoken(self) -> str:
-        """`, averaged over 5x5 pixels`, or nothing where it is not."""
+        """The text `, averaged over 5x5 pixels`, or "" without averaging."""
         side = 2 * self.radius + 1
         return f", averaged over {side}x{side} pixels" if self.radius else ""
 
 
 def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransform) -> Residual:
-    """The residual of raw data, averaged over as few pixels as its noise allows.
+    """Return the residual of raw data, averaged over as few pixels as its noise allows.
 
-    That is until the noise's standard deviation is a tenth of the scale, so that what shows is
-    missed and no grain.
+    The average is as wide as it takes for the noise's standard deviation to be a tenth of the
+    scale, so that the map shows the error and no grain.
     """
     counts = (solution.importance > 0).astype(np.float64)
-    exact = luminance(predicted.astype(np.float64) - solution.meant(predicted))
+    exact = luminance(predicted.astype(np.float64) - solution.goal(predicted))
 
     def averaged(radius: int) -> tuple[Floats, float]:
         if radius == 0:
             values = exact
         else:
-            # Only what counts, so that nothing bleeds into paint from beside it.
+            # Only pixels that count, so that nothing bleeds into paint from beside it.
             share = box_mean(counts, radius)
             values = box_mean(exact * counts, radius) / np.where(share > 0, share, 1)
             values = np.where(counts > 0, values, exact)
@@ -148,7 +148,7 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
     spread = float(np.sqrt((np.square(noise) * counts).sum() / max(counts.sum(), 1)))
     if spread == 0:
         return Residual(*averaged(0), 0)
-    aim = FAINT * averaged(RADII[len(RADII) // 2])[1]
+    aim = NOISE_SHARE * averaged(RADII[len(RADII) // 2])[1]
     enough = (radius for radius in RADII if spread <= aim * (2 * radius + 1))
     radius = next(enough, RADII[-1])
     return Residual(*averaged(radius), radius)
@@ -157,20 +157,22 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
 def residual_picture(
     residual: Residual, solution: Solution, current: Floats, *, transform: ViewTransform
 ) -> Floats:
-    """False colours of the residual over its scale, dimmed where it does not count."""
+    """Return false colours of the residual over its scale, dimmed where it does not count."""
     colours = diverging(residual.values / residual.limit)
     return over_unpainted(colours, coverage(solution.importance), current, transform=transform)
 
 
 def diverging(values: Floats) -> Floats:
-    """The colour, (…, 3), of values from −1 to +1; what lies beyond takes the end's."""
+    """Return the false colours, (…, 3), of values from −1 to +1; values beyond get the colours of
+    the ends.
+    """
     places = np.linspace(-1, 1, len(DIVERGING))
     channels = [np.interp(values, places, DIVERGING[:, c]) for c in range(3)]
     return np.stack(channels, axis=-1)
 
 
 def round_up(value: float) -> float:
-    """The next number >= value > 0 of the form 1, 2 or 5 times a power of ten."""
+    """Return the next number >= value > 0 of the form 1, 2 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(value))
     for step in (1, 2, 5):
         # Within round-off, 0.2 is not above 2 x 0.1.
@@ -180,7 +182,7 @@ def round_up(value: float) -> float:
 
 
 def spoken_view(transform: ViewTransform) -> str:
-    """`agx, exposure +1.5 stops`, or nothing where sRGB shows the picture as it is."""
+    """Return `agx, exposure +1.5 stops`, or "" for sRGB as it is."""
     name = [] if transform.name == "srgb" else [transform.name]
     return ", ".join(
         [*name, *([f"exposure {transform.stops:+.1f} stops"] if transform.stops else [])]

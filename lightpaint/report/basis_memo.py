@@ -1,4 +1,4 @@
-"""What pages show of a basis whatever the answer is: made once, and while an answer is sought.
+"""A memo of what pages show of a basis whatever the answer: made once, also ahead of the answer.
 
 Many looks share a basis, and while one is solved a processor is idle now and then.
 """
@@ -15,45 +15,45 @@ from lightpaint.basis.clean import CleanPlanes, clean_planes
 Made = TypeVar("Made")
 
 _lock = Lock()
-#: By the identity of a basis's planes, which views of it share, and what it is.
+#: Results by the identity of a basis's planes, which its views share, and by key.
 _made: dict[int, dict[Hashable, Future[Any]]] = {}
 
 
-def once(basis: Basis, what: Hashable, make: Callable[[], Made]) -> Made:
-    """What `make` makes of `basis`, or has made before; whoever asks meanwhile waits for it."""
+def make_once(basis: Basis, key: Hashable, make: Callable[[], Made]) -> Made:
+    """Return the result of `make`, which runs once for a basis; concurrent callers wait for it."""
     with _lock:
         planes = id(basis.planes)
         if planes not in _made:
             weakref.finalize(basis.planes, _made.pop, planes, None)
             _made[planes] = {}
         its = _made[planes]
-        made = its.get(what)
+        made = its.get(key)
         if made is not None:
             is_mine = False
         else:
-            made, is_mine = its.setdefault(what, Future()), True
+            made, is_mine = its.setdefault(key, Future()), True
     if is_mine:
         try:
             made.set_result(make())
         except BaseException as error:
-            its.pop(what, None)  # the next may have more luck
+            its.pop(key, None)  # the next may have more luck
             made.set_exception(error)
     result: Made = made.result()
     return result
 
 
-def planes_of(basis: Basis) -> CleanPlanes | None:
-    """As of `clean_planes`."""
-    return once(basis, "planes", lambda: clean_planes(basis))
+def cached_clean_planes(basis: Basis) -> CleanPlanes | None:
+    """Return `clean_planes` of a basis, made once."""
+    return make_once(basis, "planes", lambda: clean_planes(basis))
 
 
-def ahead(basis: Basis, makes: Callable[[Basis], object]) -> None:
-    """Begin `makes(basis)` in a thread of its own; what comes of it is there `once` asked for."""
+def make_ahead(basis: Basis, makes: Callable[[Basis], object]) -> None:
+    """Start `makes(basis)` in a thread of its own, so that a later call finds its results."""
 
     def run() -> None:
         try:
             makes(basis)
-        except Exception:  # who asks for it hears of it
+        except Exception:  # a later call raises it again
             return
 
     Thread(target=run, name="lightpaint-ahead").start()

@@ -1,4 +1,4 @@
-"""The pictures of a result as people see them: each denoised once, for all places that show it."""
+"""The pictures of a result for people: each denoised once, for all places that show it."""
 
 from dataclasses import dataclass, field
 
@@ -6,37 +6,40 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.denoiser import DENOISED_KEY, Features, denoised, how_denoised
-from lightpaint.report.basis_memo import planes_of
+from lightpaint.report.basis_memo import cached_clean_planes
 
-#: More lights than this have their thumbnails as they are, which hundreds of them need not wait
-#: for: a thumbnail is small, and averages much of its noise.
-MOST_THUMBNAILS = 64
+#: The most lights whose thumbnails are denoised: for hundreds it would take long, and a thumbnail
+#: is small, and averages much of its noise.
+MAX_CLEAN_THUMBNAILS = 64
 
 
 @dataclass(frozen=True)
 class Encoder(ViewTransform):
-    """A view transform that encodes each picture once, in however many places it is shown.
+    """A view transform that encodes each picture once, wherever it is shown.
 
-    kept: by the identity of a picture, itself and its display values. Pictures must not change.
+    encoded: pictures and their display values, by the identity of the picture, which must not
+    change.
     """
 
-    kept: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, compare=False, repr=False)
+    encoded: dict[int, tuple[Floats, Floats]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     def encode(self, image: Floats) -> Floats:
-        """As of `ViewTransform`; not to be written to."""
-        if id(image) not in self.kept:
+        """Return the display values of `ViewTransform.encode`, read-only."""
+        if id(image) not in self.encoded:
             shown = super().encode(image)
             shown.flags.writeable = False
-            self.kept[id(image)] = image, shown
-        return self.kept[id(image)][1]
+            self.encoded[id(image)] = image, shown
+        return self.encoded[id(image)][1]
 
 
 @dataclass(frozen=True)
 class CleanLooks:
     """Current look, prediction and verification, (h, w, 3) linear.
 
-    verified: None where there is none. texts: what a PNG of them says of itself; none where they
-    are as they were rendered. encoders: what has encoded them.
+    verified: None without one. texts: texts for a PNG of them; none for raw renders. encoders:
+    by transform.
     """
 
     current: Floats
@@ -55,7 +58,7 @@ class CleanLooks:
         *,
         larger: Features | None = None,
     ) -> "CleanLooks":
-        """Without their grain.
+        """Make the looks without their grain.
 
         weights: (n, 3), of which `predicted` is the sum. larger: of a verification that has another
         size than the basis.
@@ -65,7 +68,7 @@ class CleanLooks:
             verified = denoised(verified, larger or features)
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
         texts = how_denoised(features, raw=raw)
-        if (planes := planes_of(basis)) is None:
+        if (planes := cached_clean_planes(basis)) is None:
             shown = denoised(basis.present_look, features), denoised(predicted, features)
         else:
             shown = planes.present, planes.mix(weights)
@@ -73,20 +76,20 @@ class CleanLooks:
 
     @classmethod
     def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "CleanLooks":
-        """As they were rendered."""
+        """Make the looks as they were rendered."""
         present = basis.present_look
         return cls(present, predicted, verified, {})
 
-    def through(self, transform: ViewTransform) -> Encoder:
-        """That view, which encodes what all these places show once."""
+    def encoder(self, transform: ViewTransform) -> Encoder:
+        """Return the encoder of a transform, which encodes each look once for all places."""
         return self.encoders.setdefault(transform, Encoder(transform.name, transform.stops))
 
     @property
     def is_clean(self) -> bool:
-        """Whether they were denoised."""
+        """True if they were denoised."""
         return bool(self.texts)
 
     @property
-    def how(self) -> str:
-        """By what they were denoised, for people."""
+    def denoiser(self) -> str:
+        """Name of the denoiser, for people."""
         return self.texts.get(DENOISED_KEY, "").partition(";")[0]

@@ -16,26 +16,26 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (
     Residual,
     diverging,
+    report_transform,
     residual_of,
     residual_picture,
     spoken_view,
     target_picture,
-    transform_of,
 )
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.target.target import Target
 
 #: Narrower images are enlarged, pixel by pixel, until their captions can be read.
-NARROWEST = 240
-#: Share from which on all is said to be painted, as it is written.
-ALL_OF_IT = 0.9995
+MIN_WIDTH = 240
+#: Share of painted pixels that rounds to all of them.
+WHOLE_SHARE = 0.9995
 #: Pillow's own font has little beyond Latin-1: no minus, no Greek.
 SURROUND, TEXT, FAINT = (38, 38, 38), (230, 230, 230), (165, 165, 165)
 
 
 @dataclass(frozen=True)
 class Tile:
-    """One of the pictures, (h, w, 3) in display values, and what stands below it.
+    """One of the pictures, (h, w, 3) in display values, with the texts below it.
 
     limit: end of its false-colour scale, drawn as a bar, if it has one.
     """
@@ -57,20 +57,19 @@ def comparison_image(
     looks: CleanLooks | None = None,
     missed: Residual | None = None,
 ) -> npt.NDArray[np.uint8]:
-    """The pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
+    """Draw the pictures in a row, (H, W, 3) uint8 sRGB, all at one exposure, with captions.
 
     predicted, verified: (h, w, 3) linear, the latter possibly with a block of pixels for each; what
     is smaller is shown with larger pixels. Three pictures where `verified` is None. The
     residual is false-coloured luminance of prediction minus target, of raw data; pixels that
-    do not count are grey, dim and hatched. seen: what `what_is_seen` says, where somebody has
-    looked. looks: what to show instead of raw renders. missed: what
-    `residual_of` says.
-    Raises SizeError if target and basis differ in size.
+    do not count are grey, dim and hatched. seen: the result of `what_is_seen`, if known. looks:
+    shown instead of raw renders. missed: the result of `residual_of`. Raises SizeError if target
+    and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
     looks = looks or CleanLooks.raw(basis, predicted, verified)
-    transform = looks.through(transform_of(target, basis, predicted))
-    is_part = target.painted_share < ALL_OF_IT
+    transform = looks.encoder(report_transform(target, basis, predicted))
+    is_part = target.painted_share < WHOLE_SHARE
     at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
     tiles = [
         Tile(
@@ -80,7 +79,7 @@ def comparison_image(
         ),
         Tile(
             f"predicted{at}",
-            _in_short(seen or what_is_seen(solution)),
+            _short_verdict(seen or what_is_seen(solution)),
             transform.encode(looks.predicted),
         ),
     ]
@@ -104,14 +103,14 @@ def comparison_image(
 
 
 def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
-    """Tiles in a row on neutral grey, captions below. Returns (H, W, 3).
+    """Draw tiles in a row on neutral grey, captions below. Returns (H, W, 3).
 
     Pixels of the others are whole blocks of those of the largest tile.
     """
     height, width = max(tile.picture.shape[:2] for tile in tiles)
-    zoom = max(1, -(-NARROWEST // width))
+    zoom = max(1, -(-MIN_WIDTH // width))
     height, width = height * zoom, width * zoom
-    # As large beside any picture, but for panoramas, that are low, and what could not be read.
+    # In proportion to the pictures, except for low panoramas, and never too small to read.
     text = gap = max(12, min(width // 24, height // 6))
     lines = 5.5 if any(tile.limit is not None for tile in tiles) else 4
     size = (gap + len(tiles) * (width + gap), gap + height + round(lines * text))
@@ -128,11 +127,12 @@ def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
 def _caption(
     sheet: Image.Image, tile: Tile, corner: tuple[int, int], width: int, text: int
 ) -> None:
-    """A line of title, a smaller one of detail and, for a false-colour picture, one of scale."""
+    """Draw a line of title, a smaller one of detail and, for a false-colour picture, one of
+    scale."""
     (x, y), draw = corner, ImageDraw.Draw(sheet)
     title, small = ImageFont.load_default(text), ImageFont.load_default(round(0.8 * text))
-    draw.text((x, y), fitted(tile.title, title, width), TEXT, title)
-    draw.text((x, y + round(1.5 * text)), fitted(tile.detail, small, width), FAINT, small)
+    draw.text((x, y), shorten_to_width(tile.title, title, width), TEXT, title)
+    draw.text((x, y + round(1.5 * text)), shorten_to_width(tile.detail, small, width), FAINT, small)
     if tile.limit is not None:
         _scale_bar(sheet, tile.limit, (x, y + round(2.9 * text)), width, small)
 
@@ -140,7 +140,8 @@ def _caption(
 def _scale_bar(
     sheet: Image.Image, limit: float, corner: tuple[int, int], width: int, font: Any
 ) -> None:
-    """A bar from −limit to +limit between its ends in words, or in numbers where there is no room.
+    """Draw a bar from −limit to +limit between its ends in words, or in numbers if there is no
+    room.
 
     corner: the upper left one of the line, which is `width` long.
     """
@@ -159,8 +160,8 @@ def _scale_bar(
     draw.text((x + ends[0] + length + 2 * gap, y), high, FAINT, font)
 
 
-def fitted(words: str, font: Any, width: int) -> str:
-    """`words`, cut short with … where they are wider than `width` pixels."""
+def shorten_to_width(words: str, font: Any, width: int) -> str:
+    """Return `words`, cut short with … if they are wider than `width` pixels."""
     if font.getlength(words) <= width:
         return words
     while words and font.getlength(words + "…") > width:
@@ -168,6 +169,6 @@ def fitted(words: str, font: Any, width: int) -> str:
     return words.rstrip() + "…"
 
 
-def _in_short(seen: Seen) -> str:
+def _short_verdict(seen: Seen) -> str:
     how = "close" if seen.is_close else "out of reach" if seen.is_far else "part of the way"
     return f"{how}: mean dE {seen.delta_e:.1f} where painted (noise explains {seen.noise:.1f})"

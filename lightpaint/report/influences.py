@@ -1,39 +1,41 @@
-"""What else than the painting decided an answer, asked for or by default: in words, and as data."""
+"""Influences on an answer besides the painting, by option or by default: in words, and as data."""
 
 from typing import Any
 
 from lightpaint.lighting.solution import Solution
 
 
-def how_it_was_meant(solution: Solution) -> tuple[str, ...]:
-    """Clauses; none where the painting was taken at its word."""
+def fit_clauses(solution: Solution) -> tuple[str, ...]:
+    """Return clauses on the options of the fit; none for a literal fit."""
     certificate, fit = solution.certificate, solution.problem.fit
     used = []
     if certificate.display:
         used.append(f"fitted as the eye sees it ({certificate.display})")
     if fit.unpainted:
-        used.append(f"each pixel that you did not paint counts {fit.unpainted:g}")
+        used.append(f"each unpainted pixel counts {fit.unpainted:g}")
     elif fit.hold:
-        used.append(f"what you did not paint is held ({fit.hold:g})")
+        used.append(f"unpainted parts are held ({fit.hold:g})")
     if fit.colors == "gentle":
-        used.append("lamps are drawn to their own colour (gentle)")
+        used.append("lamps are pulled to their own colour (gentle)")
     elif fit.colors == "white":
         used.append("lamps are white")
     if certificate.noise_removed:
-        used.append("noise is allowed for")
+        used.append("noise is corrected")
     return tuple(used)
 
 
-def spoken_meaning(solution: Solution, *, instead: str = "") -> str:
-    """One sentence. instead: what leaves all of it, after what was used."""
-    if not (used := how_it_was_meant(solution)):
-        return "The painting is taken at its word: linear light, nothing held, any colour."
+def fit_sentence(solution: Solution, *, instead: str = "") -> str:
+    """Return a sentence on the options of the fit. instead: a clause on how to switch them off.
+    instead: what leaves all of it, after what was used.
+    """
+    if not (used := fit_clauses(solution)):
+        return "The painting is fitted literally: linear light, nothing held, any colour."
     said = "; ".join([*used, *([instead] if instead else [])])
     return f"{said[0].upper()}{said[1:]}."
 
 
-def meaning_of(solution: Solution) -> dict[str, Any]:
-    """The same as data. What `Fit` says of them is what was asked, or follows from the painting."""
+def fit_options(solution: Solution) -> dict[str, Any]:
+    """Return the options of the fit as data, resolved by the painting."""
     fit, certificate = solution.problem.fit, solution.certificate
     return {
         "space": solution.space,

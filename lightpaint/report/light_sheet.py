@@ -1,4 +1,4 @@
-"""The contact sheet of a scene's lights: what each does alone, with its name and share."""
+"""The contact sheet of a scene's lights: each light alone, with its name and share."""
 
 from dataclasses import dataclass
 
@@ -12,25 +12,26 @@ from lightpaint.colour.display.srgb import encode_display, to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.report.comparison import fitted
+from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import exposure_of
 from lightpaint.report.sentences import spoken_percent
 from lightpaint.screen import visible
 
-#: More are not shown but counted: those that do least in the picture.
-MOST = 64
+#: The most lights shown; the others, with the smallest shares, are counted.
+MAX_LIGHTS = 64
 
-#: Width of a picture, of so many lights at most; height over width of the sheet that is aimed at.
-WIDTHS, ASPECT = {4: 400, 12: 320, 30: 256, MOST: 208}, 0.62
+#: Widths of a picture by the largest number of lights; height over width of the sheet to aim at.
+WIDTHS, ASPECT = {4: 400, 12: 320, 30: 256, MAX_LIGHTS: 208}, 0.62
 
-#: A dark ground, that no picture is taken for, and what is written on it; edge of the pictures.
+#: A dark ground, unlike any picture, the colours of texts on it, and the edge of pictures.
 GROUND, TEXT, FAINT, EDGE = (24, 24, 26), (226, 226, 226), (142, 142, 146), (44, 44, 48)
 
 
 @dataclass(frozen=True)
 class _Cell:
-    """One light: its picture, (h, w, 3) in display values or None if it does nothing there."""
+    """The cell of a light: its picture, (h, w, 3) in display values, or None if it shows
+    nothing."""
 
     name: str
     share: str
@@ -39,7 +40,8 @@ class _Cell:
 
 @dataclass(frozen=True)
 class _Grid:
-    """Pixels: width and height of a picture, gap between them, height of the words below it."""
+    """The layout in pixels: width and height of a picture, gaps, and height of the words below
+    it."""
 
     width: int
     height: int
@@ -48,7 +50,7 @@ class _Grid:
 
     @property
     def text(self) -> int:
-        return 16 if self.width > WIDTHS[MOST] else 14
+        return 16 if self.width > WIDTHS[MAX_LIGHTS] else 14
 
     @property
     def gap(self) -> int:
@@ -63,36 +65,36 @@ class _Grid:
         return 3 * self.text
 
     def size(self, *, has_foot: bool) -> tuple[int, int]:
-        """(width, height) of the sheet."""
+        """Return (width, height) of the sheet."""
         rows = self.rows * (self.height + self.below + self.gap)
         foot = round(1.8 * self.text) if has_foot else 0
         return self.columns * (self.width + self.gap) + self.gap, self.head + rows + foot
 
     def corner(self, k: int) -> tuple[int, int]:
-        """The upper left one of the picture of that index."""
+        """Return the upper left corner of the picture of that index."""
         row, column = divmod(k, self.columns)
         x = self.gap + column * (self.width + self.gap)
         return x, self.head + row * (self.height + self.below + self.gap)
 
 
 def light_sheet(basis: Basis, *, title: str) -> npt.NDArray[np.uint8]:
-    """What each light does alone, (H, W, 3) uint8 sRGB, denoised, with its name and share.
+    """Draw each light alone, (H, W, 3) uint8 sRGB, denoised, with its name and share.
 
-    At its present emission, or at one that is white if it is off, and exposed so that it shows:
-    what is equally bright in two pictures is not so in the scene. Lights stand in their order; of
-    more than MOST, those that do most in the picture, and a line says what the others do.
+    Each is at its present emission, or at a white one if it is off, with an exposure of its own:
+    brightness does not compare between pictures. Lights stand in their order; of more than MOST,
+    those with the largest shares, and a line tells the share of the others.
     """
     shares = energy_shares(basis, Lighting.present(basis))
-    shown = sorted(np.argsort(-shares, kind="stable")[:MOST].tolist())
+    shown = sorted(np.argsort(-shares, kind="stable")[:MAX_LIGHTS].tolist())
     grid = _grid(len(shown), basis.size)
     factor = max(1, min(basis.size[1] // grid.width, min(basis.size)))
     cells = [_cell(basis, k, float(shares[k]), factor) for k in shown]
-    left = _spoken_rest(shares, shown)
+    left = _rest_sentence(shares, shown)
     sheet = Image.new("RGB", grid.size(has_foot=bool(left)), GROUND)
     draw, large = ImageDraw.Draw(sheet), ImageFont.load_default(round(1.1 * grid.text))
     small = ImageFont.load_default(round(0.9 * grid.text))
     room = sheet.width - 2 * grid.gap
-    head = fitted(visible(title), large, room)
+    head = shorten_to_width(visible(title), large, room)
     baseline = 2 * grid.text
     draw.text((grid.gap, baseline), head, TEXT, large, anchor="ls")
     said = "each alone, exposed by itself; its share of the picture as it is"
@@ -102,12 +104,14 @@ def light_sheet(basis: Basis, *, title: str) -> npt.NDArray[np.uint8]:
         _draw(sheet, cell, grid, grid.corner(k))
     if left:
         y = sheet.height - round(2.2 * grid.text)
-        draw.text((grid.gap, y), fitted(left, small, room), FAINT, small)
+        draw.text((grid.gap, y), shorten_to_width(left, small, room), FAINT, small)
     return np.asarray(sheet)
 
 
 def _cell(basis: Basis, k: int, share: float, factor: int) -> _Cell:
-    """Of light k. factor: of the picture's reduction, which averages much of the noise."""
+    """Draw the cell of light k. factor: of the picture's reduction, which averages much of the
+    noise.
+    """
     light, weight = basis.lights[k], basis.present_weights[k]
     name = light.name if len(light.members) == 1 else f"{light.name} ({len(light.members)})"
     is_off = not weight.any()
@@ -123,8 +127,8 @@ def _cell(basis: Basis, k: int, share: float, factor: int) -> _Cell:
     return _Cell(visible(name), said, encode_display(clean, stops=stops))
 
 
-def _spoken_rest(shares: Doubles, shown: list[int]) -> str:
-    """How many lights are not shown, and what they do; "" if all are."""
+def _rest_sentence(shares: Doubles, shown: list[int]) -> str:
+    """Return the number and share of lights that are not shown; "" if all are."""
     if not (rest := len(shares) - len(shown)):
         return ""
     others = max(1 - float(shares[shown].sum()), 0.0)
@@ -132,11 +136,12 @@ def _spoken_rest(shares: Doubles, shown: list[int]) -> str:
 
 
 def _grid(count: int, size: tuple[int, int]) -> _Grid:
-    """The grid for so many pictures of the (height, width), as near to ASPECT as can be."""
+    """Return the grid for so many pictures of the (height, width), as near to ASPECT as
+    possible."""
     width = next(wide for most, wide in WIDTHS.items() if count <= most)
     # Panoramas and towers have room for their words, and no more than a screen of height.
     height = min(max(round(width * size[0] / size[1]), width // 4), 2 * width)
-    # An empty place counts as much as a sheet that is far too wide.
+    # An empty cell is as bad as a sheet that is far too wide.
     grids = [_Grid(width, height, columns, -(-count // columns)) for columns in range(1, count + 1)]
 
     def off(grid: _Grid) -> float:
@@ -148,7 +153,7 @@ def _grid(count: int, size: tuple[int, int]) -> _Grid:
 
 
 def _draw(sheet: Image.Image, cell: _Cell, grid: _Grid, corner: tuple[int, int]) -> None:
-    """A picture with an edge, and below it the name at the left and the share at the right."""
+    """Draw a picture with an edge, and below it the name at the left and the share at the right."""
     (x, y), draw = corner, ImageDraw.Draw(sheet)
     font, small = (ImageFont.load_default(size) for size in (grid.text, round(0.9 * grid.text)))
     box = (x - 1, y - 1, x + grid.width, y + grid.height)
@@ -165,4 +170,4 @@ def _draw(sheet: Image.Image, cell: _Cell, grid: _Grid, corner: tuple[int, int])
     baseline = y + grid.height + round(1.4 * grid.text)
     draw.text((x + grid.width, baseline), cell.share, FAINT, small, anchor="rs")
     room = grid.width - round(small.getlength(cell.share)) - grid.text
-    draw.text((x, baseline), fitted(cell.name, font, room), TEXT, font, anchor="ls")
+    draw.text((x, baseline), shorten_to_width(cell.name, font, room), TEXT, font, anchor="ls")

@@ -1,4 +1,4 @@
-"""What a result comes to, in numbers: shares of energy, and what is missed as sums of squares."""
+"""Measures of a result: shares of energy, and errors as root mean squares."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from lightpaint.report.page.html import SHOWN, SPARE
 
 
 def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
-    """Share of each light in the predicted image's energy, (n,) float64, in basis order.
+    """Return share of each light in the predicted image's energy, (n,) float64, in basis order.
 
     Energy is luminance Y summed over all pixels, painted or not: Σ Y(w_i Φ_i) over
     Σ_j Σ Y(w_j Φ_j). The shares sum to 1; where every light is off they are all 0.
@@ -23,13 +23,13 @@ def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
 
 
 def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
-    """The same, (n,), now or as solved, whichever is more."""
+    """Return the larger of the present and the solved share of each light, (n,)."""
     present = energy_shares(basis, Lighting.present(basis))
     return np.maximum(energy_shares(basis, lighting), present)
 
 
-def that_do_most(basis: Basis, lighting: Lighting) -> Indices:
-    """The lights that are shown of many, by their place in the basis; of few all of them."""
+def most_visible_lights(basis: Basis, lighting: Lighting) -> Indices:
+    """Return places of the lights to show of many, those with the largest shares; all of few."""
     count = len(basis.lights)
     if count <= SHOWN + SPARE:
         return np.arange(count)
@@ -38,7 +38,7 @@ def that_do_most(basis: Basis, lighting: Lighting) -> Indices:
 
 
 def relative_residual(solution: Solution) -> float:
-    """RMS of what the prediction misses over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
+    """Return the RMS error of the prediction over the RMS of the painting: √(Σ_c E_c / Σ_c ‖Ψ_c‖²).
 
     E_c: objective of channel c; ‖Ψ_c‖² = Σ_pixels D Ψ_c². All channels together, weighted
     by importance; in display space, both of display values. 0 is a perfect match, 1 is what all
@@ -52,7 +52,7 @@ def relative_residual(solution: Solution) -> float:
 
 
 def noise_residual(solution: Solution, predicted: Estimate) -> float:
-    """The part of `relative_residual` that is the basis' own noise, in the same measure."""
+    """Return the part of `relative_residual` that is the basis's own noise."""
     norm2 = _norm2(solution)
     squares = np.square(predicted.half_difference, dtype=np.float64)
     noise2 = float((solution.weight * squares).sum())
@@ -60,17 +60,17 @@ def noise_residual(solution: Solution, predicted: Estimate) -> float:
 
 
 def linear_residual(solution: Solution, predicted: Estimate) -> float:
-    """`relative_residual` as it is in linear light, whatever was fitted."""
+    """Return `relative_residual` in linear light, whatever the space of the fit."""
     D = solution.importance[..., None]
-    meant = solution.meant(predicted.image)
+    meant = solution.goal(predicted.image)
     missed2, norm2 = (
         float((D * np.square(x, dtype=np.float64)).sum()) for x in (meant - predicted.image, meant)
     )
     return float(np.sqrt(missed2 / norm2)) if norm2 > 0 else float(missed2 > 0)
 
 
-def codes_missed(solution: Solution) -> float:
-    """What is missed in display space, RMS over pixels and channels, in codes of 255."""
+def error_in_codes(solution: Solution) -> float:
+    """Return the RMS error in display space over pixels and channels, in codes of 255."""
     mean = sum(solution.certificate.objective) / (3 * float(solution.importance.sum()))
     return 255 * float(np.sqrt(mean))
 
@@ -82,8 +82,10 @@ def _norm2(solution: Solution) -> float:
     return float(weighted.sum())
 
 
-def brighter_as_allowed(solution: Solution, predicted: Floats) -> tuple[int, int] | None:
-    """Pixels painted as at least so bright, and how many of them are brighter; None if none are."""
+def count_at_least_pixels(solution: Solution, predicted: Floats) -> tuple[int, int] | None:
+    """Return the number of "at least" pixels, and of those that are brighter; None if there are
+    none.
+    """
     loss = solution.problem.loss
     counts = (solution.importance > 0)[..., None]
     its, brighter = (loss.exceeds(x) & counts for x in (np.inf, predicted))

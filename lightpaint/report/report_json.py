@@ -1,6 +1,6 @@
 """report.json: the numbers of a report, for programs (docs/formats.md).
 
-What stands in lighting.json, as emissions do, is not repeated. The page rounds; this does not.
+It does not repeat lighting.json, which has the emissions. The page rounds; this file does not.
 """
 
 import json
@@ -17,7 +17,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
+from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
@@ -28,14 +28,14 @@ from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import (
     Residual,
     brighter_than_white,
+    report_transform,
     residual_of,
-    transform_of,
 )
-from lightpaint.report.influences import meaning_of
+from lightpaint.report.influences import fit_options
 from lightpaint.report.measures import (
-    brighter_as_allowed,
-    codes_missed,
+    count_at_least_pixels,
     energy_shares,
+    error_in_codes,
     linear_residual,
     noise_residual,
     relative_residual,
@@ -70,8 +70,8 @@ def report_numbers(
     color_choices: Choices = (),
     missed: Residual | None = None,
 ) -> str:
-    """JSON of the numbers of `report_page`, whose arguments these are."""
-    transform = transform_of(target, basis, predicted.image)
+    """Return the numbers of `report_page`, with its arguments, as JSON."""
+    transform = report_transform(target, basis, predicted.image)
     residual = missed or residual_of(solution, predicted.image, transform=transform)
     told = {
         "format": FORMAT,
@@ -88,14 +88,14 @@ def report_numbers(
             "residual_pixels": 2 * residual.radius + 1,
         },
         "seen": _seen(seen or what_is_seen(solution, predicted)),
-        "meant": meaning_of(solution),
+        "meant": fit_options(solution),
         "colors": {choice.colors: _choice(choice) for choice in color_choices} or None,
         "fit": _fit(solution, predicted, unconstrained),
         "lights": _lights(basis, solution, uncertainty),
         "missed": None if diagnosis is None else _missed(solution, diagnosis, transform),
-        "uncertainty": None if uncertainty is None else _sure(basis, solution, uncertainty),
+        "uncertainty": None if uncertainty is None else _uncertainty(basis, solution, uncertainty),
         "verification": None if verification is None else verification_numbers(verification),
-        "suggestions": _suggested(suggestions, solution.lighting.cd_per_unit),
+        "suggestions": _suggestion_list(suggestions, solution.lighting.cd_per_unit),
     }
     return json.dumps(finite(told), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -126,7 +126,8 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
 
 
 def _seen(seen: Seen) -> dict[str, Any]:
-    """Mean CIEDE2000 over what was painted, and what of that has come about."""
+    """Return the mean CIEDE2000 over the paint, and the share of the request that has come
+    about."""
     place = seen.place
     return {
         "delta_e": seen.delta_e,
@@ -135,25 +136,25 @@ def _seen(seen: Seen) -> dict[str, Any]:
         "share_met": seen.share_met,
         "region": None if place is None else place.region,
         "object": place.object or None if place else None,
-        "held": seen.held or None,
-        "held_by_views": seen.held_by_views or None,
+        "held": seen.limit_groups or None,
+        "held_by_views": seen.limiting_views or None,
         "reasons": [_reason(reason) for reason in seen.reasons] or None,
-        "elsewhere": _elsewhere(seen.elsewhere),
+        "elsewhere": _unpainted(seen.elsewhere),
     }
 
 
 def _reason(reason: Reason) -> dict[str, Any]:
-    """One thing that keeps the lights from the paint, and the share of the miss that it is."""
+    """Return a reason that keeps the lights from the paint, with its share of the error."""
     told: dict[str, Any] = {"kind": reason.kind, "names": reason.names or None}
     told |= {"share": reason.share, "is_joint": reason.is_joint or None}
     if (its := reason.loosening) is not None:
         told |= {"weaker_hold": its.hold, "weaker_hold_share": its.share}
-        told |= {"weaker_hold_elsewhere": _elsewhere(its.elsewhere)}
+        told |= {"weaker_hold_elsewhere": _unpainted(its.elsewhere)}
     return told
 
 
-def _elsewhere(rest: Elsewhere | None) -> dict[str, Any] | None:
-    """Change of what is not painted, in CIEDE2000."""
+def _unpainted(rest: UnpaintedChange | None) -> dict[str, Any] | None:
+    """Return the change of unpainted parts, in CIEDE2000."""
     if rest is None:
         return None
     place = {"object": rest.object} if rest.object else {"region": rest.region}
@@ -161,7 +162,7 @@ def _elsewhere(rest: Elsewhere | None) -> dict[str, Any] | None:
 
 
 def _choice(choice: ColorChoice) -> dict[str, Any]:
-    """What a choice of colours comes to, and the light that it would change most."""
+    """Return the answer of a choice of colours, and the light that it would change most."""
     told: dict[str, Any] = {"delta_e": choice.delta_e}
     if choice.light:
         told |= {"light": choice.light, "before": choice.before, "color": choice.color}
@@ -169,7 +170,9 @@ def _choice(choice: ColorChoice) -> dict[str, Any]:
 
 
 def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
-    """RMS, relative to the painting. norm2: what relative objectives are relative to."""
+    """Return RMS errors relative to the painting. norm2: the scale of relative objectives. norm2:
+    what relative objectives are relative to.
+    """
     told = {
         "missed": relative_residual(solution),
         "noise": noise_residual(solution, predicted),
@@ -183,8 +186,8 @@ def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict
     if not solution.problem.is_linear:
         told["missed_in_linear_light"] = linear_residual(solution, predicted)
     if solution.certificate.display:
-        told["codes_missed"] = codes_missed(solution)
-    if (brighter := brighter_as_allowed(solution, predicted.image)) is not None:
+        told["codes_missed"] = error_in_codes(solution)
+    if (brighter := count_at_least_pixels(solution, predicted.image)) is not None:
         told["at_least"], told["at_least_and_brighter"] = brighter
     return told
 
@@ -196,7 +199,7 @@ def _lights(
     shares, before = (energy_shares(basis, its) for its in (lighting, Lighting.present(basis)))
     told: dict[str, dict[str, Any]] = {}
     for k, (light, setting) in enumerate(zip(basis.lights, lighting.lights, strict=True)):
-        # Of the channels that reach something painted: of the others nothing is told.
+        # Only channels that reach something painted; the others are undetermined.
         told_of = np.array(setting.reached) | light.is_fixed
         now, new = (float(luminance(told_of * np.array(x.emission))) for x in (light, setting))
         told[light.name] = {
@@ -219,7 +222,7 @@ def _lights(
 
 
 def _missed(solution: Solution, d: Diagnosis, transform: ViewTransform) -> dict[str, Any]:
-    """Shares of the energy that is missed."""
+    """Return the shares of the error's energy."""
     told: dict[str, Any] = {
         "energy": d.total,
         "out_of_reach": d.share(d.unreachable),
@@ -230,7 +233,8 @@ def _missed(solution: Solution, d: Diagnosis, transform: ViewTransform) -> dict[
         "not_counted": d.share(d.ignored),
         "map_limit": maps_limit(solution, d, transform=transform),
         "bounds": [
-            {"lights": x.lights, "share": d.gained(x), "multiplier": x.multiplier} for x in d.bounds
+            {"lights": x.lights, "share": d.gain_share(x), "multiplier": x.multiplier}
+            for x in d.bounds
         ],
         "bounds_left_out": d.bounds_left_out,
     }
@@ -240,7 +244,7 @@ def _missed(solution: Solution, d: Diagnosis, transform: ViewTransform) -> dict[
     return told
 
 
-def _sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[str, Any]:
+def _uncertainty(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[str, Any]:
     k = most_uncertain(basis, solution, uncertainty)
     return {
         "excess": uncertainty.relative_excess,
@@ -250,7 +254,7 @@ def _sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[st
 
 
 def verification_numbers(v: Verification) -> dict[str, Any]:
-    """Whether render and prediction agree, and how far they are apart."""
+    """Return whether render and prediction agree, and how far they are apart."""
     height, width = v.verified.size
     return {
         "agrees": v.agrees,
@@ -269,7 +273,7 @@ def verification_numbers(v: Verification) -> dict[str, Any]:
     }
 
 
-def _suggested(
+def _suggestion_list(
     suggestions: Sequence[Suggestion] | None, cd_per_unit: float | None
 ) -> list[dict[str, Any]] | None:
     if suggestions is None:
@@ -283,7 +287,7 @@ def _suggested(
 
 
 def finite(told: Any) -> Any:
-    """The same without what there is none of, and without NumPy's numbers."""
+    """Return the same without missing values, and without NumPy's numbers."""
     if isinstance(told, Mapping):
         held = {key: finite(value) for key, value in told.items()}
         return {key: value for key, value in held.items() if value is not None}

@@ -1,4 +1,4 @@
-"""In plain sentences: how sure the answer is, and why it does not look like the painting."""
+"""Plain sentences on how sure the answer is, and on why it does not look like the painting."""
 
 import re
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE, luminance
 from lightpaint.lighting.analysis.appearance.appearance import Seen
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
-from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place, parts_of_miss
+from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
+from lightpaint.lighting.analysis.diagnosis import Diagnosis, Place, error_shares
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.answer.light_setting import LightSetting
@@ -22,30 +22,30 @@ from lightpaint.screen import some_names, some_of
 
 CHANNELS = ("red", "green", "blue")
 
-#: Where nothing is missed.
-MET = "The lights can do what is painted."
+#: The sentence for an answer without error.
+NO_ERROR = "The lights can make what is painted."
 
-#: Shares of the miss, or of a light, that are too small to speak of.
-SMALL = 0.05
+#: Share of the error, or of a light, that is too small to mention.
+MIN_SHARE = 0.05
 
-#: The same of a light that is switched off: it is easily switched on.
-SMALLER = 0.01
+#: The same for a light that is switched off, which is easily switched on.
+MIN_SWITCHED_OFF_SHARE = 0.01
 
 #: Characters of names in a sentence.
-NAMES = 120
+MAX_NAME_CHARACTERS = 120
 
-#: Of a light whose error says nothing, instead of one: in a table, and in a sentence.
+#: Texts for a light without a meaningful error: in a table, and in a sentence.
 UNTOLD = "cannot be told"
 UNTOLD_HERE = f"{UNTOLD} at these samples"
 
-#: What the painting and the light there must differ by to be called another colour.
-SEEN = 0.06
+#: Difference of painting and light, in chromaticity, that counts as another colour.
+COLOR_SHIFT = 0.06
 
 
 def brightness(uncertainty: Uncertainty) -> tuple[Doubles, Doubles, Doubles]:
-    """Luminance of each light as solved, and the ends of its 95 % interval, (n,) each.
+    """Return the luminance of each light as solved, and the ends of its 95 % interval, (n,) each.
 
-    Of the channels of which something is known.
+    Only known channels count.
     """
     # One path carries all channels, so that their errors go together.
     known = np.isfinite(uncertainty.scatter)
@@ -55,9 +55,9 @@ def brightness(uncertainty: Uncertainty) -> tuple[Doubles, Doubles, Doubles]:
 
 
 def relative_errors(uncertainty: Uncertainty) -> Doubles:
-    """How far the 95 % interval of each light's luminance goes, over its luminance, (n,).
+    """Return the half width of each light's 95 % interval over its luminance, (n,).
 
-    Not finite where the light is off and may be on; 0 where it has no error.
+    It is not finite if the light is off and may be on; 0 without error.
     """
     solved, low, high = brightness(uncertainty)
     side = np.maximum(solved - low, high - solved)
@@ -66,10 +66,10 @@ def relative_errors(uncertainty: Uncertainty) -> Doubles:
 
 
 def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
-    """`± 4 %` of each light; empty if nothing is known of it.
+    """Return `± 4 %` for each light; empty for unknown errors.
 
-    On one side only, `0 … +4 %`, of what is at a limit; `0 … 0.9`, in its unit, of what is off;
-    `cannot be told` of a light of which the samples show nothing but stray pixels.
+    At a limit it has one side, `0 … +4 %`; a light that is off has `0 … 0.9`, in its unit; a light
+    with little but stray pixels in the samples has `cannot be told`.
     """
     if uncertainty is None:
         return [""] * count
@@ -78,13 +78,14 @@ def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
 
 
 def untold_lights(lighting: Lighting) -> str:
-    """A sentence on the lights that cannot be told; "" if there are none."""
+    """Return a sentence on the lights that samples do not determine; "" if there are none."""
     names = [light.name for light in lighting.lights if light.untold]
     if not names:
         return ""
     it = "it" if len(names) == 1 else "them"
     return (
-        f"{spoken_lights(names, start=True)} {UNTOLD_HERE}: little but stray bright pixels is seen "
+        f"{spoken_lights(names, start=True)} {UNTOLD_HERE}: the samples show little but stray "
+        f"bright pixels "
         f"of {it}. Render more samples, or keep {it}."
     )
 
@@ -101,7 +102,7 @@ def _spoken_error(solved: float, low: float, high: float) -> str:
 
 
 def partly_reached(lighting: Lighting) -> list[str]:
-    """A clause for the lights of which some channels reach nothing painted."""
+    """Return a clause for the lights some of whose channels reach nothing painted."""
     by_channels: dict[str, list[str]] = {}
     for light in lighting.lights:
         if light.is_partly_reached:
@@ -113,12 +114,14 @@ def partly_reached(lighting: Lighting) -> list[str]:
 
 
 def unreached_channels(light: LightSetting) -> str:
-    """`green and blue`: the channels of a light that reach nothing that counts."""
+    """Return `green and blue`: the channels of a light that reach nothing that counts."""
     return " and ".join(c for c, told in zip(CHANNELS, light.reached, strict=True) if not told)
 
 
-def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
-    """What more samples would change, of the light whose error changes the picture most."""
+def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
+    """Return a sentence on the light whose error changes the picture most, and on the samples to
+    halve it.
+    """
     k = most_uncertain(basis, solution, uncertainty)
     untold = untold_lights(solution.lighting)
     if k is None and untold:
@@ -140,7 +143,8 @@ def how_sure(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
 
 
 def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> int | None:
-    """The light whose error changes the picture most, of those that can be told; None if none."""
+    """Return the light whose error changes the picture most, if it is determined; None if none
+    is."""
     errors = relative_errors(uncertainty)
     effect = np.where(np.isfinite(errors) & ~uncertainty.untold, errors, 0) * energy_shares(
         basis, solution.lighting
@@ -149,7 +153,7 @@ def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -
 
 
 def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
-    """Samples per pixel at which the error of light k is half of what it is.
+    """Return samples per pixel that halve the error of light k.
 
     Scatter falls with the root of the samples, bias with their number.
     """
@@ -162,62 +166,64 @@ def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
     return int(np.ceil(exact / power) * power) if power >= 1 else int(np.ceil(exact))
 
 
-def what_is_missed(
+def error_sentences(
     diagnosis: Diagnosis, seen: Seen | None = None, *, holds: Sequence[str] | None = None
 ) -> list[str]:
     """Return at most four sentences on why it does not look like the painting, the main one first.
 
-    seen: what `what_is_seen` says, whose reasons go before what holds single lights. holds: other
-    words for what `what_holds` says.
+    seen: the result of `what_is_seen`, whose reasons go before single bounds. holds: instead of the
+    sentences of `bound_sentences`.
     """
     d = diagnosis
-    if not (parts := parts_of_miss(d)):
-        return [MET]
+    if not (parts := error_shares(d)):
+        return [NO_ERROR]
     # What is kept has a bound of its own below.
     which = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
     words = {
-        "unreachable": f"no mix of {which} can reach{while_held(seen)}",
+        "unreachable": f"is out of reach of any mix of {which}{hold_clause(seen)}",
         "forbidden": "would need other limits of the lights or light below zero"
         if d.is_constrained
-        else "only light below zero could",
+        else "would need light below zero",
         "compromise": "is given up for the other views",
         "noise": "is noise of the basis",
-        "painting_noise": noise_of_painting(d),
+        "painting_noise": painting_noise_clause(d),
     }
     shares = [f"{spoken_percent(share)} {words[part]}" for part, share in parts.items()]
     sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
     is_told = seen is not None and seen.place is not None  # by the headline
-    if d.place is not None and not is_told and d.share(d.unreachable) >= SMALL:
+    if d.place is not None and not is_told and d.share(d.unreachable) >= MIN_SHARE:
         sentences.append(spoken_place(d.place))
-    return [*sentences, *(what_holds(d, seen) if holds is None else holds)]
+    return [*sentences, *(bound_sentences(d, seen) if holds is None else holds)]
 
 
-def while_held(seen: Seen | None) -> str:
-    """Return ` while the rest is held` where that keeps the lights from the paint, else ""."""
+def hold_clause(seen: Seen | None) -> str:
+    """Return ` while the rest is held` if that keeps the lights from the paint, else ""."""
     is_held = seen is not None and any(reason.kind == "hold" for reason in seen.reasons)
     return " while the rest is held" if is_held else ""
 
 
-def what_holds(diagnosis: Diagnosis, seen: Seen | None = None) -> list[str]:
-    """Return at most two sentences on what holds the lights, what would bring most first.
+def bound_sentences(diagnosis: Diagnosis, seen: Seen | None = None) -> list[str]:
+    """Return at most two sentences on what holds the lights, the most important first.
 
-    seen: what `what_is_seen` says: the reasons that its headline names are told with their shares,
-    and others only where there are none.
+    seen: the result of `what_is_seen`; its reasons come with their shares, and single bounds only
+    if there are none.
     """
     if seen is not None and seen.reasons:
         told = [spoken_cause(reason) for reason in seen.reasons]
         return [sentence for sentence in told if sentence][:2]
     d = diagnosis
-    most = [bound for bound in d.bounds[:1] if d.gained(bound) >= SMALL]
+    most = [bound for bound in d.bounds[:1] if d.gain_share(bound) >= MIN_SHARE]
     to_switch_on = [
-        bound for bound in d.bounds if bound.is_switched_off and d.gained(bound) >= SMALLER
+        bound
+        for bound in d.bounds
+        if bound.is_switched_off and d.gain_share(bound) >= MIN_SWITCHED_OFF_SHARE
     ]
     its = dict.fromkeys([*most, *to_switch_on[:1]])
-    return [spoken_bound(bound, d.gained(bound)) for bound in its]
+    return [spoken_bound(bound, d.gain_share(bound)) for bound in its]
 
 
-#: What is asked of lights, and what would be without it: of one, and of several.
-WITHOUT = {
+#: Clauses on constraints and their release: for one light, and for several.
+RELEASE_CLAUSES = {
     "off": ("switched off, as asked; switching it on", "switched off, as asked; switching them on"),
     "lock": ("locked; adjusting it", "locked; adjusting them"),
     "limits": ("at a limit; letting go of that", "at their limits; letting go of these"),
@@ -228,31 +234,31 @@ WITHOUT = {
     ),
 }
 
-#: The same of all lights together.
-WITHOUT_ALL = {
-    "colors": 'Lamps are not free in their colour; colors="free"',
-    "sparse": "Only so many lights may be on; allowing more",
-    "prefer_current": "Lights are pulled towards how they are now; leaving them free",
+#: The same for all lights together.
+JOINT_RELEASE_CLAUSES = {
+    "colors": 'Lamps keep their colours; colors="free"',
+    "sparse": "The number of lights is limited; allowing more",
+    "prefer_current": "Lights are pulled towards their present setting; leaving them free",
 }
 
 
 def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
-    """Say what keeps the lights from the paint, and what letting it go would bring; "" of views.
+    """Say what keeps the lights from the paint, and the gain of releasing it; "" for views.
 
-    weaker: what stands before the strength of a weaker hold.
+    weaker: the words before the strength of a weaker hold.
     """
     gained = f"would take away {spoken_percent(reason.share)} of the miss"
     if reason.is_joint:
         gained += ", if the other conditions were lifted too"
-    if reason.kind in WITHOUT:
+    if reason.kind in RELEASE_CLAUSES:
         is_one = len(reason.names) == 1
         lights = spoken_lights(reason.names, start=True) + (" is" if is_one else " are")
-        return f"{lights} {WITHOUT[reason.kind][not is_one]} {gained}."
-    if reason.kind in WITHOUT_ALL:
-        return f"{WITHOUT_ALL[reason.kind]} {gained}."
+        return f"{lights} {RELEASE_CLAUSES[reason.kind][not is_one]} {gained}."
+    if reason.kind in JOINT_RELEASE_CLAUSES:
+        return f"{JOINT_RELEASE_CLAUSES[reason.kind]} {gained}."
     if reason.kind == "views":
         return ""
-    held = "What is not painted is held near how it is;"
+    held = "Unpainted parts are held near their present look;"
     if (loosening := reason.loosening) is None:
         return f"{held} letting it go {gained}."
     share, rest = spoken_percent(loosening.share), loosening.elsewhere
@@ -260,46 +266,46 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
     return f"{held} {weaker} {loosening.hold:g} would take away {share} of the miss{cost}."
 
 
-def spoken_changed(rest: Elsewhere) -> str:
-    """Say what changes most of what is not painted, and how much: `the annex by ΔE 12`."""
+def spoken_changed(rest: UnpaintedChange) -> str:
+    """Say which unpainted part changes most, and by how much: `the annex by ΔE 12`."""
     return f"{spoken_part(rest)} by ΔE {spoken_amount(rest.worst)}"
 
 
-def spoken_elsewhere(rest: Elsewhere | None) -> str:
-    """Say `What is not painted changes too, most of all the annex, by ΔE 12.`; "" for None."""
-    return f"What is not painted changes too, most of all {_spoken_most(rest)}." if rest else ""
+def spoken_elsewhere(rest: UnpaintedChange | None) -> str:
+    """Say `Unpainted parts change too, most of all the annex, by ΔE 12.`; "" for None."""
+    return f"Unpainted parts change too, most of all {_spoken_most(rest)}." if rest else ""
 
 
-def _spoken_most(rest: Elsewhere) -> str:
+def _spoken_most(rest: UnpaintedChange) -> str:
     its = spoken_part(rest) if rest.object else spoken_ninth(rest.region)
     return f"{its}, by ΔE {spoken_amount(rest.worst)}"
 
 
-def spoken_part(rest: Elsewhere) -> str:
-    """Name what changes most: `the annex`, or what is in that part of the picture."""
+def spoken_part(rest: UnpaintedChange) -> str:
+    """Name the part that changes most: `the annex`, or a region of the picture."""
     if not rest.object:
         return f"what is {spoken_ninth(rest.region)}"
     return f"the {some_names([rest.object.replace('_', ' ').strip()])}"
 
 
 def spoken_amount(delta_e: float) -> str:
-    """Return a ΔE as it is said: `0.4`, `12`."""
+    """Return a ΔE in words: `0.4`, `12`."""
     return f"{delta_e:.0f}" if delta_e >= 9.5 else f"{delta_e:.1f}"
 
 
-def noise_of_painting(diagnosis: Diagnosis) -> str:
-    """Whose that noise is: where nothing is known of the basis' own, it may be its as well."""
+def painting_noise_clause(diagnosis: Diagnosis) -> str:
+    """Return a clause on noise of the painting, or of the lights' images if that is unknown."""
     if diagnosis.noise > 0:
         return "is noise of the painting, as renders have"
     return "is noise of the painting or of the lights' images"
 
 
 def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
-    """`light key`, `lights key, fill`, or `light_3` alone where that says what it is.
+    """Return `light key`, `lights key, fill`, or `light_3` alone if the name says what it is.
 
-    start: of a sentence. Of very many the first are named, and how many there are.
+    start: of a sentence. Of very many, the first are named, with the number of others.
     """
-    listed = some_of([name or "without a name" for name in names], room=NAMES)
+    listed = some_of([name or "without a name" for name in names], room=MAX_NAME_CHARACTERS)
     if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
         return listed
     word = "light" if len(names) == 1 else "lights"
@@ -307,7 +313,7 @@ def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
 
 
 def spoken_bound(bound: Bound, share: float) -> str:
-    """What holds a light, and which share of the miss that is."""
+    """Return a sentence on a bound that holds a light, with its share of the error."""
     is_one = len(bound.lights) == 1
     lights = spoken_lights(bound.lights, start=True) + (" is" if is_one else " are")
     if bound.kind == "zero":
@@ -326,7 +332,7 @@ def spoken_bound(bound: Bound, share: float) -> str:
         "kept": f"kept as it is; adjusting {it} too",
         "lock": f"locked; adjusting {it}",
         "off": f"switched off, as asked; switching {it} on",
-        "left out": f"left out, as only so many may be on; switching {it} on too",
+        "left out": f"left out, since their number is limited; switching {it} on too",
         "tie": "on one dimmer; adjusting each by itself",
         "limits": f"at a limit ({bound.held_by}); letting go of that",
         "colour": f"held to a colour ({bound.held_by}); any other",
@@ -335,7 +341,7 @@ def spoken_bound(bound: Bound, share: float) -> str:
 
 
 def spoken_hold(bound: Bound) -> str:
-    """What holds a light, in few words; of one at zero, in which channels by where it is felt."""
+    """Return the bound in few words; for a light at zero, with the channels that feel it."""
     if bound.kind == "kept":
         return "kept as it is"
     if bound.kind != "zero":
@@ -349,12 +355,12 @@ def spoken_hold(bound: Bound) -> str:
 
 
 def spoken_region(place: Place) -> str:
-    """`in the middle`, `top left`: where in the picture."""
+    """Return the region of the picture: `in the middle`, `top left`."""
     return spoken_ninth(place.region)
 
 
 def spoken_ninth(region: tuple[int, int]) -> str:
-    """Return the same for a row and a column, 0 to 2 each."""
+    """Return the region of a row and a column, 0 to 2 each."""
     rows, columns = ("top", "middle", "bottom"), ("left", "middle", "right")
     row, column = rows[region[0]], columns[region[1]]
     if row == column == "middle":
@@ -365,14 +371,14 @@ def spoken_ninth(region: tuple[int, int]) -> str:
 
 
 def spoken_where(place: Place) -> str:
-    """`on the statue`, or where in the picture."""
+    """Return `on the statue`, or the region of the picture."""
     if not place.object:
         return spoken_region(place)
     return f"on the {some_names([place.object.replace('_', ' ').strip()])}"
 
 
 def spoken_place(place: Place) -> str:
-    """Where light is missing, and what it lacks."""
+    """Return a sentence on where light is missing, and what it lacks."""
     where = f"{spoken_region(place)} ({spoken_percent(place.share)})"
     change = spoken_difference(place.painted, place.reached)
     return (
@@ -384,7 +390,7 @@ def spoken_place(place: Place) -> str:
 def spoken_difference(
     painted: tuple[float, float, float], reached: tuple[float, float, float]
 ) -> str:
-    """`brighter and bluer`: how a painted colour differs from the one that lights reach."""
+    """Return how a painted colour differs from the one that lights reach: `brighter and bluer`."""
     a, b = np.array(painted), np.maximum(np.array(reached), 0)
     bright_a, bright_b = float(luminance(a)), float(luminance(b))
     words = []
@@ -395,7 +401,7 @@ def spoken_difference(
     if a.sum() > 0 and b.sum() > 0:
         shift = a / a.sum() - b / b.sum()
         most = int(np.argmax(np.abs(shift)))
-        if abs(shift[most]) > SEEN:
+        if abs(shift[most]) > COLOR_SHIFT:
             more, less = ("redder", "greener", "bluer"), ("cooler", "pinker", "yellower")
             words.append(more[most] if shift[most] > 0 else less[most])
     if not words:
@@ -404,5 +410,5 @@ def spoken_difference(
 
 
 def spoken_percent(share: float) -> str:
-    """`0.4 %`, `7 %`, `62 %`."""
+    """Return `0.4 %`, `7 %`, `62 %`."""
     return f"{100 * share:.1f} %" if 0 < share < 0.0095 else f"{100 * share:.0f} %"

@@ -1,4 +1,4 @@
-"""What a result comes to, in sentences: what was painted, and whether the lights make it."""
+"""The verdict on a result, in sentences: whether the lights make what was painted."""
 
 import numpy as np
 
@@ -18,28 +18,28 @@ from lightpaint.report.sentences import (
 )
 from lightpaint.screen import some_names
 
-#: Lights that are seen too little, of which a sentence gives the names.
+#: The most barely visible lights that a sentence names.
 MAX_UNSEEN_NAMES = 2
 
-#: What is asked beside the painting, as what holds the lights back: of one light, and of several.
-HOLDING: dict[str, tuple[str, str]] = {
-    "hold": ("what is not painted is held near how it is",) * 2,
-    "colors": ("lamps are not free in their colour",) * 2,
+#: Clauses on reasons that hold the lights back: for one light, and for several.
+REASON_CLAUSES: dict[str, tuple[str, str]] = {
+    "hold": ("unpainted parts are held near their present look",) * 2,
+    "colors": ("lamps keep their colours",) * 2,
     "off": ("{} is switched off", "{} are switched off"),
     "lock": ("{} is locked", "{} are locked"),
     "limits": ("{} is at a limit", "{} are at their limits"),
     "colour": ("{} is held to a colour", "{} are held to their colours"),
     "tie": ("{} is on a dimmer with others", "{} are on one dimmer"),
-    "sparse": ("only so many lights may be on",) * 2,
-    "prefer_current": ("lights are pulled towards how they are now",) * 2,
+    "sparse": ("the number of lights is limited",) * 2,
+    "prefer_current": ("lights are pulled towards their present setting",) * 2,
     "views": ("view {} asks for other light", "views {} ask for other light"),
 }
 
-#: Names in one clause; of more it says how many.
+#: The most names in one clause; of more it tells the number.
 MAX_NAMES = 3
 
-#: Where no third of what is missed has one cause.
-NO_ONE_CAUSE = "for several reasons, none of which accounts for a third of it"
+#: The clause if no cause has a third of the error.
+NO_MAIN_CAUSE = "for several reasons, none of which accounts for a third of it"
 
 
 @keywords()
@@ -50,13 +50,13 @@ def verdict(
     *,
     seen: Seen | None = None,
 ) -> str:
-    """How near the lights come to what was painted, how far they are, and if a render confirms it.
+    """Return how near the lights come to what was painted, and whether a render confirms it.
 
     Args:
         solution: The answer.
-        predicted: What `combine` makes of it.
-        verification: What `verify` says of that; None where nothing was rendered.
-        seen: What `what_is_seen` says of it, where somebody has looked.
+        predicted: The result of `combine`.
+        verification: The result of `verify`; None without a render.
+        seen: The result of `what_is_seen`, if known.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -85,7 +85,7 @@ def headline(seen: Seen) -> str:
     """
     told = spoken_elsewhere(seen.elsewhere) if seen.changes_elsewhere else ""
     present = f"{spoken_present(seen)} " if seen.is_worse else ""
-    return f"{present}{_of_the_paint(seen)} {told}".rstrip()
+    return f"{present}{_paint_headline(seen)} {told}".rstrip()
 
 
 def spoken_present(seen: Seen) -> str:
@@ -96,33 +96,35 @@ def spoken_present(seen: Seen) -> str:
     )
 
 
-def _of_the_paint(seen: Seen) -> str:
+def _paint_headline(seen: Seen) -> str:
     if seen.is_close and not (seen.is_spot and seen.place):
         return "Close: it looks as painted."
     if seen.place is None:
-        return f"{_manner(seen)}: too much of what was painted is out of reach."
+        return f"{_headline_start(seen)}: too much of what was painted is out of reach."
     if seen.is_far:
         where = spoken_where(seen.place)
         change = spoken_difference(seen.place.painted, seen.place.reached)
         painted = f"{where} it is painted {change} than they make it"
-        return f"{_manner(seen)}: {painted}; {spoken_reason(seen)}."
+        return f"{_headline_start(seen)}: {painted}; {spoken_reason(seen)}."
     state = "is out of reach" if not seen.causes and seen.is_beyond else "is missing"
-    return f"{_manner(seen)} the {spoken_missing(seen)} {state}: {spoken_reason(seen)}."
+    return f"{_headline_start(seen)} the {spoken_missing(seen)} {state}: {spoken_reason(seen)}."
 
 
-def _manner(seen: Seen) -> str:
+def _headline_start(seen: Seen) -> str:
     if seen.is_close:
         return "Close, but"
     if not seen.is_far:
         return "Part of the way, but"
-    # It would not be true of the lights where something else holds them.
+    # "The lights cannot" would not be true if something else holds them.
     if seen.causes or _are_kept(seen):
         return "Other conditions keep the lights from this"
     return "These lights cannot make this" if seen.is_beyond else "The lights do not make this"
 
 
 def spoken_missing(seen: Seen) -> str:
-    """`brighter light on the floor`: what is missed most. Of an answer that has such a place."""
+    """Return the main error as a phrase, `brighter light on the floor`. The answer must have a
+    place. Of an answer that has such a place.
+    """
     assert seen.place is not None
     change = spoken_difference(seen.place.painted, seen.place.reached)
     light = "shade" if is_darker(seen) else "light"
@@ -130,15 +132,15 @@ def spoken_missing(seen: Seen) -> str:
 
 
 def spoken_reason(seen: Seen) -> str:
-    """Say what keeps the lights from the place where most is missed: the main cause first."""
+    """Say what keeps the lights from the worst place: the main cause first."""
     assert seen.place is not None
     if seen.causes:
         *most, last = (spoken_holding(reason) for reason in seen.causes)
         return f"{', '.join(most)}, and {last}" if most else last
     if not seen.is_beyond:
-        return spoken_noise(seen) or NO_ONE_CAUSE
+        return spoken_noise(seen) or NO_MAIN_CAUSE
     if not seen.there:
-        return "no light gets there"
+        return "no light reaches it"
     some, is_one = _spoken_some(seen.there)
     if is_darker(seen):
         return f"{some} {'lights' if is_one else 'light'} it too"
@@ -152,8 +154,8 @@ def spoken_reason(seen: Seen) -> str:
 
 
 def spoken_holding(reason: Reason) -> str:
-    """Say one thing that keeps the lights from the paint: `annex_window is switched off`."""
-    one, several = HOLDING[reason.kind]
+    """Return a reason that keeps the lights from the paint: `annex_window is switched off`."""
+    one, several = REASON_CLAUSES[reason.kind]
     if len(reason.names) > MAX_NAMES and reason.kind == "views":
         return "other views ask for other light"
     if len(reason.names) > MAX_NAMES:
@@ -165,7 +167,7 @@ def spoken_holding(reason: Reason) -> str:
 
 
 def spoken_noise(seen: Seen) -> str:
-    """Say which noise a third of what is missed is; "" where it is less."""
+    """Return a clause on noise, if it is a third of the error; else ""."""
     share = spoken_percent(seen.parts.get(seen.noise_that_counts, 0.0))
     if seen.noise_that_counts == "noise":
         return f"{share} of what is missed is noise of the samples"
@@ -175,32 +177,32 @@ def spoken_noise(seen: Seen) -> str:
 
 
 def _are_kept(seen: Seen) -> bool:
-    """Whether no light does much for the place but what something asked of it holds back."""
+    """Return whether constraints hold back all lights that contribute much to the place."""
     is_short = seen.place is not None and seen.does_much and not is_darker(seen)
     return is_short and bool(seen.there) and set(seen.there) <= set(seen.kept_there)
 
 
 def _spoken_some(names: tuple[str, ...]) -> tuple[str, bool]:
-    """The first two, and whether there is one only."""
+    """Return the first two names, and whether there is only one."""
     return some_names(names[:2], joint=" and "), len(names) == 1
 
 
 def is_darker(seen: Seen) -> bool:
-    """Whether it is painted darker, where most is missed, than the lights make it."""
+    """Return whether the worst place is painted darker than the lights make it."""
     assert seen.place is not None
     painted, reached = (luminance(np.array(x)) for x in (seen.place.painted, seen.place.reached))
     return bool(painted < reached)
 
 
 def spoken_delta_e(seen: Seen, *, known: bool) -> str:
-    """`Mean ΔE 4.2 over what was painted (11.3 as the scene is now; noise explains 0.8)`."""
+    """Return `Mean ΔE 4.2 over what was painted (11.3 as the scene is now; noise explains 0.8)`."""
     noise = f"noise explains {seen.noise:.1f}" if known else "noise included"
     now = f"{seen.asked:.1f} as the scene is now"
     return f"Mean ΔE {seen.delta_e:.1f} over what was painted ({now}; {noise})"
 
 
 def spoken_blindness(verification: Verification) -> str:
-    """Name the lights seen least: `It would probably have missed an error of 5 % in bulb`."""
+    """Name the least detectable lights: `It would probably have missed an error of 5 % in bulb`."""
     unseen, power = verification.unseen, verification.power or {}
     others, more = [name for name in power if name not in unseen], len(unseen) - MAX_UNSEEN_NAMES
     if more > 0 and len(others) <= MAX_UNSEEN_NAMES:
@@ -215,7 +217,7 @@ def spoken_blindness(verification: Verification) -> str:
 
 
 def agreement(verification: Verification | None) -> str:
-    """Whether prediction and verification agree, as a clause with its numbers."""
+    """Return whether prediction and verification agree, as a clause with its numbers."""
     if verification is None:
         return "the prediction is not verified by a render"
     word = "agree within noise" if verification.agrees else "DISAGREE by more than their noise"

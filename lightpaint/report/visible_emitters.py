@@ -1,27 +1,29 @@
-"""What is said of emitters in view: which painted pixels they take out, and how they come out."""
+"""Remarks on emitters in view: the painted pixels that they exclude, and their brightness in the
+answer.
+"""
 
 import numpy as np
 
 from lightpaint.arrays import Bools
 from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.loss.painting import left_out
+from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import some_of
 from lightpaint.target.target import Target
 
-#: Times as bright as painted from which on an emitter that does not count is worth a warning.
-BRIGHTER = 4.0
+#: Ratio to the painted brightness from which an emitter that does not count is worth a warning.
+MIN_RATIO = 4.0
 
-#: Part of the painted energy from which on emitters that count rule the answer.
-MOST = 0.5
+#: Share of the painted energy from which emitters that count dominate the answer.
+DOMINANT_SHARE = 0.5
 
 
-def emitters_in_view(target: Target, solution: Solution, predicted: Estimate) -> list[str]:
-    """Sentences for a person. target: of one view, as it was given to the solve."""
+def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> list[str]:
+    """Return sentences for people. target: of one view, as it was given to the solve."""
     seen = solution.basis.emitters_seen
     painted = target.importance > 0
-    out = left_out(target, seen, solution.problem.fit.emitters)
+    out = ignored_paint(target, seen, solution.problem.fit.emitters)
     if out.any():
         return [
             f"{_share(out, painted)}, and count nothing; "
@@ -35,7 +37,7 @@ def emitters_in_view(target: Target, solution: Solution, predicted: Estimate) ->
     if not counted.any():
         return []
     energy = target.importance[..., None] * np.square(target.image, dtype=np.float64)
-    if (part := energy[counted].sum() / (energy.sum() or 1)) >= MOST:
+    if (part := energy[counted].sum() / (energy.sum() or 1)) >= DOMINANT_SHARE:
         return [
             f"{_share(counted, painted)}, which make up {100 * part:.0f} % of the painted energy "
             'and rule the fit: emitters="skip" leaves them out'
@@ -52,9 +54,9 @@ def _share(some: Bools, painted: Bools) -> str:
 
 
 def _too_bright(target: Target, solution: Solution, predicted: Estimate, out: Bools) -> list[str]:
-    """A warning of lights that come out far brighter than they were painted where they are seen."""
+    """Return a warning of lights that come out far brighter in view than they were painted."""
     basis = solution.basis
-    # Where the painting says at least so bright, no more is too bright.
+    # Where the painting means "at least", nothing is too bright.
     if target.at_least is not None:
         out = out & ~target.at_least.any(axis=-1)
     images = basis.planes.pixels(np.flatnonzero(out)) * solution.weights[:, None].astype(np.float32)
@@ -63,7 +65,7 @@ def _too_bright(target: Target, solution: Solution, predicted: Estimate, out: Bo
     told = []
     for k in np.unique(whose):
         there, wanted = here[whose == k].sum(), np.maximum(meant[whose == k], 0).sum()
-        if there > BRIGHTER * wanted and not basis.is_fixed[k]:
+        if there > MIN_RATIO * wanted and not basis.is_fixed[k]:
             told.append(f"{basis.names[k]} ({_times(float(there), float(wanted))})")
     if not told:
         return []

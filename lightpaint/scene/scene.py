@@ -26,7 +26,7 @@ from lightpaint.scene.lights.emission import EmitterSetting
 from lightpaint.scene.lights.emitters import Emitter, check_emitters, find_emitters, point_emitter
 from lightpaint.scene.lights.light import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights.light_choice import REST, choose_lights
-from lightpaint.scene.lights.lights_file import LightRequests, lights_file_beside, lights_file_for
+from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside, lights_file_for
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_tree import ParsedScene, mitsuba_errors, render_errors
@@ -81,7 +81,7 @@ class Scene(Shown):
     files: tuple[Path, ...]
     content: str
     lights_file: Path | None
-    requests: LightRequests
+    requests: SceneRequests
     _parsed: ParsedScene
 
     def __post_init__(self) -> None:
@@ -184,7 +184,7 @@ class Scene(Shown):
             emitters=emitters,
             lights=lights_of(emitters, members, fixed=[*members][-1:]),
             content=lit_by,
-            requests=LightRequests(),
+            requests=SceneRequests(),
             _parsed=parsed,
         )
 

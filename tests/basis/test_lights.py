@@ -10,11 +10,11 @@ from lightpaint.errors import BasisError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, resolve_fit
-from lightpaint.lighting.linear_problem import reduced_by
+from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem_sums import Sums, problem_of_sums
-from lightpaint.scene.lights.lights_file import LightRequests
+from lightpaint.lighting.problem_sums import Sums, summed_problem
+from lightpaint.scene.lights.lights_file import SceneRequests
 
 
 def lamp(name: str, emission: float = 0.5, **about: bool) -> BasisLight:
@@ -46,13 +46,13 @@ def test_names_do_not_repeat() -> None:
 
 
 def test_a_lighting_and_a_solve_need_no_pixel() -> None:
-    asked = LightRequests({"light": {"b": {"lock": [0.25] * 3}}}, "hall.toml")
+    asked = SceneRequests({"light": {"b": {"lock": [0.25] * 3}}}, "hall.toml")
     lights = Lights((lamp("a"), lamp("b")), asked)
     M = np.tile(np.diag([2.0, 3.0]), (3, 1, 1))
     sums = Sums(NormalEquations(M, np.tile([4.0, 9.0], (3, 1)), np.full(3, 50.0)), np.ones((2, 3)))
-    problem = problem_of_sums(lights, "it", sums, constraints=Constraints(), fit=Fit(literal=True))
+    problem = summed_problem(lights, "it", sums, constraints=Constraints(), fit=Fit(literal=True))
     found = solve_linear(problem, problem.start)
     np.testing.assert_allclose(found.weights, [[2.0] * 3, [0.25] * 3])
     assert found.lighting.weights_for(lights).tolist() == found.weights.tolist()
     assert Lighting.of_weights(lights, found.weights).emission == found.lighting.emission
-    assert len(reduced_by(Constraints(), lights, resolve_fit(Fit())).knobs) == 2
+    assert len(reduce_lights(Constraints(), lights, resolve_fit(Fit())).knobs) == 2

@@ -22,7 +22,7 @@ from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.linear_solve import solve_linear
-from lightpaint.lighting.problem_sums import Sums, problem_of_sums, sums_of, why_not_by_sums
+from lightpaint.lighting.problem_sums import Sums, reason_against_sums, sum_rows, summed_problem
 from lightpaint.lighting.solve import solve
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.target.target import Target
@@ -43,7 +43,7 @@ def cut(basis: Basis, rows: slice) -> Basis:
 def of_sums(basis: Basis, sums: Sums, **asked: Any) -> np.ndarray:
     constraints = asked.pop("constraints", Constraints())
     fit = Fit(literal=True, **asked)
-    problem = problem_of_sums(basis.lights, "it", sums, constraints=constraints, fit=fit)
+    problem = summed_problem(basis.lights, "it", sums, constraints=constraints, fit=fit)
     return solve_linear(problem, problem.start).weights
 
 
@@ -69,8 +69,8 @@ def test_the_lighting_is_that_of_the_whole_basis(
     importance = rng.random((12, 10), np.float32) * (np.arange(12) > 1)[:, None]
     target = Target.of(image, importance.astype(np.float32))
     fit = Fit(literal=True, **{k: v for k, v in asked.items() if k != "constraints"})
-    assert why_not_by_sums(target, fit) == ""
-    first, second = (sums_of(cut(basis, rows), target, rows, fit) for rows in ROWS)
+    assert reason_against_sums(target, fit) == ""
+    first, second = (sum_rows(cut(basis, rows), target, rows, fit) for rows in ROWS)
     expected = solve(basis, target, literal=True, **asked).weights
     # Sums of float64 in another order.
     np.testing.assert_allclose(of_sums(basis, first + second, **asked), expected, atol=1e-9)
@@ -80,15 +80,15 @@ def test_what_needs_pictures_says_so() -> None:
     image = np.ones((4, 4, 3), np.float32)
     target = Target.of(image, np.eye(4))
     for fit in (Fit(), Fit(hold=1.0), Fit(space="display"), Fit(colors="gentle")):
-        assert bool(why_not_by_sums(target, fit)) == (fit != Fit())
+        assert bool(reason_against_sums(target, fit)) == (fit != Fit())
     white = replace(target, at_least=np.ones((4, 4, 3), bool))
-    assert "brighter" in why_not_by_sums(white, Fit(literal=True))
+    assert "brighter" in reason_against_sums(white, Fit(literal=True))
 
 
 def test_where_nothing_counts(make_basis: BasisFactory) -> None:
     basis = make_basis(2, images=np.zeros((2, 12, 10, 3)))
     target = Target.of(np.zeros((12, 10, 3)))
-    sums = sums_of(cut(basis, ROWS[0]), target, ROWS[0], Fit())
+    sums = sum_rows(cut(basis, ROWS[0]), target, ROWS[0], Fit())
     with pytest.raises(TargetError, match="no light reaches"):
         of_sums(basis, sums)
 

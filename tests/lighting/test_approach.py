@@ -14,7 +14,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import lit_pixels, loss, warm_start
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.warm_start import sample
+from lightpaint.lighting.loss.warm_start import sample_pixels
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
@@ -27,9 +27,9 @@ VIEWS = [ViewTransform("srgb"), ViewTransform("agx", 1.0), ViewTransform("filmic
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Samples of 400 pixels, and strips of 500."""
-    monkeypatch.setattr(warm_start, "SAMPLE", 400)
-    monkeypatch.setattr(warm_start, "EACH", 1)
-    monkeypatch.setattr(loss, "STRIP", 500)
+    monkeypatch.setattr(warm_start, "MIN_SAMPLE", 400)
+    monkeypatch.setattr(warm_start, "PIXELS_PER_LIGHT", 1)
+    monkeypatch.setattr(loss, "STRIP_PIXELS", 500)
     return monkeypatch
 
 
@@ -49,7 +49,7 @@ def _random(make_basis: Any, seed: int, *, n: int = 4) -> tuple[Basis, Target]:
 def _alone(few: pytest.MonkeyPatch, *args: Any, **how: Any) -> Solution:
     """By rounds over all pixels alone."""
     with few.context() as patch:
-        patch.setattr(warm_start, "SAMPLE", 10**9)
+        patch.setattr(warm_start, "MIN_SAMPLE", 10**9)
         return solve(*args, **how)
 
 
@@ -172,7 +172,7 @@ def test_a_sample_stands_for_all_and_has_every_light(make_basis: Any, few: Any):
     basis = make_basis(images=images)
     target = Target("t", rng.random((*SIZE, 3)).astype(np.float32), np.ones(SIZE, np.float32), True)
     problem, lit = _lit(basis, target, VIEWS[0])
-    part = sample(lit, np.einsum("cii->ic", problem.equations.M), 400)
+    part = sample_pixels(lit, np.einsum("cii->ic", problem.equations.M), 400)
     assert 350 <= len(part.pixels) <= 450
     assert (part.planes.pixels(slice(None))[3] > 0).any(axis=-1).sum() == 5
     # One drawn of each 400th part: the mean of all, to some 1/400 and the scatter of weights.
@@ -192,7 +192,7 @@ def test_few_pixels_need_no_sample(make_basis: Any, few: Any):
     counted = np.zeros(SIZE, np.float32)
     counted[:10] = 1
     asked: list[int] = []
-    few.setattr(warm_start, "sample", lambda *args: asked.append(1))
+    few.setattr(warm_start, "sample_pixels", lambda *args: asked.append(1))
     solution = solve(basis, replace(target, importance=counted), transform=VIEWS[0])
     assert not asked
     assert solution.certificate.converged
@@ -208,6 +208,6 @@ def test_pixels_that_do_not_count_are_not_looked_at(make_basis: Any, monkeypatch
     other[some == 0] = 1e9
     again = solve(basis, replace(target, image=other), transform=VIEWS[1], hold=0.0, colors="free")
     np.testing.assert_array_equal(again.weights, solution.weights)
-    monkeypatch.setattr(lit_pixels, "FEW_LEFT_OUT", 1.0)
+    monkeypatch.setattr(lit_pixels, "MIN_SKIPPED_SHARE", 1.0)
     whole = solve(basis, target, transform=VIEWS[1], hold=0.0, colors="free")
     np.testing.assert_allclose(whole.weights, solution.weights, rtol=1e-6, atol=1e-9)

@@ -8,10 +8,10 @@ import pytest
 import lightpaint as lp
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.lighting.fit import meant_by
-from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.fit import resolve_for_targets
+from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.loss.emitter_paint import asks_no_less
+from lightpaint.lighting.loss.emitter_paint import find_glow_paint
 
 SIZE = (36, 30)
 FLAME = (slice(16, 19), slice(14, 17))
@@ -46,7 +46,9 @@ def _lantern(basis: Basis, target: lp.Target, **fit: Any) -> tuple[float, float]
     """How bright it comes out, exactly and live, beside the present."""
     exact = lp.solve(basis, target, **fit).weights
     view = LiveView(basis, target.image.copy(), target.importance.copy())
-    live = Live([view], fit=meant_by(lp.Fit(**fit), [target]), constraints=lp.Constraints())
+    live = LiveSolver(
+        [view], fit=resolve_for_targets(lp.Fit(**fit), [target]), constraints=lp.Constraints()
+    )
     weights: Doubles = basis.present_weights
     for _ in range(8):
         weights = live.answer(weights)
@@ -114,7 +116,7 @@ def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
     rng = np.random.default_rng(2)
     image, counts = basis.present_look.copy(), np.zeros(SIZE, np.float32)
     view = LiveView(basis, image, counts)
-    view.see_through(lp.ViewTransform())
+    view.set_transform(lp.ViewTransform())
     view.film(lp.ViewTransform(), 100)
     view.tiles()
     for _ in range(30):
@@ -122,9 +124,9 @@ def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
         region = (slice(top, top + 6), slice(left, left + 6))
         image[region] = rng.choice([0, 0.02, 0.5, 20]) * WARM
         counts[region] = rng.choice([0, 0.3, 1, 10])
-        view.painted(region)
+        view.update(region)
         fresh = LiveView(basis, image, counts)
-        fresh.see_through(lp.ViewTransform())
+        fresh.set_transform(lp.ViewTransform())
         assert (view.counts == fresh.counts).all()
         here, there = (x.film(lp.ViewTransform(), 100).pixels(0.1, None) for x in (view, fresh))
         assert (here.importance == there.importance).all()
@@ -135,4 +137,4 @@ def test_strokes_one_after_the_other_count_as_all_at_once(basis: Basis):
 
 def test_nothing_painted_is_nothing_meant(basis: Basis):
     look, none = basis.present_look, np.zeros(SIZE, np.float32)
-    assert not asks_no_less(look, none, look, basis.emitters_seen, None, dark=0.01).any()
+    assert not find_glow_paint(look, none, look, basis.emitters_seen, None, dark=0.01).any()

@@ -17,11 +17,11 @@ from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
-from lightpaint.lighting.fit import meant_by
-from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.fit import resolve_for_targets
+from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
-from lightpaint.lighting.loss.pixel_bins import binned_pixels, block_side
+from lightpaint.lighting.loss.pixel_bins import bin_pixels, block_side
 
 SCENES = Path(__file__).parent.parent.parent / "scenes"
 FILMS = {"cornell": "32x32", "stage": "80x45", "gallery": "80x45"}
@@ -75,7 +75,9 @@ def _painting(basis: Basis, look: Any, wish: str) -> lp.Target:
 
 def _live(basis: Basis, target: lp.Target) -> Any:
     view = LiveView(basis, target.image.copy(), target.importance.copy())
-    live = Live([view], fit=meant_by(lp.Fit(), [target]), constraints=lp.Constraints())
+    live = LiveSolver(
+        [view], fit=resolve_for_targets(lp.Fit(), [target]), constraints=lp.Constraints()
+    )
     return live.answer(live.answer(basis.present_weights))
 
 
@@ -168,7 +170,7 @@ def test_blocks_cost_what_their_pixels_do(make_basis: Any):
         transform=lp.ViewTransform(),
     )
     views = lp.Problem.of(basis, lp.Target.of(loss.painted.astype(np.float32))).views
-    binned = binned_pixels(views, loss, 2)
+    binned = bin_pixels(views, loss, 2)
     weights = rng.random((2, 3))
     whole = loss.objective(basis.mix(weights))
     assert binned.loss.objective(binned.basis.mix(weights)) == pytest.approx(whole, rel=1e-6)

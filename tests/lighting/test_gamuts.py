@@ -11,8 +11,8 @@ from lightpaint.colour.color_hull import DIRECTIONS, chromaticity
 from lightpaint.colour.white_range import white_range
 from lightpaint.lighting import problem as module
 from lightpaint.lighting.constraints.gamuts import PAINTED_MARGIN
-from lightpaint.lighting.fit import meant_by
-from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.fit import resolve_for_targets
+from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 
 SIZE = (24, 30)
@@ -105,15 +105,15 @@ def test_nor_under_the_brush(make_basis: Any, seed: int, space: Any) -> None:
     basis = _room(make_basis, seed)
     image, weight = basis.present_look.copy(), np.zeros(SIZE, np.float32)
     view = LiveView(basis, image, weight)
-    fit = meant_by(lp.Fit(space=space), [_target(*_painting(basis, WARM))])
-    live = Live([view], fit=fit, constraints=lp.Constraints())
+    fit = resolve_for_targets(lp.Fit(space=space), [_target(*_painting(basis, WARM))])
+    live = LiveSolver([view], fit=fit, constraints=lp.Constraints())
     painted, whole = _painting(basis, WARM)
     answer = basis.present_weights
     for region in (PAINTED, BLACK):
         for row in range(region[0].start, region[0].stop):
             its = slice(row, row + 1), region[1]
             image[its], weight[its] = painted[its], whole[its]
-            view.painted(its)
+            view.update(its)
             answer = live.answer(answer)
             assert _is_white(answer)
 

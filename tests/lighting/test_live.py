@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.fit import Fit, meant_by
-from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.fit import Fit, resolve_for_targets
+from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.loss.painting import weight_of_rest
+from lightpaint.lighting.loss.painting import unpainted_weight_of
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.target.target import Target
@@ -51,7 +51,7 @@ class _Brush:
             self.importance[self.basis.emitters_seen] = 0
         if kind == "erase":
             self.importance[region] = 0
-        self.view.painted(region, with_importance=kind != "colour")
+        self.view.update(region, with_importance=kind != "colour")
 
     @property
     def target(self) -> Target:
@@ -71,12 +71,12 @@ def _painted(make_basis: Any, seed: int, views: int, count: int) -> list[_Brush]
                 brush.view.tiles().equations(1.0)
         if not brush.importance.any():
             brush.importance[10:20, 5:9] = 0.5
-            brush.view.painted((slice(10, 20), slice(5, 9)))
+            brush.view.update((slice(10, 20), slice(5, 9)))
     return brushes
 
 
 def _meant(targets: list[Target], **fit: Any) -> Fit:
-    return meant_by(Fit(**fit), targets)
+    return resolve_for_targets(Fit(**fit), targets)
 
 
 @given(
@@ -92,7 +92,7 @@ def test_sums_under_a_brush_are_those_of_the_whole_problem(
     targets = [brush.target for brush in brushes]
     meant = _meant(targets, space="linear", **fit)
     problem = Problem.of([brush.basis for brush in brushes], targets, fit=meant)
-    rest = weight_of_rest(problem.views, meant)
+    rest = unpainted_weight_of(problem.views, meant)
     live = reduce(add, (brush.view.tiles().equations(rest) for brush in brushes))
     # ‖Ψ‖² is another constant: here paint and rest are two residuals of a pixel, there one.
     for name in ("M", "b"):
@@ -118,10 +118,10 @@ def test_undoing_a_stroke_gives_back_the_bits(make_basis: Any) -> None:
     before, region = brush.view.tiles().equations(0.0), (slice(5, 30), slice(2, 19))
     image, importance = brush.image[region].copy(), brush.importance[region].copy()
     brush.image[region], brush.importance[region] = (1.0, 0.5, 0.2), 1.0
-    brush.view.painted(region)
+    brush.view.update(region)
     stroke = brush.view.tiles().equations(0.0)
     brush.image[region], brush.importance[region] = image, importance
-    brush.view.painted(region)
+    brush.view.update(region)
     undone = brush.view.tiles().equations(0.0)
     for name in SUMS:
         assert getattr(undone, name).tobytes() == getattr(before, name).tobytes()
@@ -139,7 +139,7 @@ def test_the_answer_under_a_brush_is_that_of_a_solve(
     constraints = Constraints.of(light=asked)
     brushes = _painted(make_basis, 5, views, 0)
     meant = _meant([brush.target for brush in brushes], space="linear", **fit)
-    live = Live([brush.view for brush in brushes], fit=meant, constraints=constraints)
+    live = LiveSolver([brush.view for brush in brushes], fit=meant, constraints=constraints)
     rng, answer = np.random.default_rng(3), brushes[0].basis.present_weights
     for _ in range(4):
         for brush in brushes:
@@ -155,7 +155,7 @@ def test_the_answer_under_a_brush_is_that_of_a_solve(
 def test_rounds_under_a_brush_come_to_the_answer_of_a_display(make_basis: Any) -> None:
     [brush] = _painted(make_basis, 8, 1, 5)
     meant = _meant([brush.target], space="display", hold=1.0)
-    live = Live([brush.view], fit=meant, constraints=Constraints())
+    live = LiveSolver([brush.view], fit=meant, constraints=Constraints())
     answer = brush.basis.present_weights
     for _ in range(60):
         answer = live.answer(answer)

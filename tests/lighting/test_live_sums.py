@@ -28,11 +28,11 @@ def test_paint_and_rest_are_those_of_the_whole_picture(
         shape = importance[region].shape
         image[region] = rng.random((*shape, 3))
         importance[region] = most * rng.random(shape) * (over_seen | ~seen[region])
-        tiles.painted(region, with_importance=True)
+        tiles.update(region, with_importance=True)
         made = tiles.equations(2.5)
         left_of_1 = np.where(seen, 0, np.maximum(1 - importance.astype(np.float64), 0))
         paint = NormalEquations.of(basis, image, importance)
-        rest = NormalEquations.of(basis, basis.present_look, left_of_1).times(2.5)
+        rest = NormalEquations.of(basis, basis.present_look, left_of_1).scaled(2.5)
         for name in ("M", "b", "target_norm2"):
             expected = getattr(paint, name) + getattr(rest, name)
             # The present look, and what is left of 1, are in single precision.
@@ -45,7 +45,7 @@ def test_what_was_painted_first_has_the_same_rest(make_basis: Any):
     image, importance = basis.present_look.copy(), np.zeros(SIZE, np.float32)
     before = PaintedTiles(basis, image, importance)
     importance[5:25, 8:40] = rng.random((20, 32))
-    before.painted((slice(5, 25), slice(8, 40)), with_importance=True)
+    before.update((slice(5, 25), slice(8, 40)), with_importance=True)
     after = PaintedTiles(basis, image, importance)
     for name in ("M", "b", "target_norm2"):
         one, other = (getattr(x.equations(1.0), name) for x in (before, after))

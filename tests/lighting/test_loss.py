@@ -30,11 +30,11 @@ class RobustPixels(PixelLoss):
     importance: Doubles
     scale: float
 
-    def at(self, which: Any) -> "RobustPixels":
+    def subset(self, which: Any) -> "RobustPixels":
         return RobustPixels(self.painted[:, which], self.importance[which], self.scale)
 
-    def weighed(self, by: Doubles) -> "RobustPixels":
-        return replace(self, importance=self.importance * by)
+    def scaled(self, factors: Doubles) -> "RobustPixels":
+        return replace(self, importance=self.importance * factors)
 
     def _root(self, x: Doubles) -> Doubles:
         return np.sqrt(1 + np.square((self.painted - x) / self.scale))

@@ -11,9 +11,9 @@ import lightpaint as lp
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import TargetError
 from lightpaint.lighting import problem
-from lightpaint.lighting.fit import HOLD, Fit, meant_by
-from lightpaint.lighting.loss.painting import weight_of_rest
-from lightpaint.lighting.loss.weight_penalty import DIMMEST, GENTLE
+from lightpaint.lighting.fit import DEFAULT_HOLD, Fit, resolve_for_targets
+from lightpaint.lighting.loss.painting import unpainted_weight_of
+from lightpaint.lighting.loss.weight_penalty import COLOR_PULL, MAX_DIMMING
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 
@@ -39,34 +39,34 @@ def _painted(basis: lp.Basis, seed: int = 1, **about: Any) -> lp.Target:
     [
         ({}, ("linear", 0, "free", None)),
         ({"transform": SRGB}, ("linear", 0, "free", None)),
-        ({"over_look": True}, ("linear", HOLD, "gentle", None)),
+        ({"over_look": True}, ("linear", DEFAULT_HOLD, "gentle", None)),
         ({"through_view": True, "transform": SRGB}, ("display", 0, "gentle", SRGB)),
         (
             {"through_view": True, "over_look": True, "transform": SRGB},
-            ("display", HOLD, "gentle", SRGB),
+            ("display", DEFAULT_HOLD, "gentle", SRGB),
         ),
     ],
 )
 def test_what_is_left_open_follows_from_how_it_was_painted(make_basis: Any, about: Any, fit: Any):
     target = _painted(_basis(make_basis), **about)
-    found = meant_by(Fit(), [target])
+    found = resolve_for_targets(Fit(), [target])
     assert (found.space, found.hold, found.colors, found.transform) == fit
-    literal = meant_by(Fit(literal=True), [target])
+    literal = resolve_for_targets(Fit(literal=True), [target])
     assert (literal.space, literal.hold, literal.colors) == ("linear", 0, "free")
     # What is said holds, whatever else is taken at its word.
     said = Fit(space="display", hold=0.7, colors="white", literal=True)
-    assert meant_by(said, [target]) == replace(said, transform=SRGB)
+    assert resolve_for_targets(said, [target]) == replace(said, transform=SRGB)
 
 
 def test_views_of_which_one_was_painted_over_the_look(make_basis: Any):
     basis = _basis(make_basis)
     both = [_painted(basis), _painted(basis, over_look=True)]
-    assert meant_by(Fit(), both).hold == HOLD
+    assert resolve_for_targets(Fit(), both).hold == DEFAULT_HOLD
     agx = lp.ViewTransform("agx")
     seen = [_painted(basis, through_view=True, transform=x) for x in (SRGB, agx)]
     with pytest.raises(TargetError, match=r"srgb at \+0 stops.*transform=\.\.\."):
-        meant_by(Fit(), seen)
-    assert meant_by(Fit(transform=agx), seen).transform == agx
+        resolve_for_targets(Fit(), seen)
+    assert resolve_for_targets(Fit(transform=agx), seen).transform == agx
 
 
 def test_what_is_not_painted_weighs_as_much_as_is_said(make_basis: Any):
@@ -81,7 +81,12 @@ def test_what_is_not_painted_weighs_as_much_as_is_said(make_basis: Any):
     np.testing.assert_allclose(rest.sum(), hold * D.sum(), rtol=1e-6)
     np.testing.assert_allclose(rest, rest.max() * (1 - D), rtol=1e-5, atol=1e-9)
     most = replace(target, importance=np.where(np.arange(10) > 0, 1, D).astype(np.float32))
-    assert weight_of_rest(Problem.of(basis, most).views, meant_by(Fit(hold=50), [most])) == 1
+    assert (
+        unpainted_weight_of(
+            Problem.of(basis, most).views, resolve_for_targets(Fit(hold=50), [most])
+        )
+        == 1
+    )
 
 
 def test_an_untouched_look_is_met_by_the_present_lighting(make_basis: Any):
@@ -112,7 +117,7 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
         missed = target.image - np.einsum("nhwc,nc->hwc", images, w)
         hue = w - (w @ LUMINANCE)[:, None] * colors
         pull = (dimming[:, None] * power * hue**2).sum()
-        return float((D[..., None] * missed**2).sum() + GENTLE * D.mean() * pull)
+        return float((D[..., None] * missed**2).sum() + COLOR_PULL * D.mean() * pull)
 
     bounds, dimming, start = [(0, None)] * present.size, np.ones(4), present.ravel()
     how = {"method": "L-BFGS-B", "options": {"ftol": 1e-15, "maxiter": 5000}}
@@ -121,7 +126,7 @@ def test_colors_are_pulled_as_the_formula_says(make_basis: Any, monkeypatch: pyt
         assert found.success
         before, start = dimming, found.x
         then = np.maximum(found.x.reshape(-1, 3) @ LUMINANCE, 1e-9)
-        dimming = np.clip(present @ LUMINANCE / then, 1, DIMMEST)
+        dimming = np.clip(present @ LUMINANCE / then, 1, MAX_DIMMING)
     dimming = before
     assert dimming.max() > 1.5
     assert cost(solution.weights.ravel()) <= found.fun * (1 + 1e-7)
@@ -165,4 +170,4 @@ def test_the_answer_says_how_it_was_found(make_basis: Any, tmp_path: Any):
     lighting = lp.solve(basis, _painted(basis, over_look=True)).lighting
     lp.write_lighting(tmp_path / "a.json", lighting)
     certificate = lp.read_lighting(tmp_path / "a.json").certificate
-    assert (certificate.hold, certificate.colors) == (HOLD, "gentle")
+    assert (certificate.hold, certificate.colors) == (DEFAULT_HOLD, "gentle")

@@ -24,7 +24,7 @@ from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.lighting.normal_equations import inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import again, solve
+from lightpaint.lighting.solve import solve, solve_again
 from lightpaint.target.target import Target
 
 SIZE = (8, 9)
@@ -133,7 +133,7 @@ def test_the_objective_never_rises(
     plain = solve(basis, replace(target, at_least=None))
     values = [problem.objective(plain.weights).sum()]
     for rounds in range(1, 12):
-        monkeypatch.setattr(reweighted, "ROUNDS", rounds)
+        monkeypatch.setattr(reweighted, "MAX_ROUNDS", rounds)
         solution = solve(basis, target, transform=transform)
         values.append(sum(solution.certificate.objective))
         assert solution.certificate.converged or transform is not None or rounds < 6
@@ -149,7 +149,7 @@ def test_running_out_of_rounds_keeps_what_was_won(
     target, transform = _target(image, importance), ViewTransform("srgb", 2.0)
     asked = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
     problem = solve(basis, target, constraints=asked)
-    monkeypatch.setattr(reweighted, "ROUNDS", 1)
+    monkeypatch.setattr(reweighted, "MAX_ROUNDS", 1)
     solution = solve(basis, target, constraints=asked, transform=transform)
     assert not solution.certificate.converged
     begin = solution.problem.objective(problem.lighting.weights_for(basis)).sum()
@@ -481,7 +481,7 @@ def test_lights_once_chosen_stay_chosen(
     w = solution.lighting.weights_for(basis)
     mix = combine(basis, solution.lighting)
     refined = refine(solution, Estimate(mix.image, 0.5 * mix.half_difference))
-    for found in (again(solution, solution.problem), correct_noise(solution), refined):
+    for found in (solve_again(solution, solution.problem), correct_noise(solution), refined):
         v = found.lighting.weights_for(basis)
         assert v.any(axis=1).tolist() == w.any(axis=1).tolist()
         # Noise of 1e-4 moves nothing further, squares that end where the loss does neither.

@@ -19,7 +19,7 @@ from lightpaint.errors import (
 )
 from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.loss.painting import squares_of
+from lightpaint.lighting.loss.painting import target_squares
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 
@@ -49,7 +49,7 @@ def _seen() -> Any:
 
 def _weighted(basis: Any, target: Target, *, unpainted: float = 0.0) -> tuple[Any, Any]:
     """The image and importance that are solved for."""
-    squares = squares_of(basis, target, unpainted=unpainted)
+    squares = target_squares(basis, target, unpainted=unpainted)
     return squares.image, squares.weight[..., 0]
 
 
@@ -224,7 +224,7 @@ def test_mixing_copies_no_basis(make_basis: Any):
         mixed = basis.mix(basis.present_weights)
         _, mixing = tracemalloc.get_traced_memory()
         tracemalloc.reset_peak()
-        squares_of(basis, target, unpainted=1.0)
+        target_squares(basis, target, unpainted=1.0)
         _, weighting = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

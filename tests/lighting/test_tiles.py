@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lightpaint.errors import SizeError
-from lightpaint.lighting.live.tiles import ROOM, TiledEquations, side_for
+from lightpaint.lighting.live.tiles import MAX_SUM_BYTES, TiledEquations, tile_side
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 
 HEIGHT, WIDTH = 21, 30
@@ -121,9 +121,9 @@ def test_pictures_of_another_size():
 
 @pytest.mark.parametrize(("n", "size"), [(12, (360, 640)), (64, (360, 640)), (256, (1080, 1920))])
 def test_the_sums_of_all_tiles_fit(n: int, size: tuple[int, int]):
-    side = side_for(n, *size)
+    side = tile_side(n, *size)
     tiles = -(-size[0] // side) * -(-size[1] // side)
-    assert 4 * tiles * 3 * (n + 1) ** 2 * 8 <= ROOM or side >= max(size)
+    assert 4 * tiles * 3 * (n + 1) ** 2 * 8 <= MAX_SUM_BYTES or side >= max(size)
 
 
 def test_two_halves_add_up_and_other_lights_do_not():

@@ -9,7 +9,7 @@ from light_groups import pictures
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.round_off import without_traces
+from lightpaint.lighting.round_off import remove_traces
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 
@@ -70,8 +70,11 @@ def test_a_dim_light_beside_a_bright_one_stays_as_it_was():
     """In half floats no pixel shows a candle in the sun; nobody has painted it off."""
     images = pictures(2, size=SIZE) + 1
     images[0] *= 2e3
-    found = without_traces(
-        _basis(images.astype(np.float16)), np.ones((2, 3)), images[0], is_asked=np.zeros(2, bool)
+    found = remove_traces(
+        _basis(images.astype(np.float16)),
+        np.ones((2, 3)),
+        images[0],
+        is_constrained=np.zeros(2, bool),
     )
     assert (found == 1).all()
 
@@ -87,6 +90,6 @@ def test_what_is_asked_is_kept():
 def test_of_a_basis_that_knows_its_noise_nothing_is_taken():
     images = pictures(2, size=SIZE)
     weights = np.array([[1.0] * 3, [1e-12] * 3])
-    how: Any = {"image": images[0], "is_asked": np.zeros(2, bool)}
-    assert (without_traces(_basis(images, spp=8), weights, **how) == weights).all()
-    assert (without_traces(_basis(images), weights, **how)[1] == 0).all()
+    how: Any = {"image": images[0], "is_constrained": np.zeros(2, bool)}
+    assert (remove_traces(_basis(images, spp=8), weights, **how) == weights).all()
+    assert (remove_traces(_basis(images), weights, **how)[1] == 0).all()

@@ -17,7 +17,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.cli.commands.session_options import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.fit import HOLD
+from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint import protocol
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
@@ -115,7 +115,7 @@ def test_an_answer_is_that_of_solve(basis: lp.Basis):
     expected = lp.solve(basis, target, constraints=asked)
     np.testing.assert_array_equal(solution.weights, expected.weights)
     assert solution.space == "display"
-    assert solution.problem.fit.hold == HOLD
+    assert solution.problem.fit.hold == DEFAULT_HOLD
     message = session.accept_solution(snapshot, solution)
     assert message is not None
     assert message.fields["exact"]

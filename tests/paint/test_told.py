@@ -9,7 +9,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.lighting.analysis.appearance.appearance import Seen
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
+from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.paint.protocol import Advice
 from lightpaint.paint.session.answer_messages import (
@@ -36,8 +36,8 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         (
             18.0,
             {"reasons": (HOLD,)},
-            "A first step, 10 %: brighter light on the floor is missing; what is not painted is "
-            "held near how it is. Paint more, or loosen it.",
+            "A first step, 10 %: brighter light on the floor is missing; unpainted parts are "
+            "held near their present look. Paint more, or loosen it.",
         ),
         (
             10.0,
@@ -48,8 +48,8 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         (
             6.0,
             {"reasons": (COLORS, SIDE)},
-            "Most of the way, 70 %: brighter light on the floor is missing; lamps are not "
-            "free in their colour. The settings allow any colour.",
+            "Most of the way, 70 %: brighter light on the floor is missing; lamps keep "
+            "their colours. The settings allow any colour.",
         ),
         (
             8.0,
@@ -61,14 +61,15 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             23.0,
             {"reasons": (HOLD,)},
             "Farther from the paint than it is now, which undo brings back: brighter light on the "
-            "floor is missing; what is not painted is held near how it is. Paint more, or loosen "
+            "floor is missing; unpainted parts are held near their present look. Paint more, or "
+            "loosen "
             "it.",
         ),
         (
             20.0,
             {"reasons": (HOLD,)},
-            "No closer than it is now: brighter light on the floor is missing; what is not "
-            "painted is held near how it is. Paint more, or loosen it.",
+            "No closer than it is now: brighter light on the floor is missing; unpainted "
+            "parts are held near their present look. Paint more, or loosen it.",
         ),
         (
             14.0,
@@ -110,11 +111,12 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
     assert "; annex_window is switched off." in sketch_headline(seen)
     fields = Advice("off", ("annex_window",), closes=0.57, hold=None)
     assert advice(seen) == fields
-    weaker = Loosening(0.8, 0.35, Elsewhere(2.0, 12.0, "annex"))
+    weaker = Loosening(0.8, 0.35, UnpaintedChange(2.0, 12.0, "annex"))
     held = replace(seen, reasons=(replace(HOLD, loosening=weaker),))
     assert advice(held) == Advice("hold", (), closes=0.35, hold=0.8)
     assert spoken_cause(held.reasons[0]) == (
-        "What is not painted is held near how it is; a hold of 0.8 would take away 35 % of the "
+        "Unpainted parts are held near their present look; a hold of 0.8 would take away 35 % of "
+        "the "
         "miss, and change the annex by ΔE 12."
     )
     # Of what takes several, none closes a share by itself.
@@ -125,7 +127,7 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
 
 
 def test_a_preview_says_what_it_brings_and_what_it_costs():
-    annex = Elsewhere(2.0, 12.0, "annex")
+    annex = UnpaintedChange(2.0, 12.0, "annex")
     its = {"delta_e": (17.2, 6.9), "is_at_cost": False}
     told = "Closes 57 % of what is missed (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
     assert preview_text(0.57, annex, **its) == (told, False)
@@ -137,10 +139,12 @@ def test_a_preview_says_what_it_brings_and_what_it_costs():
 
 def test_what_harms_the_rest_is_not_praised():
     """Letting go blew out the annex, and was told as 57 %."""
-    seen = Seen(8.6, 0.0, 20.0, PLACE, there=("lamp",), elsewhere=Elsewhere(19.0, 51.0, "annex"))
+    seen = Seen(
+        8.6, 0.0, 20.0, PLACE, there=("lamp",), elsewhere=UnpaintedChange(19.0, 51.0, "annex")
+    )
     said = sketch_headline(seen)
     assert said.startswith("57 % of the way, at the cost of the annex (ΔE 51): ")
-    mild = sketch_headline(replace(seen, elsewhere=Elsewhere(2.0, 7.0, "annex")))
+    mild = sketch_headline(replace(seen, elsewhere=UnpaintedChange(2.0, 7.0, "annex")))
     assert mild.startswith("About half of the way, 57 %, and changes the annex by ΔE 7.0: ")
 
 
@@ -170,7 +174,7 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
     unseen = replace(analysis, seen=replace(analysis.seen, place=None))
     assert "Most of that out of reach is" in why_not_closer(unseen)[1]
     met = replace(analysis, diagnosis=replace(analysis.diagnosis, missed=0.009))
-    assert why_not_closer(met) == ["The lights can do what is painted."]
+    assert why_not_closer(met) == ["The lights can make what is painted."]
 
 
 @pytest.mark.parametrize("is_asked", [False, True])

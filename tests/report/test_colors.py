@@ -12,7 +12,7 @@ from lightpaint.colour.hue import spoken_hue
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.solve import solve
-from lightpaint.report.influences import meaning_of, spoken_meaning
+from lightpaint.report.influences import fit_options, fit_sentence
 from lightpaint.report.page.color_section import closer_choice, colors_section, spoken_choice
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
@@ -106,10 +106,10 @@ def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, ask
         "verification": None,
         "command": "",
     }
-    said = spoken_meaning(solution)
+    said = fit_sentence(solution)
     assert f'<p class="meant">{said}</p>' in report_page(**how)
     meant = json.loads(report_numbers(**how))["meant"]
-    assert meant == {k: v for k, v in meaning_of(solution).items() if v is not None}
+    assert meant == {k: v for k, v in fit_options(solution).items() if v is not None}
     assert meant["colors"] == asked.get("colors", "free")
     assert meant["hold"] == asked.get("hold", 0)
     expected = {"white": "lamps are white", "free": "any colour"}[meant["colors"]]

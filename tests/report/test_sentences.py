@@ -16,15 +16,15 @@ from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.sentences import (
+    error_sentences,
     halving_spp,
-    how_sure,
     spoken_bound,
     spoken_difference,
     spoken_hold,
     spoken_lights,
     spoken_percent,
     spoken_place,
-    what_is_missed,
+    uncertainty_sentence,
 )
 from lightpaint.target.target import Target
 
@@ -105,34 +105,35 @@ def test_scatter_takes_four_times_the_samples_and_bias_twice(make_basis: Any):
 
 def test_the_light_that_matters_is_named(make_basis: Any):
     basis, solution, found, _ = _solved(make_basis)
-    text = how_sure(basis, solution, found)
+    text = uncertainty_sentence(basis, solution, found)
     assert "More samples would change light" in text
     assert "would halve that" in text
     ends = (found.weights, found.weights)
     quiet = replace(found, scatter=0 * found.scatter, bias=0 * found.bias, interval=ends)
-    assert "change no light" in how_sure(basis, solution, quiet)
+    assert "change no light" in uncertainty_sentence(basis, solution, quiet)
 
 
 def test_the_most_useful_comes_first(make_basis: Any):
     *_, found = _solved(make_basis)
-    first, *rest = what_is_missed(found)
+    first, *rest = error_sentences(found)
     assert first.startswith("Of what is missed (in energy), ")
-    assert "no mix of the lights can reach" in first
+    assert "is out of reach of any mix of the lights" in first
     assert len(rest) <= 3
     met = replace(found, missed=0.009)
-    assert what_is_missed(met) == ["The lights can do what is painted."]
+    assert error_sentences(met) == ["The lights can make what is painted."]
     half = 0.5 * found.total
     held = replace(found, bounds=(_bound("zero", "key", gain=half, multiplier=(0, 1, 1)),))
-    assert "Light key is off in green and blue and still too much" in what_is_missed(held)[-1]
+    assert "Light key is off in green and blue and still too much" in error_sentences(held)[-1]
 
 
 def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
     *_, found = _solved(make_basis)
     seen = Seen(12.0, 0.0, 20.0)
-    assert "no mix of the lights can reach," in what_is_missed(found, seen)[0]
+    assert "is out of reach of any mix of the lights," in error_sentences(found, seen)[0]
     held = replace(seen, reasons=(Reason("hold", (), 0.7),))
     assert (
-        "no mix of the lights can reach while the rest is held," in what_is_missed(found, held)[0]
+        "is out of reach of any mix of the lights while the rest is "
+        "held," in error_sentences(found, held)[0]
     )
 
 
@@ -142,8 +143,11 @@ def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
         (_bound("kept", "rest"), "Light rest is kept as it is; adjusting it too would take away"),
         (_bound("lock", "a"), "Light a is locked; adjusting it would"),
         (_bound("off", "a"), "Light a is switched off, as asked; switching it on would"),
-        (_bound("left out", "a"), "Light a is left out, as only so many may be on; switching it"),
-        (_bound("left out", "a", "b"), "Lights a, b are left out, as only so many may be on"),
+        (
+            _bound("left out", "a"),
+            "Light a is left out, since their number is limited; switching it",
+        ),
+        (_bound("left out", "a", "b"), "Lights a, b are left out, since their number is limited"),
         (_bound("tie", "a", "b"), "Lights a, b are on one dimmer; adjusting each by itself would"),
         (_bound("limits", "a"), "Light a is at a limit (as asked); letting go of that would"),
         (_bound("colour", "a"), "Light a is held to a colour (as asked); any other would"),
@@ -159,21 +163,21 @@ def test_the_switched_off_light_that_would_help_most_is_named(make_basis: Any):
     *_, found = _solved(make_basis)
     shares = {"tie": 0.5, "off": 0.3, "left out": 0.2, "zero": 0.1}
     bounds = [_bound(kind, kind, gain=share * found.total) for kind, share in shares.items()]
-    *_, first, second = what_is_missed(replace(found, bounds=tuple(bounds)))
+    *_, first, second = error_sentences(replace(found, bounds=tuple(bounds)))
     assert "on one dimmer" in first
     assert second == spoken_bound(bounds[1], 0.3)
     assert "30 %" in second
     # If it is what helps most of all, once is enough.
-    alone = what_is_missed(replace(found, bounds=tuple(bounds[1:])))
+    alone = error_sentences(replace(found, bounds=tuple(bounds[1:])))
     assert alone[-1] == second
     assert sum("switched off" in sentence for sentence in alone) == 1
     # It is spoken of where others that would help as little are not.
     little = [replace(bound, gain=0.03 * found.total) for bound in bounds]
-    assert "switched off" in what_is_missed(replace(found, bounds=tuple(little)))[-1]
-    assert "dimmer" not in " ".join(what_is_missed(replace(found, bounds=tuple(little))))
+    assert "switched off" in error_sentences(replace(found, bounds=tuple(little)))[-1]
+    assert "dimmer" not in " ".join(error_sentences(replace(found, bounds=tuple(little))))
     # What hardly helps is not spoken of.
     faint = replace(bounds[1], gain=0.009 * found.total)
-    assert "switched off" not in " ".join(what_is_missed(replace(found, bounds=(faint,))))
+    assert "switched off" not in " ".join(error_sentences(replace(found, bounds=(faint,))))
 
 
 def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
@@ -217,7 +221,9 @@ def test_of_hundreds_of_names_the_first_are_said(make_basis: Any):
 
 def test_a_light_that_is_called_so_is_not_called_twice(make_basis: Any):
     basis, solution, found, _ = _solved(make_basis, names=["light_1", "light_2", "light_3"])
-    assert re.match(r"More samples would change light_\d, ", how_sure(basis, solution, found))
+    assert re.match(
+        r"More samples would change light_\d, ", uncertainty_sentence(basis, solution, found)
+    )
 
 
 def test_names_are_escaped(make_basis: Any):

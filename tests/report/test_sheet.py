@@ -8,14 +8,14 @@ import pytest
 
 from lightpaint.basis.basis import Basis
 from lightpaint.report import light_sheet as drawing
-from lightpaint.report.light_sheet import EDGE, GROUND, MOST, _grid, light_sheet
+from lightpaint.report.light_sheet import EDGE, GROUND, MAX_LIGHTS, _grid, light_sheet
 
 
 def told(sheet: np.ndarray, basis: Basis) -> list[float]:
     """Mean difference from the ground in the picture of each light that has a place."""
-    grid = _grid(min(len(basis.lights), MOST), basis.size)
+    grid = _grid(min(len(basis.lights), MAX_LIGHTS), basis.size)
     found = []
-    for k in range(min(len(basis.lights), MOST)):
+    for k in range(min(len(basis.lights), MAX_LIGHTS)):
         x, y = grid.corner(k)
         inside = sheet[y + 4 : y + grid.height - 4, x + 4 : x + grid.width - 4]
         found.append(float(np.abs(inside.astype(float) - GROUND).mean()))
@@ -37,11 +37,11 @@ def test_every_light_has_its_picture(make_basis: Any, n: int) -> None:
     assert sheet.shape[1] < 2500
     assert min(told(sheet, basis)) > 50
     foot = sheet[-20:].reshape(-1, 3) != GROUND
-    assert foot.any() == (n > MOST)
+    assert foot.any() == (n > MAX_LIGHTS)
 
 
 def test_places_do_not_meet() -> None:
-    for n in range(1, MOST + 1):
+    for n in range(1, MAX_LIGHTS + 1):
         for size in ((9, 16), (16, 9), (1, 100), (100, 1)):
             grid = _grid(n, size)
             assert grid.columns * (grid.rows - 1) < n <= grid.columns * grid.rows

@@ -15,8 +15,8 @@ from lightpaint.basis.file import write_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.appearance.appearance import Seen
-from lightpaint.lighting.analysis.appearance.limiting_reasons import NAMED, Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
+from lightpaint.lighting.analysis.appearance.limiting_reasons import HEADLINE_SHARE, Reason
+from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -41,7 +41,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         (_seen(2.9), "Close: it looks as painted."),
         (
             _seen(2.0, is_spot=True),
-            "Close, but the brighter light in the middle is out of reach: no light gets there.",
+            "Close, but the brighter light in the middle is out of reach: no light reaches it.",
         ),
         (
             _seen(2.0, is_spot=True, there=("lamp", "sun"), does_much=False),
@@ -60,22 +60,22 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         (
             _seen(14.0),
             "These lights cannot make this: in the middle it is painted brighter than they make "
-            "it; no light gets there.",
+            "it; no light reaches it.",
         ),
         (
             _seen(2.8, 3.0, reasons=(Reason("hold"),)),
             "Other conditions keep the lights from this: in the middle it is painted brighter "
-            "than they make it; what is not painted is held near how it is.",
+            "than they make it; unpainted parts are held near their present look.",
         ),
         (
             _seen(5.0, reasons=(Reason("colors"), Reason("lock", ("lamp",)))),
-            "Part of the way, but the brighter light in the middle is missing: lamps are not "
-            "free in their colour, and lamp is locked.",
+            "Part of the way, but the brighter light in the middle is missing: lamps keep their "
+            "colours, and lamp is locked.",
         ),
         (
             _seen(5.0, on="figure_hollow"),
             "Part of the way, but the brighter light on the figure hollow is out of reach: no "
-            "light gets there.",
+            "light reaches it.",
         ),
         (
             _seen(14.0, on="<b>\x1b[1m", there=("lamp",)),
@@ -89,8 +89,8 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(5.0, reasons=(Reason("colors"), Reason("views", ("a", "b")))),
-            "Part of the way, but the brighter light in the middle is missing: lamps are not "
-            "free in their colour, and views a and b ask for other light.",
+            "Part of the way, but the brighter light in the middle is missing: lamps keep their "
+            "colours, and views a and b ask for other light.",
         ),
         (
             _seen(5.0, there=("lamp", "sun", "sky"), kept_there=("lamp", "sun")),
@@ -140,9 +140,9 @@ def test_a_headline_names_no_cause_of_less_than_a_third(part: str, share: float)
     parts = {part: share} | dict.fromkeys(others, (1 - share) / 4)
     said = headline(_seen(5.0, there=("lamp",), parts=parts))
     named = [x for x in PARTS if SAID[x] in said]
-    assert all(parts.get(x, 0) >= NAMED for x in named if x == part)
-    assert (part in named) == (share >= NAMED)
-    assert ("none of which accounts for a third" in said) == (share < NAMED)
+    assert all(parts.get(x, 0) >= HEADLINE_SHARE for x in named if x == part)
+    assert (part in named) == (share >= HEADLINE_SHARE)
+    assert ("none of which accounts for a third" in said) == (share < HEADLINE_SHARE)
 
 
 @pytest.mark.parametrize(("share", "is_named"), [(0.3, False), (0.36, True)])
@@ -154,17 +154,19 @@ def test_a_headline_names_no_reason_of_less_than_a_third(share: float, is_named:
 
 
 def test_what_changes_elsewhere_is_part_of_the_verdict():
-    annex = Elsewhere(19.0, 51.0, "annex")
+    annex = UnpaintedChange(19.0, 51.0, "annex")
     close = _seen(1.0, elsewhere=annex)
-    said = "What is not painted changes too, most of all the annex, by ΔE 51."
+    said = "Unpainted parts change too, most of all the annex, by ΔE 51."
     assert headline(close) == f"Close: it looks as painted. {said}"
     assert headline(_seen(5.0, elsewhere=annex)).endswith(said)
-    corner = Elsewhere(3.0, 7.5, region=(0, 2))
+    corner = UnpaintedChange(3.0, 7.5, region=(0, 2))
     assert headline(_seen(1.0, elsewhere=corner)).endswith(
         "most of all at the top right, by ΔE 7.5."
     )
     # What nobody sees at a glance is not spoken of.
-    assert headline(_seen(1.0, elsewhere=Elsewhere(1.0, 5.0, "annex"))) == headline(_seen(1.0))
+    assert headline(_seen(1.0, elsewhere=UnpaintedChange(1.0, 5.0, "annex"))) == headline(
+        _seen(1.0)
+    )
 
 
 def test_noise_is_no_fault_of_the_lighting():

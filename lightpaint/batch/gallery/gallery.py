@@ -29,7 +29,7 @@ from lightpaint.batch.plan.plan import Plan
 from lightpaint.batch.work.task import Kind
 from lightpaint.files import write_bytes, write_text
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.report.comparison import fitted
+from lightpaint.report.comparison import shorten_to_width
 from lightpaint.screen import visible
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import bundled, styles
@@ -130,7 +130,7 @@ def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
     title = counts_text(rows)
     if len(rows) > MAX_PICTURES:
         title += f"; the first {MAX_PICTURES} are shown"
-    draw.text((GAP, GAP), fitted(title, font, size[0] - 2 * GAP), FAINT, font)
+    draw.text((GAP, GAP), shorten_to_width(title, font, size[0] - 2 * GAP), FAINT, font)
     for k, row in enumerate(shown):
         x = GAP + k % columns * (WIDTH + GAP)
         y = 2 * GAP + CAPTION_HEIGHT + k // columns * (height + CAPTION_HEIGHT + GAP)
@@ -160,4 +160,4 @@ def _draw(
     draw.text((x + width, baseline), text, FAINT, font, anchor="rs")
     room = width - round(font.getlength(text)) - 8
     name = row.look if row.folder == row.look else f"{row.look} {row.sensor}"
-    draw.text((x, baseline), fitted(visible(name), font, room), TEXT, font, anchor="ls")
+    draw.text((x, baseline), shorten_to_width(visible(name), font, room), TEXT, font, anchor="ls")

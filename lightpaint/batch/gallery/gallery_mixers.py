@@ -12,7 +12,7 @@ from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.report.page.mixer import kelvins, told_file, told_transform
+from lightpaint.report.page.mixer import kelvin_colors, lighting_data, transform_data
 
 #: Mixers of a page, at most: each may be two megabytes. Lights of one that have sliders.
 MAX_MIXERS, MAX_LIGHTS = 8, 40
@@ -53,10 +53,10 @@ def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[Su
         "lights": lights,
         "shown": _strongest_lights(record, rows),
         "rest": None,
-        "kelvins": kelvins(),
-        "transform": told_transform(ViewTransform()),
+        "kelvins": kelvin_colors(),
+        "transform": transform_data(ViewTransform()),
         "painting": None,
-        "lighting": told_file(lighting),
+        "lighting": lighting_data(lighting),
         "command": None,
     }
     text = f'<script type="application/json">{script_json(data)}</script>'
@@ -79,10 +79,10 @@ def _strongest_lights(record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> 
 
 def transforms_of(rows: Sequence[SummaryRow]) -> dict[str, Any]:
     """Return the looks' view transforms by name; the exposure belongs to each look."""
-    made = {"srgb": told_transform(ViewTransform())}
+    made = {"srgb": transform_data(ViewTransform())}
     for name in dict.fromkeys(row.view[0] for row in rows if row.view):
         with suppress(LightpaintError):
-            made.setdefault(name, told_transform(ViewTransform(name)))
+            made.setdefault(name, transform_data(ViewTransform(name)))
     return made
 
 

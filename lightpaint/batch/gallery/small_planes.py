@@ -20,7 +20,7 @@ from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, write_text
 from lightpaint.pipeline.sources import content
-from lightpaint.report.page.mixer import planes_for_page, told_light
+from lightpaint.report.page.mixer import light_data, planes_for_page
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 
@@ -56,7 +56,7 @@ def write_planes(folder: Path, key: str, basis: Basis) -> None:
         "size": size,
         "totals": [float(sum(total)) for total in basis.totals],
         "lights": [
-            {**told_light(x), "present": list(map(float, x.emission))} for x in basis.lights
+            {**light_data(x), "present": list(map(float, x.emission))} for x in basis.lights
         ],
         "planes": planes,
     }

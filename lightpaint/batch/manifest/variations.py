@@ -13,7 +13,7 @@ from lightpaint.errors import BatchError
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.fit import HOLD
+from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.pipeline.settings import Settings
 
 #: Variations that are solved.
@@ -56,7 +56,7 @@ def vary(
         return settings, replace(constraints, sparse=most)
     if word == "white only":
         return replace(settings, colors="white"), constraints
-    hold = HARDER * (HOLD if not settings.hold else settings.hold)
+    hold = HARDER * (DEFAULT_HOLD if not settings.hold else settings.hold)
     return replace(settings, hold=hold, unpainted=0.0), constraints
 
 

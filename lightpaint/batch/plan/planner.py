@@ -26,7 +26,7 @@ from lightpaint.errors import ALONE, BatchError, LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.problem_sums import why_not_by_sums
+from lightpaint.lighting.problem_sums import reason_against_sums
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.result_folder import is_as_written
 from lightpaint.pipeline.results import view_names
@@ -243,7 +243,7 @@ class _Planner:
 def _check_by_sums(job: Job) -> None:
     """Raise BatchError for a lighting that does not follow from sums."""
     [view] = job.views
-    why = why_not_by_sums(view.target, job.fit)
+    why = reason_against_sums(view.target, job.fit)
     if not why and view.basis is None and view.scene is not None:
         why = why_not_one_pass(view.scene) or ""
     if why:

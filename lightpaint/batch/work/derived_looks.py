@@ -110,7 +110,7 @@ def write_shifted(
     job: Job, word: str, results: ResultFolder, lighting: Lighting, bases: Sequence[Basis]
 ) -> None:
     """Write a variation of the answer of `job`. bases: of its views."""
-    shifted_lighting = shift(lighting, SHIFTED_WORDS[word], dimmer_lights(bases[0])).named(
+    shifted_lighting = shift(lighting, SHIFTED_WORDS[word], dimmer_lights(bases[0])).for_target(
         results.folder.name
     )
     options: dict[str, Any] = {

@@ -14,7 +14,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.problem import Problem
-from lightpaint.lighting.problem_sums import Sums, problem_of_sums, sums_of
+from lightpaint.lighting.problem_sums import Sums, sum_rows, summed_problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.answer_folder import new_answer
 from lightpaint.pipeline.job import Job
@@ -39,7 +39,7 @@ def sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
     origin = origin_of(scene, item.seed, IN_PARTS, (spp[0], spp[1]), (1, 1))
     basis = Basis(basis_lights(scene), as_planes(images), as_planes(differences), seen > 0, origin)
     return [
-        sums_of(basis, cache.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
+        sum_rows(basis, cache.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
         for wanted in item.paintings
     ]
 
@@ -53,7 +53,7 @@ def answer_by_sums(job: Job, basis: Basis) -> None:
         problem = Problem.of(basis, view.target, constraints=job.asked, fit=job.fit)
         write_lighting_only(job, solution_of(problem).lighting)
         return
-    sums = sums_of(basis, view.target, slice(None), job.fit)
+    sums = sum_rows(basis, view.target, slice(None), job.fit)
     origin = basis.origin
     write_solved_lights(
         job, basis.lights, sums, scene_identity=origin.scene_identity, spp=origin.spp
@@ -63,8 +63,8 @@ def answer_by_sums(job: Job, basis: Basis) -> None:
 def write_solved_lights(
     job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int
 ) -> None:
-    """Solve, and write the lighting. Other parameters are those of `problem_of_sums`."""
-    problem = problem_of_sums(
+    """Solve, and write the lighting. Other parameters are those of `summed_problem`."""
+    problem = summed_problem(
         lights,
         job.views[0].target.name,
         sums,

@@ -13,25 +13,25 @@ from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
-from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS
+from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.pipeline.results import Look
 from lightpaint.pipeline.settings import Settings
 from lightpaint.report.answer_pictures import spoken_view
-from lightpaint.report.influences import spoken_meaning
+from lightpaint.report.influences import fit_sentence
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.color_section import closer_choice
 from lightpaint.report.sentences import (
-    how_sure,
+    bound_sentences,
+    error_sentences,
     partly_reached,
     spoken_cause,
     spoken_errors,
     spoken_percent,
+    uncertainty_sentence,
     unreached_channels,
     untold_lights,
-    what_holds,
-    what_is_missed,
 )
 from lightpaint.screen import some_names, some_of
 
@@ -61,7 +61,7 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     else:
         _show_short(look)
     terminal.write("")
-    terminal.tell(spoken_meaning(look.solution, instead="--literal for none of this"))
+    terminal.tell(fit_sentence(look.solution, instead="--literal for none of this"))
     certificate = look.solution.certificate
     if curve := certificate.curve:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
@@ -88,16 +88,16 @@ def _sentences(look: Look, table: Table) -> list[str]:
     if table == "short":
         is_told = not look.analysis.seen.is_close
         return [*(_what_holds(look)[:1] if is_told else []), *closer]
-    told = [*what_is_missed(look.diagnosis, look.analysis.seen, holds=_what_holds(look)), *closer]
+    told = [*error_sentences(look.diagnosis, look.analysis.seen, holds=_what_holds(look)), *closer]
     if look.uncertainty is not None:
-        told.append(how_sure(look.basis, look.solution, look.uncertainty))
+        told.append(uncertainty_sentence(look.basis, look.solution, look.uncertainty))
     return told
 
 
 def _what_holds(look: Look) -> list[str]:
     """Say what keeps the lights from the paint, the main reason first, each with its option."""
     if not look.analysis.seen.reasons:
-        return what_holds(look.diagnosis)
+        return bound_sentences(look.diagnosis)
     told = [_spoken_cause(look, reason) for reason in look.analysis.seen.reasons]
     return [sentence for sentence in told if sentence][:2]
 
@@ -105,7 +105,7 @@ def _what_holds(look: Look) -> list[str]:
 def _spoken_cause(look: Look, reason: Reason) -> str:
     """One of them; of what the command line asks of lights, what to leave out."""
     said = spoken_cause(reason, weaker="--hold")
-    keys = KEYS.get(reason.kind, ())
+    keys = KEYS_BY_KIND.get(reason.kind, ())
     options = [
         f"--{'limit' if key == 'limits' else key} {name}"
         for name, wish, where in look.solution.problem.constraints.lights

@@ -1,1 +1,1 @@
-"""How sure an answer is, how it can be better, and why it is not closer."""
+"""The analysis of an answer: its errors, better answers, and the reasons why it is not closer."""

@@ -1,4 +1,4 @@
-"""Lights that a painting cannot tell apart: their images differ by nothing that counts."""
+"""Lights that a painting cannot tell apart, since their images differ by nothing that counts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,23 +9,23 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 from lightpaint.lighting.solution import Solution
 
-#: Two images are taken for one if their normalised inner product is above 1 − ALIKE, and
-#: several make up for each other if what is left of a mix of them is below that share.
+#: Two images are alike if their normalised inner product is above 1 − ALIKE, and several are
+#: ambiguous if a mix of them cancels to less than that share.
 ALIKE = 1e-6
 
-#: The largest `alike` that noise is an excuse for.
-MOST_ALIKE = 0.01
+#: The largest `alike` that noise justifies.
+MAX_ALIKE = 0.01
 
-#: Share of a light in a mix that cancels, below which it has no part in it.
-PART = 0.05
+#: Smallest share of a light in a mix that cancels for it to be a part of the mix.
+MIN_PART = 0.05
 
 
 @dataclass(frozen=True)
 class Ambiguity:
-    """Lights that share what they do among themselves in many ways, all equally good.
+    """Lights that can share their light among themselves in many equally good ways.
 
-    names: the lights. left: of their images, what is left when they cancel: 1 − cos of the
-    angle between two; an eigenvalue for more. is_mix: whether it takes a mix, in some channel;
+    names: the lights. left: the part of their images that remains when they cancel: 1 − cos
+    of the angle between two; an eigenvalue for more. is_mix: whether a mix in some channel cancels;
     otherwise all are alike in all channels.
     """
 
@@ -35,7 +35,7 @@ class Ambiguity:
 
     @property
     def sentence(self) -> str:
-        """What this means, and what would change it."""
+        """The meaning and the remedy, as a sentence."""
         lights = " and ".join([", ".join(self.names[:-1]), self.names[-1]])
         what = (
             f"mixes of {lights} light the painted part alike"
@@ -43,15 +43,15 @@ class Ambiguity:
             else f"{lights} light the painted part alike"
         )
         return (
-            f"{what}: only what they do together is determined. A wider mask or another view, "
-            "where they differ, would tell them apart; or tie them, or keep one as it is"
+            f"{what}: only their sum is determined. A wider mask or another view "
+            "would tell them apart; or tie them, or keep one as it is"
         )
 
 
 def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
-    """The lights that the painting cannot tell apart, as far as its noise lets see.
+    """Return the lights that the painting cannot tell apart, as far as its noise allows to see.
 
-    Noise makes the images of two lights at one place differ: by its share of their power.
+    Noise makes the images of two lights at one place differ by its share of their power.
     """
     basis = solution.basis
     free = np.flatnonzero(~basis.is_fixed)
@@ -61,15 +61,15 @@ def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
     )
     shares = noise[power > 0] / power[power > 0]
     alike = max(ALIKE, 2 * float(np.median(shares))) if shares.size else ALIKE
-    # Where noise is much of a picture, what is alike cannot be seen.
+    # Strong noise would make different images look alike.
     M = solution.equations.M[:, free][:, :, free]
-    return indistinguishable(M, [basis.names[k] for k in free], alike=min(alike, MOST_ALIKE))
+    return indistinguishable(M, [basis.names[k] for k in free], alike=min(alike, MAX_ALIKE))
 
 
 def indistinguishable(
     M: Doubles, names: Sequence[str], *, alike: float = ALIKE
 ) -> tuple[Ambiguity, ...]:
-    """Groups of lights that M cannot tell apart, under the importance it was formed with.
+    """Return groups of lights that M cannot tell apart, under its importance.
 
     M: (3, n, n), inner products per channel, or (n, n). Lights that reach nothing are left out.
     Pairs of one shape of light come first, as groups; then other mixes that cancel.
@@ -99,27 +99,27 @@ def indistinguishable(
         if len(group) > 1
     ]
 
-    # One light stands for each group; other mixes may cancel, and in one channel suffices.
+    # One light stands for each group. Other mixes may cancel; one channel suffices.
     mixes: dict[tuple[str, ...], float] = {}
     for c in range(len(channels)):
         heads = np.array([group[0] for group in groups if lit[c, group[0]]], dtype=int)
         values, vectors = np.linalg.eigh(cosines[c][np.ix_(heads, heads)])
         for value, vector in zip(values, vectors.T, strict=True):
             if value <= alike:
-                part = np.abs(vector) > PART * np.abs(vector).max()
+                part = np.abs(vector) > MIN_PART * np.abs(vector).max()
                 mixed = tuple(names[i] for i in heads[part].tolist())
                 mixes[mixed] = min(mixes.get(mixed, np.inf), max(0.0, float(value)))
     return (*found, *(Ambiguity(mixed, left, is_mix=True) for mixed, left in mixes.items()))
 
 
 def _power(image: Floats) -> float:
-    """Sum of squares."""
+    """Return the sum of squares."""
     its = image.astype(np.float64).ravel()
     return float(its @ its)
 
 
 def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:
-    """The cosine between two images in the channel where they differ most."""
+    """Return the cosine between two images in the channel where they differ most."""
     if (lit[:, i] != lit[:, j]).any():
         return 0.0
     return float(cosines[lit[:, i], i, j].min(initial=1.0))

@@ -1,4 +1,4 @@
-"""All that is asked of an answer, once: how sure it is, why it is not closer, and at what cost."""
+"""The whole analysis of an answer, computed once: its errors, its reasons, and their costs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
 from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
 from lightpaint.lighting.analysis.appearance.color_choices import (
     Choices,
-    best_of_each,
+    best_by_colors,
     color_choices,
 )
 from lightpaint.lighting.analysis.constraint_cost import without_constraints
@@ -24,18 +24,18 @@ from lightpaint.threads import side_by_side
 @keywords()
 @dataclass(frozen=True)
 class Analysis:
-    """What is known of an answer, or of the answer to one of several views.
+    """The analysis of an answer, or of the answer to one of several views.
 
     Attributes:
-        solution: With its errors and with what holds its lights in its certificate.
-        uncertainty: How sure the lights are, None where nothing is known of the noise.
-        diagnosis: Why the painting is not met.
-        seen: How far the answer looks from what was painted.
-        ambiguities: Lights that it cannot tell apart, where nothing is asked of them.
-        unconstrained: The best without what is asked, None where nothing is, or of one view of
-            several.
-        color_choices: What each choice of `colors` comes to; none where no light could have another
-            colour.
+        solution: The solution, with its errors, and with active bounds in its certificate.
+        uncertainty: The errors of the lights, None if the noise is unknown.
+        diagnosis: The reasons why the painting is not met.
+        seen: The visible difference between answer and painting.
+        ambiguities: Lights that the painting cannot tell apart, if there are no constraints.
+        unconstrained: The best answer without constraints, None if there are none, and for one view
+            of several.
+        color_choices: The answer of each choice of `colors`; none if no light may change its
+        colour.
 
     Examples:
         >>> [analysis] = lp.analyse(lp.solve(basis, target))
@@ -56,7 +56,7 @@ class Analysis:
 
 @keywords()
 def analyse(solution: Solution) -> tuple[Analysis, ...]:
-    """An analysis for each view.
+    """Return analyse the answer to each view.
 
     Args:
         solution: Of one view or of several.
@@ -68,12 +68,12 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
         (2, 3)
     """
     views = solution.views
-    asked: list[Callable[[], Any]] = [partial(_looked_at, view) for view in views]
-    asked += [partial(error_bars, solution), partial(best_of_each, solution)]
-    asked += [partial(_alike, solution)]
-    asked += [partial(without_constraints, view) for view in views]
-    # None of them needs another, and each leaves a processor idle now and then.
-    answers = iter(side_by_side(lambda ask: ask(), asked))
+    jobs: list[Callable[[], Any]] = [partial(_appearance_and_diagnosis, view) for view in views]
+    jobs += [partial(error_bars, solution), partial(best_by_colors, solution)]
+    jobs += [partial(_ambiguities, solution)]
+    jobs += [partial(without_constraints, view) for view in views]
+    # The jobs are independent, and each leaves a processor idle now and then.
+    answers = iter(side_by_side(lambda ask: ask(), jobs))
     looked_at: list[tuple[Seen, Diagnosis]] = [next(answers) for _ in views]
     seen = [its for its, _ in looked_at]
     diagnoses = [diagnosis for _, diagnosis in looked_at]
@@ -82,30 +82,30 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     choices = color_choices(solution, [its.delta_e for its in seen], best)
     found = []
     for view, its, diagnosis, colors in zip(solution.views, seen, diagnoses, choices, strict=True):
-        told = view.told(bounds=diagnosis.bounds, **_numbers(its))
+        told = view.with_certificate_fields(bounds=diagnosis.bounds, **_certificate_fields(its))
         free = next(answers)
         found.append(Analysis(told, uncertainty, diagnosis, its, alike, free, colors))
     return tuple(found)
 
 
-def _alike(solution: Solution) -> tuple[Ambiguity, ...]:
-    return () if solution.problem.asks else ambiguities(solution)
+def _ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
+    return () if solution.problem.is_constrained else ambiguities(solution)
 
 
 def with_findings(solution: Solution, analyses: tuple[Analysis, ...]) -> Solution:
-    """The answer to all views with what was found of it, for lighting.json."""
+    """Return the answer to all views with its analysis, for lighting.json."""
     first = analyses[0]
     seen = first.seen if len(analyses) == 1 else what_is_seen(solution)
     told = with_error_bars(solution, first.uncertainty)
-    return told.told(bounds=first.diagnosis.bounds, **_numbers(seen))
+    return told.with_certificate_fields(bounds=first.diagnosis.bounds, **_certificate_fields(seen))
 
 
-def _looked_at(view: Solution) -> tuple[Seen, Diagnosis]:
-    """How far one view looks from its painting, and why it misses it."""
+def _appearance_and_diagnosis(view: Solution) -> tuple[Seen, Diagnosis]:
+    """Return the visible difference of a view from its painting, and the diagnosis."""
     diagnosis = diagnose(view)
     return what_is_seen(view, diagnosis=diagnosis), diagnosis
 
 
-def _numbers(seen: Seen) -> dict[str, float]:
-    """As a certificate has them."""
+def _certificate_fields(seen: Seen) -> dict[str, float]:
+    """Return the differences as fields of a certificate."""
     return {"delta_e": seen.delta_e, "delta_e_noise": seen.noise, "delta_e_asked": seen.asked}

@@ -1,7 +1,7 @@
-"""What letting go of one thing alone would bring, of all that holds the lights back.
+"""The gain of releasing one bound alone, for each bound that holds the lights back.
 
-The gains are exact: the problem is solved again without that one thing. For which of them that
-is worth while is decided by what moving these lights alone would bring, a lower limit of it.
+The gains are exact: each comes from a new solve without that bound. Only bounds with large
+estimates are solved for; an estimate is the gain of moving these lights alone, a lower limit.
 """
 
 from dataclasses import replace
@@ -9,7 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.lighting.analysis.active_bounds import Answer, Held, all_held
+from lightpaint.lighting.analysis.active_bounds import (
+    ActiveBound,
+    BoundedAnswer,
+    find_active_bounds,
+)
 from lightpaint.lighting.answer.active_bound import Bound, Tint
 from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
@@ -18,39 +22,40 @@ from lightpaint.lighting.constraints.white_neighbours import move_to_best_white,
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 
-#: Bounds for which the problem is solved again, those that seem to matter most: so many, and of
-#: large problems about as many as WORK has unknowns, at least so many.
-RELEASED, WORK, FEWEST = 32, 2048, 4
+#: The most bounds to release; for large problems, about MAX_UNKNOWNS unknowns in all; the fewest
+#: bounds.
+MAX_RELEASED, MAX_UNKNOWNS, MIN_RELEASED = 32, 2048, 4
 
-#: By how much greener or pinker than its whites, in Duv, a light has to be for anybody to see it.
-SEEN = 0.003
+#: Visible difference of a light from its whites to green or pink, in Duv.
+VISIBLE_DUV = 0.003
 
 #: Share of ‖Ψ‖² below which a gain is round-off.
-SMALLEST = 1e-12
+MIN_GAIN = 1e-12
 
 
 def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
-    """What holds the lights of `solution`, the largest gain first, and how many more there are.
+    """Return the bounds on the lights of `solution`, the largest gain first, and the number of
+    others.
 
-    For these, which seem to matter less, the problem was not solved again.
+    The others, with smaller estimates, were not released.
     """
     problem = solution.problem
-    equations = problem.pulled(problem.solved)
-    answer = _answer(solution, equations)
-    least = SMALLEST * float(solution.equations.target_norm2.sum())
-    held = [h for h in all_held(answer) if h.estimate > least]
+    equations = problem.with_pull(problem.solved)
+    answer = _bounded_answer(solution, equations)
+    least = MIN_GAIN * float(solution.equations.target_norm2.sum())
+    held = [h for h in find_active_bounds(answer) if h.estimate > least]
     held.sort(key=lambda h: -h.estimate)
-    before, bounds = _value(problem.solved, answer.w), []
+    before, bounds = _relative_objective(problem.solved, answer.w), []
     size = len(answer.reduction.unknowns) // len(answer.reduction.channel_groups)
-    for h in held[: min(max(WORK // max(size, 1), FEWEST), RELEASED)]:
-        reduction, x = _without(answer, h)
+    for h in held[: min(max(MAX_UNKNOWNS // max(size, 1), MIN_RELEASED), MAX_RELEASED)]:
+        reduction, x = _release(answer, h)
         if h.kind == "left out" and reduction.knobs[h.knob].whites is not None:
             freed = next_whites(equations, reduction, answer.w, only=[h.knob])[1]
         else:
             freed = solve_reduced(equations, reduction, answer.w, x=x)
-        gain = before - _value(problem.solved, freed.weights)
+        gain = before - _relative_objective(problem.solved, freed.weights)
         if problem.pull is None:
-            gain = max(gain, 0.0)  # but for round-off it is
+            gain = max(gain, 0.0)  # except for round-off
         tint = _tint(answer, h, freed.weights)
         names = tuple(solution.basis.names[k] for k in h.lights)
         label = answer.full.labels[h.lights[0]]
@@ -59,11 +64,11 @@ def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
     return tuple(sorted(bounds, key=lambda bound: -bound.gain)), len(held) - len(bounds)
 
 
-def _answer(solution: Solution, equations: NormalEquations) -> Answer:
-    reduction = solution.problem.about_answer
+def _bounded_answer(solution: Solution, equations: NormalEquations) -> BoundedAnswer:
+    reduction = solution.problem.local_reduction
     found = solve_reduced(equations, reduction, solution.weights)
     lit = equations.reached
-    return Answer(
+    return BoundedAnswer(
         solution.basis,
         reduction,
         solution.problem.full,
@@ -74,26 +79,27 @@ def _answer(solution: Solution, equations: NormalEquations) -> Answer:
     )
 
 
-def _tint(o: Answer, held: Held, freed: Doubles) -> Tint:
-    """To which side of its range of white a light goes in weights (n, 3) that let it go."""
+def _tint(o: BoundedAnswer, held: ActiveBound, freed: Doubles) -> Tint:
+    """Return the side of its range of white to which a light goes in weights (n, 3) after
+    release."""
     its = [knob.whites for knob in o.full.knobs if knob.lights == held.lights]
     if held.kind != "colour" or not its or (whites := its[0]) is None:
         return ""
     [green] = whites.greener(freed[list(held.lights)])
-    if abs(green) <= SEEN:
+    if abs(green) <= VISIBLE_DUV:
         return ""
     return "greener" if green > 0 else "pinker"
 
 
-def _value(equations: NormalEquations, w: Doubles) -> float:
-    """The objective less ‖Ψ‖², without its round-off."""
+def _relative_objective(equations: NormalEquations, w: Doubles) -> float:
+    """Return the objective less ‖Ψ‖², without its round-off."""
     quadratic = np.einsum("ic,cij,jc->", w, equations.M, w, optimize=True)
     return float(quadratic - 2 * np.einsum("ci,ic->", equations.b, w))
 
 
-def _without(o: Answer, held: Held) -> tuple[Reduction, Doubles]:
-    """The reduction with that alone let go, and the answer in its unknowns."""
-    knobs, x = [*o.reduction.knobs], o.found.x
+def _release(o: BoundedAnswer, held: ActiveBound) -> tuple[Reduction, Doubles]:
+    """Return the reduction without one bound, and the answer in its unknowns."""
+    knobs, x = [*o.reduction.knobs], o.optimum.x
     if held.kind == "left out":
         knobs[held.knob] = move_to_best_white(o.full.knobs[held.knob], o.gradient)
     elif held.kind == "zero":

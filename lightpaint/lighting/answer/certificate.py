@@ -1,4 +1,4 @@
-"""What shows how good an answer is."""
+"""The proof of how good an answer is."""
 
 import math
 from dataclasses import dataclass, replace
@@ -15,34 +15,31 @@ from lightpaint.screen import shortly
 @keywords()
 @dataclass(frozen=True)
 class Certificate:
-    """How good a solve is, per colour channel (R, G, B).
+    """The proof of how good a solve is, per colour channel (R, G, B).
 
     Attributes:
         kkt_residual: Optimality measure of the solver (see solver.kkt_residual).
         objective: ‖Ψ − Σ w_i Φ_i‖² under the importance.
         relative_objective: Over ‖Ψ‖².
         sweeps: Gauss–Seidel sweeps per channel; 0 where Newton steps did it.
-        converged: Whether the KKT residual came below the tolerance.
-        unreached: Lights that no weighted pixel sees, which keep what the solve started from, or
-            what is nearest to it under their constraints: their present emission, if no start was
-            given.
-        curve: Where only some lights may be on, numbers of lights and the relative residual, √(Σ_c
-            E_c / Σ_c ‖Ψ_c‖²), of the best that were found.
-        bounds: What holds single lights, where a diagnosis has looked, the largest gain first.
-        objective_error: Standard error of `objective`, from the noise it was solved with, where
-            that is known.
-        display: The view transform through which the objective is seen; "" where it is of linear
-            light.
-        rounds: Linear problems solved one after the other, the last of which is the certified one.
-        hold: Weight of all that was not painted, against the current look, beside that of what was.
-        colors: How free lamps were to change their colour: `free`, `gentle` or `white`.
-        noise_removed: Share of the noise that was taken out of the equations.
-        delta_e: Mean CIEDE2000 between the prediction and the painting, over what was painted.
+        converged: Whether the KKT residual is within the tolerance.
+        unreached: Lights that reach no weighted pixel. They keep the start of the solve, or the
+            nearest emission under their constraints: the present one, if no start was given.
+        curve: If only some lights may be on, numbers of lights and the relative residual, √(Σ_c
+            E_c / Σ_c ‖Ψ_c‖²), of the best ones.
+        bounds: Bounds that hold single lights, from a diagnosis, the largest gain first.
+        objective_error: Standard error of `objective`, from the noise of the basis, if known.
+        display: The view transform of the objective; "" for linear light.
+        rounds: The number of linear problems solved in turn, the last of which is certified.
+        hold: Weight of unpainted pixels, which holds them to the current look, relative to painted
+        ones.
+        colors: The freedom of lamps to change their colour: `free`, `gentle` or `white`.
+        noise_removed: Share of the noise that was removed from the equations.
+        delta_e: Mean CIEDE2000 between the prediction and the painting, over the paint.
         delta_e_noise: The part of it that noise explains.
-        delta_e_asked: That of the scene as it is: how much was asked for.
-        software: What it was computed with, where that is known.
-        basis_spp: Samples per pixel of the basis it was solved with, of the first of several views;
-            None where nobody knows of any.
+        delta_e_asked: That of the present scene: the change that the painting asks for.
+        software: The software that computed it, if known.
+        basis_spp: Samples per pixel of the basis, of the first of several views; None if unknown.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -75,19 +72,21 @@ class Certificate:
     __repr__ = shortly
 
     def __str__(self) -> str:
-        told = "closest there is"
+        state = "closest there is"
         if self.curve or self.rounds > 1:
-            told = "closest with the lights chosen" if self.curve else "no small change is closer"
-        told = told if self.converged else "stopped before it converged"
+            state = "closest with the lights chosen" if self.curve else "no small change is closer"
+        state = state if self.converged else "stopped before it converged"
         missed = math.sqrt(max(self.relative_objective))
         where = f", as {self.display} shows it" if self.display else ""
         return (
-            f"{told} (KKT residual {max(self.kkt_residual):.1g}); misses {missed:.2g} of the "
+            f"{state} (KKT residual {max(self.kkt_residual):.1g}); misses {missed:.2g} of the "
             f"painting{where} (RMS, worst channel)"
         )
 
-    def of(self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None) -> "Certificate":
-        """With what is missed, (3,), beside what a black picture would miss, (3,)."""
+    def with_objective(
+        self, objective: Doubles, norm2: Doubles, *, error: RGB | None = None
+    ) -> "Certificate":
+        """Return the certificate with this loss, (3,), and that of a black picture, (3,)."""
         norm = np.where(norm2 > 0, norm2, 1)
         return replace(
             self,

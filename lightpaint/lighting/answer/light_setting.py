@@ -1,4 +1,4 @@
-"""One light of an answer: its emission, what was asked of it, and how sure it is."""
+"""A light of an answer: its emission, its constraint, and its error."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ from lightpaint.arrays import RGB
 from lightpaint.errors import LightingError
 from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
-#: A number of each channel, None where nothing tells; an interval of each.
+#: A number of each channel, None if undetermined; an interval of each.
 Errors = tuple[float | None, float | None, float | None]
 Ends = tuple[float, float]
 Intervals = tuple[Ends | None, Ends | None, Ends | None]
@@ -16,21 +16,21 @@ ALL_REACHED = (True, True, True)
 
 @dataclass(frozen=True)
 class LightSetting:
-    """One light of a lighting.
+    """The setting of a light in a lighting.
 
     emission: linear RGB in `unit`, the parameter's own unit in Mitsuba.
     weight: RGB relative to one unit of the basis; the same numbers for one-colour lights.
-    is_fixed: whether it is what stays as it is in the scene, with weight 1.
+    is_fixed: whether it stays as it is in the scene, with weight 1.
     members: names of the emitters it consists of; itself if none are given.
-    unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
-    constraint: what was asked of it in the solve, in few words; "" for nothing. is_active:
-    whether that held it back from what the painting asks for.
-    reached: of each channel whether it reaches anything that counts; where it does not, nothing
-    tells its emission, and it stays as it was.
-    standard_error: of the emission, from the noise it was solved with, where that is known; None in
-    channels that reach nothing.
+    unit_flux: watts it radiates per channel at an emission of 1; None if unknown.
+    constraint: its constraint in the solve, in few words; "" for none. is_active: whether the
+    constraint held it back.
+    reached: for each channel whether it reaches anything that counts; if not, its emission is
+    undetermined, and stays as it was.
+    standard_error: of the emission, from the noise of the basis, if known; None in channels that
+    reach nothing.
     interval: 95 % interval of each channel, lower and upper end; as standard_error.
-    untold: whether so little is known of it that it cannot be told at the samples of the basis.
+    untold: whether the samples of the basis do not suffice to determine it.
     """
 
     name: str
@@ -75,7 +75,7 @@ class LightSetting:
 
     @property
     def is_partly_reached(self) -> bool:
-        """Whether some of its channels were solved for and others reach nothing."""
+        """True if some of its channels were solved for and others reach nothing."""
         return any(self.reached) and not all(self.reached)
 
     def _check_errors(self) -> None:

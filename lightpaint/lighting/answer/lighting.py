@@ -29,11 +29,11 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     """Emissions for named lights: a mapping of their names to their settings, in their order.
 
     Attributes:
-        lights: Each with its emission, in the order of the basis.
-        target: Name of what was painted.
-        scene_identity: Of the scene it is for.
-        certificate: Of the solve they come from, if they do.
-        cd_per_unit: cd/m² that a radiance of 1 stands for, where that was said.
+        lights: The setting of each light, in the order of the basis.
+        target: Name of the painting.
+        scene_identity: The identity of its scene.
+        certificate: The certificate of the solve, if there was one.
+        cd_per_unit: cd/m² for a radiance of 1, if given.
 
     Examples:
         >>> lighting = lp.read_lighting("lighting.json")
@@ -72,7 +72,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
             )
 
     def __getitem__(self, name: str) -> LightSetting:
-        """The light of that name. Raises UnknownLightError, a KeyError, if there is none."""
+        """Return the light of that name. Raises UnknownLightError, a KeyError, if there is none."""
         if name not in self._by_name:
             raise UnknownLightError(
                 f"no light {name!r} in the lighting: it has {some_of([*self], room=400)}"
@@ -105,9 +105,9 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return {light.name: light.emission for light in self.lights}
 
     def photometry(self, light: LightSetting) -> Photometry:
-        """Colour, temperature and flux of one of its lights.
+        """Return colour, temperature and flux of one of its lights.
 
-        One that reaches something in some channels only has no colour: nobody knows it.
+        The colour of a light that reaches something in some channels only is unknown.
         """
         seen = photometry(
             light.emission,
@@ -172,7 +172,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         )
 
     def with_emission(self, name: str, emission: RGB) -> "Lighting":
-        """This lighting with another RGB emission for one light, and no claim to be optimal.
+        """Return the lighting with another RGB emission for one light, and without its certificate.
 
         Raises UnknownLightError if there is no such light.
         """
@@ -195,12 +195,12 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         )
         return replace(self, lights=lights, certificate=None)
 
-    def named(self, target: str) -> "Lighting":
-        """The same, as the answer to that target."""
+    def for_target(self, target: str) -> "Lighting":
+        """Return the lighting as the answer to that target."""
         return replace(self, target=target)
 
     def with_certificate(self, certificate: Certificate | None) -> "Lighting":
-        """The same, with what shows how good it is."""
+        """Return the lighting with this certificate."""
         return replace(self, certificate=certificate)
 
     @classmethod
@@ -210,13 +210,14 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         lights: Basis | Lights,
         weights: Doubles,
         *,
-        asked: Sequence[tuple[str, bool]] | None = None,
+        labels: Sequence[tuple[str, bool]] | None = None,
         reached: Bools | None = None,
         **about: Any,
     ) -> "Lighting":
-        """From weights (n, 3) in the order of `lights`, which may be those of a basis.
+        """Make a lighting of weights (n, 3) in the order of `lights`, which may be those of a
+        basis.
 
-        asked: of each light its `constraint` and whether that `is_active`. reached: (n, 3).
+        labels: for each light its `constraint` and whether this `is_active`. reached: (n, 3).
         """
         if isinstance(lights, Basis):
             about.setdefault("scene_identity", lights.origin.scene_identity)
@@ -226,7 +227,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         settings = tuple(
             _setting(light, as_rgb(weight), one, (bool(its[0]), bool(its[1]), bool(its[2])))
             for light, weight, one, its in zip(
-                lights, weights, asked or [("", False)] * count, told, strict=True
+                lights, weights, labels or [("", False)] * count, told, strict=True
             )
         )
         return cls(settings, **about)
@@ -234,11 +235,11 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     @classmethod
     @keywords()
     def present(cls, basis: Basis) -> "Lighting":
-        """The scene's lighting as it is."""
+        """Return the present lighting of the scene."""
         return cls.of_weights(basis, basis.present_weights)
 
     def weights_for(self, lights: Basis | Lights) -> Doubles:
-        """(n, 3) weights in the order of `lights`, which may be those of a basis.
+        """Return weights (n, 3) in the order of `lights`, which may be those of a basis.
 
         Raises LightingError if the two do not name the same lights.
         """
@@ -266,16 +267,16 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 def combine(
     basis: Basis, lighting: Lighting | Mapping[str, float | Sequence[float]] | npt.ArrayLike
 ) -> Estimate:
-    """The predicted image Σ w_i Φ_i, with the noise that the basis gives it.
+    """Return the predicted image Σ w_i Φ_i, with the noise of the basis.
 
     Args:
         basis: Of n lights.
         lighting: Of the same lights; or weights >= 0 of some of them by name, a number or RGB each,
-            the others being off; or (n,) or (n, 3) weights in the order of the basis. What is kept
-            has the weight 1.
+            the others being off; or (n,) or (n, 3) weights in the order of the basis. Fixed lights
+            have the weight 1.
 
     Raises:
-        LightingError: If the two do not name the same lights, or for what are no such weights.
+        LightingError: If the two do not name the same lights, or for invalid weights.
 
     Examples:
         >>> solution = lp.solve(basis, target)
@@ -285,39 +286,43 @@ def combine(
         >>> bool(np.abs(twice - 2 * basis.image("bulb")).max() < 1e-6)
         True
     """
-    given = lighting
-    weights = given.weights_for(basis) if isinstance(given, Lighting) else _weights(basis, given)
+    lighting_or_weights = lighting
+    weights = (
+        lighting_or_weights.weights_for(basis)
+        if isinstance(lighting_or_weights, Lighting)
+        else _weights(basis, lighting_or_weights)
+    )
     return Estimate(basis.mix(weights), basis.noise.mix(weights))
 
 
-def _weights(basis: Basis, given: Mapping[str, Any] | npt.ArrayLike) -> Doubles:
-    """(n, 3), from weights by name, or of all lights in their order."""
+def _weights(basis: Basis, values: Mapping[str, Any] | npt.ArrayLike) -> Doubles:
+    """Return weights (n, 3) from weights by name, or of all lights in their order."""
     n, names = len(basis.lights), basis.names
     weights = np.where(basis.is_fixed[:, None], np.ones(3), np.zeros(3))
-    if isinstance(given, Mapping):
-        if unknown := [str(name) for name in given if name not in names]:
+    if isinstance(values, Mapping):
+        if unknown := [str(name) for name in values if name not in names]:
             raise UnknownLightError(
                 f"no light {some_of(unknown, room=400)} in the basis: it has "
                 f"{some_of(names, room=400)}"
             )
-        for name, weight in given.items():
+        for name, weight in values.items():
             weights[names.index(name)] = _numbers(weight, f"light {name!r}", ((), (3,)))
     else:
-        whole = _numbers(given, f"a lighting of {n} lights", ((n,), (n, 3)))
+        whole = _numbers(values, f"a lighting of {n} lights", ((n,), (n, 3)))
         weights = np.broadcast_to(whole.reshape(n, -1), (n, 3)).copy()
     for k in np.flatnonzero(basis.is_fixed & (weights != 1).any(axis=1)):
         raise LightingError(f"light {names[k]!r} is kept as it is: its weight is 1")
     return weights
 
 
-def _numbers(given: Any, what: str, shapes: tuple[tuple[int, ...], ...]) -> Doubles:
-    """Weights in an array of one of these shapes. Raises LightingError for anything else."""
+def _numbers(values: Any, what: str, shapes: tuple[tuple[int, ...], ...]) -> Doubles:
+    """Return weights as an array of one of these shapes. Raises LightingError for anything else."""
     expected = " or ".join(str(shape) if shape else "one number" for shape in shapes)
     try:
-        weights = np.asarray(given, dtype=np.float64)
+        weights = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise LightingError(
-            f"{what}: weights of the type {type(given).__name__}: expected {expected}"
+            f"{what}: weights of the type {type(values).__name__}: expected {expected}"
         ) from None
     if weights.shape not in shapes:
         raise LightingError(f"{what}: weights of the shape {weights.shape}: expected {expected}")
@@ -327,7 +332,7 @@ def _numbers(given: Any, what: str, shapes: tuple[tuple[int, ...], ...]) -> Doub
 
 
 def _setting(
-    light: BasisLight, weight: RGB, asked: tuple[str, bool], reached: tuple[bool, bool, bool]
+    light: BasisLight, weight: RGB, label: tuple[str, bool], reached: tuple[bool, bool, bool]
 ) -> LightSetting:
     # One unit of weight is unit-white emission, so that here the two are the same numbers.
     return LightSetting(
@@ -340,7 +345,7 @@ def _setting(
         is_fixed=light.is_fixed,
         members=light.members,
         unit_flux=light.unit_flux,
-        constraint=asked[0],
-        is_active=asked[1],
+        constraint=label[0],
+        is_active=label[1],
         reached=reached,
     )

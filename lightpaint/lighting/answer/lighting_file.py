@@ -17,17 +17,17 @@ from lightpaint.version import __version__
 
 FORMAT = "lightpaint-lighting 1"
 
-#: Longest lighting file that is read, in bytes: some 2 kB are written for a light.
+#: Longest lighting file that is read, in bytes: a light takes some 2 kB.
 MAX_BYTES = 2**23
 
-#: Fields of a lighting that stand in its file under their own names.
-READ_AS_THEY_STAND = ("target", "scene_identity", "cd_per_unit")
+#: Fields of a lighting that its file has under their own names.
+PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit")
 
-#: Fields of a certificate that say how the lighting was found, where it is not the paper's way.
-FIT = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basis_spp")
+#: Fields of a certificate for options of the fit, written where they differ from the paper.
+FIT_FIELDS = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basis_spp")
 
-#: And how far it looks from the painting, where somebody has looked.
-SEEN = ("delta_e", "delta_e_noise", "delta_e_asked")
+#: Fields of a certificate for the difference to the painting, if computed.
+APPEARANCE_FIELDS = ("delta_e", "delta_e_noise", "delta_e_asked")
 
 
 @keywords()
@@ -35,8 +35,8 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
     """Write lighting.json (docs/formats.md), whole or not at all.
 
     Args:
-        path: Of the file.
-        lighting: To keep.
+        path: The file to write.
+        lighting: The lighting to keep.
 
     Examples:
         >>> lp.write_lighting("evening.json", lp.solve(basis, target).lighting)
@@ -48,7 +48,7 @@ def write_lighting(path: str | Path, lighting: Lighting) -> None:
 
 
 def lighting_fields(lighting: Lighting) -> dict[str, Any]:
-    """What a lighting.json has of it, as plain values."""
+    """Return the content of a lighting.json as plain values."""
     data: dict[str, Any] = {
         "format": FORMAT,
         "lightpaint": __version__,
@@ -62,20 +62,22 @@ def lighting_fields(lighting: Lighting) -> dict[str, Any]:
                 "unit": light.unit,
                 "emission": light.emission,
                 "weight": light.weight,
-                **_ties(light),
+                **_optional_fields(light),
                 **_photometry(lighting, light),
             }
             for light in lighting.lights
         },
     }
     if (q := lighting.certificate) is not None:
-        data["solve"] = fields_of(q, "curve", "bounds", "objective_error", *FIT, *SEEN)
+        data["solve"] = fields_of(
+            q, "curve", "bounds", "objective_error", *FIT_FIELDS, *APPEARANCE_FIELDS
+        )
     return data
 
 
 @keywords()
 def read_lighting(path: str | Path) -> Lighting:
-    """Read what `write_lighting` wrote.
+    """Read a file of `write_lighting`.
 
     Args:
         path: A lighting.json.
@@ -97,7 +99,7 @@ def read_lighting(path: str | Path) -> Lighting:
     if found != FORMAT:
         raise LightingError(f"{path} has the format {one_line(repr(found))}: expected {FORMAT!r}")
     try:
-        about = {key: data[key] for key in READ_AS_THEY_STAND if key in data}
+        about = {key: data[key] for key in PLAIN_FIELDS if key in data}
         lighting = read_record(Lighting, {"lights": [], **about})
         lights = tuple(_read_setting(name, light) for name, light in data["lights"].items())
         certificate = None
@@ -117,8 +119,8 @@ def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
     return read_record(LightSetting, {**data, "name": name}, others=True)
 
 
-def _ties(light: LightSetting) -> dict[str, Any]:
-    """What the file says of a light only where it does not go without saying."""
+def _optional_fields(light: LightSetting) -> dict[str, Any]:
+    """Return the fields of a light that differ from their defaults."""
     ties: dict[str, Any] = {}
     if light.reached != ALL_REACHED:
         ties["reached"] = light.reached
@@ -138,6 +140,8 @@ def _ties(light: LightSetting) -> dict[str, Any]:
 
 
 def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:
-    """What follows from the emission, for people and programs; only `unit_flux` is read back."""
+    """Return values that follow from the emission, for people and programs; only `unit_flux` is
+    read back.
+    """
     known: dict[str, Any] = {} if light.unit_flux is None else {"unit_flux": light.unit_flux}
     return known if light.is_fixed else {**known, "photometry": lighting.photometry(light).fields()}

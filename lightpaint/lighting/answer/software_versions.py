@@ -1,4 +1,4 @@
-"""What an answer was computed with, on which its last digits depend (docs/method.md)."""
+"""Versions of the software behind an answer, on which its last digits depend (docs/method.md)."""
 
 import importlib.metadata
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from lightpaint.version import __version__
 class Software:
     """Versions as installed, and the processor's part in them.
 
-    blas: library of linear algebra under NumPy, and its version. kernel: what it has chosen for the
-    processor, as `Haswell`, "" where it does not say. mitsuba: "" where there is none.
+    blas: library of linear algebra under NumPy, and its version. kernel: its choice for the
+    processor, as `Haswell`, "" if unknown. mitsuba: "" if it is not installed.
     """
 
     lightpaint: str
@@ -25,13 +25,13 @@ class Software:
     @classmethod
     @cache
     def here(cls) -> "Software":
-        """That of this process."""
+        """Return the versions of this process."""
         blas, kernel = linear_algebra()
         return cls(__version__, version("numpy"), blas, kernel, version("mitsuba"))
 
 
 def version(package: str) -> str:
-    """Of an installed package; "" if it is not."""
+    """Return the version of an installed package; "" if it is not."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:

@@ -9,7 +9,7 @@ from lightpaint.files import one_line
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.values import check_keys, parse_strength
-from lightpaint.scene.lights.lights_file import LightRequests, read_keys
+from lightpaint.scene.lights.lights_file import SceneRequests, read_keys
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
 MAX_MESSAGE_LENGTH = 1000
@@ -31,10 +31,10 @@ def read_constraints(path: str | Path) -> Constraints:
         >>> lp.solve(basis, target, constraints=constraints).lighting.emission["bulb"]
         (0.0, 0.0, 0.0)
     """
-    return constraints_of(LightRequests.of(Path(path), read_keys(Path(path))))
+    return constraints_of(SceneRequests.of(Path(path), read_keys(Path(path))))
 
 
-def constraints_of(asked: LightRequests) -> Constraints:
+def constraints_of(asked: SceneRequests) -> Constraints:
     """Return the constraints in the keys of a lights file. Raises ConstraintError."""
     keys = asked.keys
     try:

@@ -111,7 +111,7 @@ def solve_reduced(
     x = nearest_unknowns(reduction, start, np.any(reached, axis=1)) if x is None else x.copy()
     options: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
     left = _move_fixed_to_right(equations, reduction, lit, start)
-    optima = _solve_blocks(left, equations.across, reduction, x, options)
+    optima = _solve_blocks(left, equations.coupling, reduction, x, options)
     multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
     residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
     for block, optimum in zip(reduction.blocks, optima, strict=True):
@@ -134,7 +134,9 @@ def solve_reduced(
 
 def reduced_problems(equations: NormalEquations, reduction: Reduction) -> list[ReducedProblem]:
     """Return one problem for every set of channels that the unknowns couple."""
-    return _block_problems(_move_fixed_to_right(equations, reduction), equations.across, reduction)
+    return _block_problems(
+        _move_fixed_to_right(equations, reduction), equations.coupling, reduction
+    )
 
 
 def _move_fixed_to_right(

@@ -248,8 +248,8 @@ def _distant_window(
     for its in groups:
         colors, w = its.whites.colors, found.weights[its.lights]
         own = np.einsum("cii,cd->icd", equations.M, np.eye(3))[its.lights]
-        if equations.across is not None:
-            own = own + equations.across[its.lights]
+        if equations.coupling is not None:
+            own = own + equations.coupling[its.lights]
         right = np.einsum("icd,id->ic", own, w) - gradient[its.lights]
         now = np.einsum("ic,icd,id->i", w, own, w) - 2 * (w * right).sum(axis=1)
         q, r = np.einsum("kc,icd,kd->ik", colors, own, colors), right @ colors.T

@@ -1,16 +1,16 @@
-"""The answer while the brush moves: what is solved between two frames of a display.
+"""The answer under the moving brush, solved between two frames of a display.
 
 In linear light the equations follow the brush tile by tile (Eq 7-9), and the answer is that of
-`solve` but for the noise correction. What is painted and the rest have sums of their own: a hold
-weighs the rest by how much is painted, so that a stroke changes the weight of every other pixel,
-but no sum of theirs.
+`solve` without the noise correction. Painted pixels and the rest have separate sums: a hold weighs
+the rest by the amount of paint, so that a stroke changes the weight of every other pixel, but none
+of their sums.
 
 In display space every answer changes the weight of every pixel. There the picture is averaged to
-a few thousand pixels, and a round from the answer before is enough to follow the brush;
-the answer of all pixels comes when it is lifted.
+a few thousand pixels, and one round from the last answer follows the brush; the answer of all
+pixels comes when the brush is lifted.
 
-Of several views those count in which something is painted. Each has sums of its own, so that a
-stroke in one costs no more than where there is no other.
+Of several views those with paint count. Each has sums of its own, so that a stroke costs no more
+than with a single view.
 """
 
 from collections.abc import Sequence
@@ -31,78 +31,83 @@ from lightpaint.lighting.constraints.white_neighbours import (
     snap_to_whites,
 )
 from lightpaint.lighting.fit import Fit, Space
-from lightpaint.lighting.linear_problem import reduced_by
-from lightpaint.lighting.live.live_sums import FILM, Films, SmallFilm
+from lightpaint.lighting.linear_problem import reduce_lights
+from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.lighting.loss.painting import rest_weight
+from lightpaint.lighting.loss.painting import unpainted_weight
 from lightpaint.lighting.loss.pixel_bins import block_side
-from lightpaint.lighting.loss.weight_penalty import dimming_of, drawn_more, pull_of, to_present
+from lightpaint.lighting.loss.weight_penalty import (
+    dimming_factors,
+    pull_to_present,
+    strengthen,
+    weight_pull,
+)
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Steps between whites for one answer, at most: the next answer goes on.
+#: Most steps between whites for one answer; the next answer goes on.
 WHITE_STEPS = 2
 
-#: Pieces of a range of white within which a light first looks for its white, under the hand.
+#: Width, in pieces of a range of white, of the window in which a light first finds its white.
 WHITE_WIDTH = 8
 
-#: Painted pixels that say which colours lights may take, about.
+#: Painted pixels that determine the colours lights may take, about.
 GAMUT_PIXELS = 2**8
 
-#: Of which views, and what pulls to the present and to its colours.
+#: Views, with the pulls to the present and to its colours.
 _Pulls = tuple[tuple[LiveView, ...], NormalEquations | None, NormalEquations | None]
 
 
-class Live:
-    """Paintings that change under a brush, and the lighting for them. Updated in place.
+class LiveSolver:
+    """The lighting for paintings that change under a brush, updated in place. Updated in place.
 
-    views: of one lighting, each of which is told where it is painted. fit: with nothing left open,
-    as `meant_by` makes it. constraints: all that is asked of the lights.
+    views: of one lighting; report strokes to each by `update`. fit: with nothing left open, as
+    `resolve_for_targets` returns it. constraints: all constraints on the lights.
     """
 
     def __init__(self, views: Sequence[LiveView], *, fit: Fit, constraints: Constraints) -> None:
         self._views = tuple(views)
         self._basis = views[0].basis
         self._films: tuple[tuple[LiveView, ...], Films] | None = None
-        self.asks(fit, constraints)
+        self.constrain(fit, constraints)
 
-    def asks(self, fit: Fit, constraints: Constraints) -> None:
-        """Go on with these. Raises ConstraintError for what is impossible."""
-        reduction = reduced_by(constraints, self._basis.lights, fit)
+    def constrain(self, fit: Fit, constraints: Constraints) -> None:
+        """Change fit and constraints. Raises ConstraintError for what is impossible."""
+        reduction = reduce_lights(constraints, self._basis.lights, fit)
         self._fit, self._constraints, self._reduction = fit, constraints, reduction
         self._pulls: _Pulls | None = None
         self._untouched: Doubles | None = None
         self._within, self._gamuts_of = reduction, tuple[LiveView, ...]()
         self._is_kept_to = False  # by the answer before
         for view in self._views:
-            view.see_through(fit.transform)
+            view.set_transform(fit.transform)
 
     def prepare(self) -> None:
-        """Do now what the first answer would wait for."""
+        """Compute now all sums that the first answer needs."""
         for view in self._views:
             if self.mode == "linear":
                 view.tiles()
             else:
-                self._film_of(view)
+                self._film(view)
 
     @property
     def mode(self) -> Space:
-        """In which space answers are found."""
+        """The space of the answers."""
         return self._fit.space or "linear"
 
     def answer(self, start: Doubles) -> Doubles:
-        """The weights (n, 3) that are best now, from those before.
+        """Return the best weights (n, 3), from the last ones.
 
-        Before anything is painted, lights stay as they are but for what is asked of them.
+        Before anything is painted, lights stay as they are, within the constraints.
         """
         views = tuple(view for view in self._views if view.is_painted)
         if not views:
-            return self._at_rest()
+            return self._unpainted_answer()
         if not self._is_kept_to:
-            # What is not allowed may well be nearer to the painting.
+            # Weights that the constraints forbid may well be closer to the painting.
             start = _nearest(start, views, self._reduction)
             self._is_kept_to = True
         painted, rest = reduce(add, (view.counts for view in views))
-        unpainted = rest_weight(float(painted), float(rest), self._fit)
+        unpainted = unpainted_weight(float(painted), float(rest), self._fit)
         reduction = self._with_gamuts(views)
 
         def best(equations: NormalEquations, begin: Doubles) -> Doubles:
@@ -117,26 +122,27 @@ class Live:
             found = best(equations, start)
             if self._fit.colors != "gentle":
                 return found
-            # As a solve does: once more, with what came out dim drawn to its colour the more.
+            # Once more, as `solve` does, with a stronger pull to the colours of lights that came
+            # out dim.
             pull = self._pull(views, found)
             return best(equations, found)
         pull = self._pull(views, start)
-        films = self._films_of(views)
+        films = self._joint_films(views)
         pixels = films.pixels(unpainted, self._fit.transform)
-        # A painting that another hand has changed may leave the answer before worse than none.
-        starts = allowed(start), self._at_rest()
-        return films.nearer(pixels, starts, best, pull, allowed)
+        # After a change of the painting the last answer may be worse than the present lighting.
+        starts = allowed(start), self._unpainted_answer()
+        return films.improve(pixels, starts, best, pull, allowed)
 
-    def _at_rest(self) -> Doubles:
-        """Return the answer to no paint, (n, 3)."""
+    def _unpainted_answer(self) -> Doubles:
+        """Return the answer without paint, (n, 3)."""
         if self._untouched is None:
-            self._untouched = untouched(self._views, self._reduction)
+            self._untouched = unpainted_weights(self._views, self._reduction)
         return self._untouched
 
     def _with_gamuts(self, views: tuple[LiveView, ...]) -> Reduction:
-        """Return the unknowns, with the colours that lights may take as the views are painted.
+        """Return the unknowns, with the gamuts that the painted views allow.
 
-        Lights that the answer before had to keep within theirs are so from the beginning.
+        Lights that the last answer confined to their gamuts are confined from the start.
         """
         if self._fit.colors != "gentle":
             return self._reduction
@@ -151,7 +157,7 @@ class Live:
         return within
 
     def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
-        """Return the best weights (n, 3) of what constraints leave, near those to begin with."""
+        """Return the best weights (n, 3) under the constraints, from those to begin with."""
         method, reduction = self._fit.method, self._within
         if not reduction.white_knobs:
             self._within, found = solve_near_sides(equations, reduction, start, method=method)
@@ -160,21 +166,21 @@ class Live:
         wide = center_windows(reduction, start, WHITE_WIDTH)
         start = solve_reduced(equations, wide, start, method=method).weights
         reduction = center_windows(reduction, start)
-        how: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
-        return next_whites(equations, reduction, start, **how)[1].weights
+        options: dict[str, Any] = {"steps": WHITE_STEPS, "method": method}
+        return next_whites(equations, reduction, start, **options)[1].weights
 
     def _pull(self, views: tuple[LiveView, ...], before: Doubles) -> NormalEquations | None:
-        """Return the pull on the weights, as `Problem.pull`; the part of the colours is found once.
+        """Return the pull on the weights, as `Problem.pull`; the part of the colours is cached.
 
-        before: (n, 3), an answer that says which lights are dim.
+        before: (n, 3), an answer that tells which lights are dim.
         """
         if self._pulls is None or self._pulls[0] != views:
             power = _power(views)
             keeps_color = self._reduction.is_free & power.any(axis=1)
             present, prefer = self._basis.present_weights, self._constraints.prefer_current
 
-            def of(prefer: float, share: float) -> NormalEquations | None:
-                return pull_of(
+            def pull_to(prefer: float, share: float) -> NormalEquations | None:
+                return weight_pull(
                     power,
                     present,
                     self._fit,
@@ -183,43 +189,46 @@ class Live:
                     keeps_color=keeps_color,
                 )
 
-            self._pulls = views, of(prefer, 0.0), of(0.0, 1.0)
+            self._pulls = views, pull_to(prefer, 0.0), pull_to(0.0, 1.0)
         _, to_present, to_colors = self._pulls
         if to_colors is None:
             return to_present
-        # Importance of all that is painted, beside the number of pixels.
+        # The total importance, relative to the number of pixels.
         pixels = sum(view.pixels for view in views)
-        to_colors = to_colors.times(sum(float(view.counts[0]) for view in views) / pixels)
-        to_colors = drawn_more(to_colors, dimming_of(self._basis.present_weights, before))
+        to_colors = to_colors.scaled(sum(float(view.counts[0]) for view in views) / pixels)
+        to_colors = strengthen(to_colors, dimming_factors(self._basis.present_weights, before))
         return to_colors if to_present is None else to_present + to_colors
 
-    def _films_of(self, views: tuple[LiveView, ...]) -> Films:
+    def _joint_films(self, views: tuple[LiveView, ...]) -> Films:
         if self._films is None or self._films[0] != views:
-            self._films = views, Films([self._film_of(view) for view in views])
+            self._films = views, Films([self._film(view) for view in views])
         return self._films[1]
 
-    def _film_of(self, view: LiveView) -> SmallFilm:
-        """All films together have as many pixels as that of one view, or fewer of less noise."""
+    def _film(self, view: LiveView) -> SmallFilm:
+        """Return the film of a view; all films together have the pixels of one, or fewer with less
+        noise.
+        """
         side = block_side([one.basis for one in self._views], self._fit.transform)
-        most = min(FILM // len(self._views), view.pixels // side**2)
+        most = min(MAX_FILM_PIXELS // len(self._views), view.pixels // side**2)
         return view.film(self._fit.transform, max(1, most))
 
 
 def _power(views: Sequence[LiveView]) -> Doubles:
-    """‖Φᵢ‖² of all views together, (n, 3)."""
+    """Return ‖Φᵢ‖² of all views together, (n, 3)."""
     return reduce(add, (view.basis.power for view in views))
 
 
-def untouched(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
-    """The weights (n, 3) nearest to the present ones, of what constraints leave."""
+def unpainted_weights(views: Sequence[LiveView], reduction: Reduction) -> Doubles:
+    """Return the weights (n, 3) nearest to the present ones that constraints allow."""
     return _nearest(views[0].basis.present_weights, views, reduction)
 
 
 def _nearest(weights: Doubles, views: Sequence[LiveView], reduction: Reduction) -> Doubles:
-    """Of what constraints leave, (n, 3), by how bright the lights are.
+    """Return the nearest weights (n, 3) that constraints allow, relative to the brightness of
+    lights.
 
     Lights that keep to a range of white get its nearest one, as bright as they are.
     """
     weights = snap_to_whites(reduction, weights)
     reduction = center_windows(reduction, weights)
-    return solve_reduced(to_present(_power(views), weights), reduction, weights).weights
+    return solve_reduced(pull_to_present(_power(views), weights), reduction, weights).weights

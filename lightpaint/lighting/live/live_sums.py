@@ -10,66 +10,70 @@ from lightpaint.arrays import Doubles, Floats, Slices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_mean, block_sums, enlarged
-from lightpaint.lighting.live.tiles import FEW_LIGHTS, TiledEquations
-from lightpaint.lighting.loss.channel_loss import PaintedPixels, joined
-from lightpaint.lighting.loss.loss import STRIP
-from lightpaint.lighting.loss.reweighting import between
+from lightpaint.lighting.live.tiles import MAX_CHEAP_LIGHTS, TiledEquations
+from lightpaint.lighting.loss.channel_loss import PaintedPixels, join_pixels
+from lightpaint.lighting.loss.loss import STRIP_PIXELS
+from lightpaint.lighting.loss.reweighting import interpolate
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread
 
-#: Pixels that a picture is averaged to in display space, at most: what goes into one strip.
-FILM = STRIP
+#: Most pixels of an averaged picture in display space: those of one strip.
+MAX_FILM_PIXELS = STRIP_PIXELS
 
-#: What is left of 1 is 1 less what is painted, in singles, up to this.
-EPSILON = 1e-6
+#: Round-off, in float32, of an importance and its complement, whose sum is 1.
+IMPORTANCE_ROUND_OFF = 1e-6
 
-#: Parts of a step in display space that are tried. An answer is one step from the one before.
-PARTS = (1.0, 0.5, 0.25)
+#: Shares of a step to try in display space. An answer is one step from the last one.
+STEP_SHARES = (1.0, 0.5, 0.25)
 
 
 class PaintedTiles:
-    """Equations of what is painted and of the rest, each at weight 1, in linear light."""
+    """Equations of painted pixels and of the rest, each at weight 1, in linear light."""
 
     def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
         self._importance, self._seen = importance, basis.emitters_seen
         self._present = basis.present_weights
         self._paint = TiledEquations(basis.planes, image, importance)
-        self._left = np.where(basis.emitters_seen, np.float32(0), np.float32(1))
-        rest = basis.planes, basis.present_look, self._left
-        self._rest = TiledEquations(*rest, like=self._paint)
+        self._unpainted = np.where(basis.emitters_seen, np.float32(0), np.float32(1))
+        rest = basis.planes, basis.present_look, self._unpainted
+        self._rest = TiledEquations(*rest, twin=self._paint)
         self._whole = self._rest.base.copy()
         everything = slice(0, len(importance)), slice(0, importance.shape[1])
-        self._leave(everything)
-        # Where the rest is another by now.
+        self._set_unpainted(everything)
+        # Where the sums of the rest are out of date.
         self._is_old: Slices | None = everything
 
-    def _leave(self, region: Slices) -> None:
+    def _set_unpainted(self, region: Slices) -> None:
         left = np.maximum(1 - self._importance[region], 0)
-        self._left[region] = np.where(self._seen[region], 0, left)
+        self._unpainted[region] = np.where(self._seen[region], 0, left)
 
     def _update_rest(self, region: Slices) -> None:
-        """Where paint and rest are 1 in every pixel, the rest is what the paint is not."""
+        """Update the sums of the rest; as the complement of the paint where both add up to 1."""
         side = self._rest.side
         within = tuple(
-            slice(part.start * side, part.stop * side) for part in self._rest.touched(region)
+            slice(part.start * side, part.stop * side) for part in self._rest.tiles_in(region)
         )
-        counted = self._importance[within] + self._left[within]
+        counted = self._importance[within] + self._unpainted[within]
         one = np.where(self._seen[within], np.float32(0), np.float32(1))
-        if np.abs(counted - one).max(initial=0) <= EPSILON:
-            self._rest.update_as_rest(region, self._whole, self._paint, self._present)
+        if np.abs(counted - one).max(initial=0) <= IMPORTANCE_ROUND_OFF:
+            self._rest.update_as_complement(region, self._whole, self._paint, self._present)
         else:
             self._rest.update(region)
 
-    def painted(self, region: Slices, *, with_importance: bool) -> None:
+    def update(self, region: Slices, *, with_importance: bool) -> None:
+        """Update the sums after a rectangle was painted."""
         self._paint.update(region, with_M=with_importance)
         if not with_importance:
             return
-        before = self._left[region].copy()
-        self._leave(region)
-        if not np.array_equal(before, self._left[region]):
-            self._is_old = region if self._is_old is None else _both(self._is_old, region)
+        before = self._unpainted[region].copy()
+        self._set_unpainted(region)
+        if not np.array_equal(before, self._unpainted[region]):
+            self._is_old = (
+                region if self._is_old is None else _bounding_region(self._is_old, region)
+            )
 
     def equations(self, rest_weight: float) -> NormalEquations:
+        """Return the equations with this weight of the rest."""
         equations = self._paint.equations
         if not rest_weight:
             return equations
@@ -85,19 +89,21 @@ class PaintedTiles:
 
 
 class SmallFilm:
-    """The picture averaged to `most` pixels; what is painted of each, by its importance."""
+    """The picture averaged to `max_pixels`, and the paint of each by its importance."""
 
-    def __init__(self, basis: Basis, image: Floats, importance: Floats, most: int = FILM) -> None:
+    def __init__(
+        self, basis: Basis, image: Floats, importance: Floats, max_pixels: int = MAX_FILM_PIXELS
+    ) -> None:
         height, width = importance.shape
-        self._side = side = max(1, ceil((height * width / most) ** 0.5))
+        self._side = side = max(1, ceil((height * width / max_pixels) ** 0.5))
         self._image, self._importance, self._seen = image, importance, basis.emitters_seen
         rows, columns = -(-height // side), -(-width // side)
         self._size = rows, columns
-        # A block in which something else is seen shows no emitter.
+        # Emitters do not count in a block that shows anything else.
         unseen = (~self._seen).astype(np.float64)
         self._shown = np.where(_spread(block_sums(unseen, side), side, unseen.shape) > 0, unseen, 1)
         small = np.stack([self._average(x) for x in basis.planes])
-        # Singles are enough for what is averaged, and sums of them take half the time.
+        # float32 suffices for averages, and sums of it take half the time.
         planes = small.reshape(len(small), -1, 3).transpose(2, 0, 1)
         self.rows = np.ascontiguousarray(planes, np.float32)
         self._current = _planes(self._average(basis.present_look))
@@ -105,20 +111,20 @@ class SmallFilm:
         self._transform: ViewTransform | None = None
         self._seen_painted = self._seen_current = self._current
         self._a, self._left = np.zeros((2, rows * columns))
-        self.painted((slice(0, height), slice(0, width)))
+        self.update((slice(0, height), slice(0, width)))
 
     def _average(self, image: Floats) -> Floats:
         """Return (h', w', 3) means over blocks of a picture (h, w, 3)."""
         if self._side == 1 or self._shown.all():
-            return _averaged(image, self._side)
+            return _block_average(image, self._side)
         total = block_sums(image * self._shown[..., None], self._side)
         return np.asarray(total / block_sums(self._shown, self._side)[..., None], np.float32)
 
-    def painted(self, region: Slices) -> None:
-        """Average anew what a rectangle touches."""
+    def update(self, region: Slices) -> None:
+        """Average anew the blocks that a rectangle touches."""
         side, (height, width) = self._side, self._importance.shape
         (top, bottom), (left, right) = (
-            _around(part, side, length)
+            _block_range(part, side, length)
             for part, length in zip(region, (height, width), strict=True)
         )
         if top >= bottom or left >= right:
@@ -142,8 +148,8 @@ class SmallFilm:
             planes = np.ascontiguousarray(painted).reshape(3, -1)
             seen[...] = self._transform.encode_planes(planes).reshape(seen.shape)
 
-    def see_through(self, transform: ViewTransform | None) -> None:
-        """From now on a display is meant that shows light so."""
+    def set_transform(self, transform: ViewTransform | None) -> None:
+        """Set the view transform of the comparison; None keeps the last one."""
         if transform is not None and transform != self._transform:
             self._seen_painted, self._seen_current = (
                 np.array(transform.encode_planes(x), np.float64)
@@ -152,7 +158,7 @@ class SmallFilm:
         self._transform = transform
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
-        """The loss of these pixels; an average counts as much as all that are in it."""
+        """Return the loss of these pixels; an average counts as much as all pixels in it."""
         rest = rest_weight * self._left
         weight = self._a + rest
         share = np.where(weight > 0, rest / np.where(weight > 0, weight, 1), 0)
@@ -161,7 +167,7 @@ class SmallFilm:
 
 
 class Films:
-    """The films of several views as one: their pixels behind each other."""
+    """The films of several views as one, with their pixels behind each other."""
 
     def __init__(self, films: Sequence[SmallFilm]) -> None:
         self._films = films
@@ -169,23 +175,24 @@ class Films:
         self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
-        """The loss of all pixels, as of `SmallFilm`."""
+        """Return the loss of all pixels, as `SmallFilm.pixels` does."""
         each = [film.pixels(rest_weight, transform) for film in self._films]
-        return each[0] if len(each) == 1 else joined(each)
+        return each[0] if len(each) == 1 else join_pixels(each)
 
-    def nearer(
+    def improve(
         self,
         pixels: PaintedPixels,
         starts: Sequence[Doubles],
         best: Callable[[NormalEquations, Doubles], Doubles],
         pull: NormalEquations | None,
-        allowed: Callable[[Doubles], Doubles],
+        project: Callable[[Doubles], Doubles],
     ) -> Doubles:
-        """One round of reweighting: weights (n, 3) that miss no more than any of `starts`.
+        """Return improve weights (n, 3) by one round of reweighting; the loss is that of the best
+        start, or less.
 
-        As of `reweighted.rounds`, but for singles, and for a step that is halved a few times only:
-        as long as less of it misses less. allowed: from weights between two that are allowed to
-        such.
+        The round is one of `reweighting.rounds`, but in float32, and with a step that is halved a
+        few times only, as long as a shorter one lowers the loss. allowed: projects weights between
+        two allowed ones onto the constraints.
         """
 
         def missed(w: Doubles, x: Doubles) -> float:
@@ -198,8 +205,8 @@ class Films:
         start, before, value = starts[k], mixed[k], values[k]
         squares = pixels.squares(before, from_clipping=False)
         image, weight = (x.astype(np.float32) for x in squares)
-        # Threads of BLAS would wait for each other at few lights.
-        with one_thread() if len(start) <= FEW_LIGHTS else nullcontext():
+        # With few lights, threads of BLAS would mostly wait for each other.
+        with one_thread() if len(start) <= MAX_CHEAP_LIGHTS else nullcontext():
             M = np.stack([(r * w) @ r.T for r, w in zip(self._rows, weight, strict=True)])
         b = np.stack([r @ x for r, x in zip(self._rows, weight * image, strict=True)])
         norm2 = np.square(image) * weight
@@ -207,8 +214,8 @@ class Films:
             M.astype(np.float64), b.astype(np.float64), norm2.sum(axis=1, dtype=np.float64)
         )
         found, nearest = best(equations, start), start
-        for part in PARTS:
-            step = allowed(between(start, found, part))
+        for part in STEP_SHARES:
+            step = project(interpolate(start, found, part))
             reached = missed(step, self._mixed(step))
             if reached > value and nearest is not start:
                 break
@@ -217,14 +224,14 @@ class Films:
         return nearest
 
     def _mixed(self, weights: Doubles) -> Doubles:
-        """The picture of these weights, (3, p)."""
+        """Return the picture of these weights, (3, p)."""
         w = weights.astype(np.float32)
         mixed = np.stack([w[:, c] @ rows for c, rows in enumerate(self._rows)])
         return mixed.astype(np.float64)
 
 
-def _both(one: Slices, other: Slices) -> Slices:
-    """The smallest region that holds both."""
+def _bounding_region(one: Slices, other: Slices) -> Slices:
+    """Return the smallest region that holds both."""
     (top, left), (below, right) = (
         [min(a.start, b.start) for a, b in zip(one, other, strict=True)],
         [max(a.stop, b.stop) for a, b in zip(one, other, strict=True)],
@@ -232,8 +239,8 @@ def _both(one: Slices, other: Slices) -> Slices:
     return slice(top, below), slice(left, right)
 
 
-def _around(along: slice, side: int, length: int) -> tuple[int, int]:
-    """The pixels of all blocks that a slice touches."""
+def _block_range(along: slice, side: int, length: int) -> tuple[int, int]:
+    """Return the range of all blocks that a slice touches."""
     start, stop, _ = along.indices(length)
     return start // side * side, min(-(-stop // side) * side, length)
 
@@ -243,8 +250,8 @@ def _spread(blocks: Doubles, side: int, size: tuple[int, ...]) -> Doubles:
     return np.asarray(enlarged(blocks, side)[: size[0], : size[1]])
 
 
-def _averaged(image: Floats, side: int) -> Floats:
-    """(h, w, 3) means over blocks."""
+def _block_average(image: Floats, side: int) -> Floats:
+    """Return means over blocks, (h', w', 3)."""
     height, width = image.shape[:2]
     if side == 1:
         return image

@@ -1,9 +1,9 @@
 """Normal equations that follow the brush (Schoeneman et al. 1993, Eq 7, 8, 9).
 
 The picture is cut into tiles, and M, b and ‖Ψ‖² are sums over them. A stroke makes some tiles
-dirty, whose sums are formed anew: its cost is that of the tiles it touches. Nothing is ever
-subtracted, so that nothing drifts: undoing a stroke gives back the very same bits, and an
-updated problem is bit for bit the one built from scratch.
+dirty, and their sums are formed anew: its cost is that of the tiles it touches. Nothing is ever
+subtracted, so that nothing drifts: undoing a stroke restores the same bits, and an updated problem
+equals the one built from scratch bit for bit.
 """
 
 import threading
@@ -19,28 +19,28 @@ from lightpaint.errors import SizeError
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import one_thread, side_by_side
 
-#: Pixels along the side of a tile. Smaller ones fit a brush better and are more to add.
-SIDE = 16
+#: Pixels along the side of a tile. Smaller tiles fit a brush better, but there are more to add.
+TILE_SIDE = 16
 
-#: Bytes that the sums of all tiles may take; tiles are larger if they would take more.
-ROOM = 2**29
+#: Most bytes for the sums of all tiles; tiles are larger if they would take more.
+MAX_SUM_BYTES = 2**29
 
-#: Bytes of pixels, in float64, that are summed at a time: they stay in the processor's cache.
-CHUNK = 2**21
+#: Bytes of pixels, in float64, that are summed together: they stay in the processor's cache.
+CHUNK_BYTES = 2**21
 
-#: Lights up to which a tile takes the time of the calls and not of the arithmetic.
-FEW_LIGHTS = 32
+#: Most lights for which calls, not arithmetic, determine the time of a tile.
+MAX_CHEAP_LIGHTS = 32
 
 
 class TiledEquations:
-    """The problem of one basis, target and importance, which are looked at where they are.
+    """The problem of one basis, target and importance, which stay the caller's arrays.
 
     planes: (n, h, w, 3) if an array; target: (h, w, 3); importance: (h, w), or (h, w, 1 or 3) where
-    channels differ, finite and >= 0. Whoever paints on these says where, by `update`.
+    channels differ, finite and >= 0. Call `update` after painting on them.
 
     The sums of the tiles are the base of a pyramid, each of whose nodes is the sum of two by
     two below it: a dirty tile costs its own sum and three additions per level, and the order
-    of summation does not depend on what has been painted when.
+    of summation does not depend on the order of strokes.
     """
 
     def __init__(
@@ -50,9 +50,11 @@ class TiledEquations:
         importance: Floats,
         *,
         side: int | None = None,
-        like: "TiledEquations | None" = None,
+        twin: "TiledEquations | None" = None,
     ) -> None:
-        """like: of the same planes, updated for the same strokes; they are looked at once then."""
+        """Sum all tiles. like: equations of the same planes and strokes, whose reads of planes are
+        shared.
+        """
         planes = as_planes(planes)
         self._count = n = planes.count
         height, width = planes.size
@@ -66,11 +68,12 @@ class TiledEquations:
             )
         self._target = target
         self._importance = importance
-        self.side = side_for(n, height, width) if side is None else side
-        self._lit: _Lit = _Lit(planes, self.side) if like is None else like._lit
-        self._lit.is_shared = like is not None
-        # What a stroke of colour leaves as it is, M, is kept apart from what it changes, b and
-        # ‖Ψ‖².
+        self.side = tile_side(n, height, width) if side is None else side
+        self._tile_reader: _TileReader = (
+            _TileReader(planes, self.side) if twin is None else twin._tile_reader
+        )
+        self._tile_reader.is_shared = twin is not None
+        # A stroke of colour changes b and ‖Ψ‖², but not M, which has a pyramid of its own.
         shape = -(-height // self.side), -(-width // self.side)
         self._M = _pyramid(shape, (3, n, n))
         self._b = _pyramid(shape, (3, n + 1))
@@ -82,8 +85,9 @@ class TiledEquations:
         M, b = self._M[-1][0, 0], self._b[-1][0, 0]
         return NormalEquations(M.copy(), b[:, :-1].copy(), b[:, -1].copy())
 
-    def touched(self, region: tuple[slice, slice]) -> tuple[range, range]:
-        """Rows and columns of the tiles that a rectangle, slices of rows and columns, touches.
+    def tiles_in(self, region: tuple[slice, slice]) -> tuple[range, range]:
+        """Return rows and columns of the tiles that a rectangle, slices of rows and columns,
+        touches.
 
         Raises ValueError for one that runs backwards.
         """
@@ -91,32 +95,32 @@ class TiledEquations:
         return _tiles(region[0], height, self.side), _tiles(region[1], width, self.side)
 
     def update(self, region: tuple[slice, slice], *, with_M: bool = True) -> None:
-        """Sum anew after a rectangle was painted over. with_M: whether its importance changed."""
-        rows, columns = self.touched(region)
+        """Sum the tiles of a painted rectangle anew. with_M: whether its importance changed."""
+        rows, columns = self.tiles_in(region)
         if not (rows and columns):
             return
-        few = max(CHUNK // (8 * 3 * (self._count + 1) * self.side**2), 1)
+        few = max(CHUNK_BYTES // (8 * 3 * (self._count + 1) * self.side**2), 1)
         wide = min(few, len(columns))
-        blocks = product(_parts(rows, few // wide), _parts(columns, wide))
+        blocks = product(_split_range(rows, few // wide), _split_range(columns, wide))
         sum_block = partial(self._sum, with_M=with_M)
-        if with_M and self._count > FEW_LIGHTS:
+        if with_M and self._count > MAX_CHEAP_LIGHTS:
             side_by_side(sum_block, blocks)
         else:
             with one_thread():
                 for block in blocks:
                     sum_block(block)
         for pyramid in (self._M, self._b) if with_M else (self._b,):
-            _add_up(pyramid, rows, columns)
+            _sum_pyramid(pyramid, rows, columns)
 
-    def update_as_rest(
+    def update_as_complement(
         self, region: tuple[slice, slice], whole: Doubles, painted: "TiledEquations", w: Doubles
     ) -> None:
-        """The same, where importance is what `painted` leaves of 1: without looking at pixels.
+        """Update the sums where importance is 1 less that of `painted`, without reading pixels.
 
         whole: the `base` at importance 1. painted: of the same images. w: (n, 3), the weights of
         which the target is the sum.
         """
-        rows, columns = self.touched(region)
+        rows, columns = self.tiles_in(region)
         if not (rows and columns):
             return
         n = self._count
@@ -126,15 +130,17 @@ class TiledEquations:
         self._b[0][tiles][..., :n] = b
         self._b[0][tiles][..., n] = np.einsum("rcki,ik->rck", b, w)
         for pyramid in (self._M, self._b):
-            _add_up(pyramid, rows, columns)
+            _sum_pyramid(pyramid, rows, columns)
 
     @property
     def base(self) -> Doubles:
-        """M of each tile, (rows, columns, 3, n, n); to look at only."""
+        """M of each tile, (rows, columns, 3, n, n), read-only."""
         return self._M[0]
 
     def _sum(self, block: tuple[range, range], *, with_M: bool) -> None:
-        """Σ D f g over each of a block of tiles: of images and target, and of pairs of images."""
+        """Compute Σ D f g over each tile of a block, for images with the target and pairs of
+        images.
+        """
         n, side = self._count, self.side
         tiles = len(block[0]), len(block[1])
         rows, columns = (slice(part.start, part.stop) for part in block)
@@ -150,7 +156,7 @@ class TiledEquations:
             # Pixels without weight may hold anything.
             np.copyto(target, 0, where=(D == 0)[:, :, :, None])
         painted = target * D[:, :, :, None]
-        lit = self._lit(where, tiles)
+        lit = self._tile_reader(where, tiles)
         with np.errstate(invalid="ignore"):
             b = np.matmul(lit, painted.swapaxes(-1, -2))[..., 0]
         if not np.isfinite(b).all():
@@ -159,21 +165,21 @@ class TiledEquations:
         self._b[0][rows, columns, :, :n] = b
         self._b[0][rows, columns, :, n] = np.matmul(target, painted.swapaxes(-1, -2))[..., 0, 0]
         if with_M:
-            one = _ROOM.array("one", lit.shape)
+            one = _BUFFERS.array("one", lit.shape)
             np.multiply(lit, np.sqrt(D)[:, :, :, None], out=one)
             two = one
-            if n <= FEW_LIGHTS:
+            if n <= MAX_CHEAP_LIGHTS:
                 # Of one array and itself numpy forms half of the product, of two all of it, which
                 # is faster for few lights.
-                two = _ROOM.array("two", lit.shape)
+                two = _BUFFERS.array("two", lit.shape)
                 two[...] = one
             np.matmul(one, two.swapaxes(-1, -2), out=self._M[0][rows, columns])
 
 
-class _Lit:
-    """Basis images cut into tiles, in float64.
+class _TileReader:
+    """A reader of basis images, cut into tiles, in float64.
 
-    is_shared: whether the last block is kept, for who asks for the same, and never changes.
+    is_shared: whether the last block is kept for a second reader.
     """
 
     def __init__(self, planes: Planes, side: int) -> None:
@@ -182,7 +188,7 @@ class _Lit:
         self.is_shared = False
 
     def __call__(self, where: tuple[slice, slice], tiles: tuple[int, int]) -> Doubles:
-        """(rows, columns, 3, n, side²) of the tiles at `where`; to look at only."""
+        """Return the tiles at `where`, (rows, columns, 3, n, side²), read-only."""
         last = self._last
         if last is not None and last[0] == where:
             return last[1]
@@ -195,33 +201,33 @@ class _Lit:
         return made
 
 
-class _Room(threading.local):
-    """Memory of a thread that is used again: new pages from the system take as long as the sums."""
+class _Buffers(threading.local):
+    """Memory of a thread that is reused: new pages from the system take as long as the sums."""
 
     def __init__(self) -> None:
         self._kept: dict[str, Doubles] = {}
 
     def array(self, name: str, shape: tuple[int, ...]) -> Doubles:
-        """An array of any content, until the next of that name is asked for."""
+        """Return an array of any content, valid until the next call with that name."""
         size = prod(shape)
-        if 8 * size > 2 * CHUNK:
+        if 8 * size > 2 * CHUNK_BYTES:
             return np.empty(shape)
         if name not in self._kept or self._kept[name].size < size:
             self._kept[name] = np.empty(size)
         return self._kept[name][:size].reshape(shape)
 
 
-_ROOM = _Room()
+_BUFFERS = _Buffers()
 
 
-def _parts(whole: range, size: int) -> list[range]:
-    """Ranges of `size`, the last one shorter, that make up the whole."""
+def _split_range(whole: range, size: int) -> list[range]:
+    """Return ranges of `size`, the last one shorter, that make up the whole."""
     starts = range(whole.start, whole.stop, size)
     return [range(first, min(first + size, whole.stop)) for first in starts]
 
 
 def _cut(pictures: Floats, side: int, out: Doubles) -> None:
-    """Cut a block of tiles apart: (n, h, w, channels) into (rows, columns, channels, n, side²).
+    """Cut a block of tiles: (n, h, w, channels) into (rows, columns, channels, n, side²).
 
     Tiles that the border of the picture cuts off are 0 beyond it.
     """
@@ -236,7 +242,9 @@ def _cut(pictures: Floats, side: int, out: Doubles) -> None:
 
 
 def _pyramid(shape: tuple[int, int], node: tuple[int, ...]) -> list[Doubles]:
-    """Zeros for rows and columns of nodes, for each two by two of these, and so on up to one."""
+    """Return zeros for rows and columns of nodes, for each two by two of these, and so on up to
+    one.
+    """
     rows, columns = shape
     levels = []
     while rows * columns > 1:
@@ -246,8 +254,8 @@ def _pyramid(shape: tuple[int, int], node: tuple[int, ...]) -> list[Doubles]:
     return [*levels, np.zeros((1, 1, *node))]
 
 
-def _add_up(pyramid: list[Doubles], rows: range, columns: range) -> None:
-    """Form anew all that stands on these nodes of the base."""
+def _sum_pyramid(pyramid: list[Doubles], rows: range, columns: range) -> None:
+    """Sum anew all nodes above these nodes of the base."""
     top, bottom, left, right = rows.start, rows.stop, columns.start, columns.stop
     for below, above in pairwise(pyramid):
         top, bottom, left, right = top // 2, -(-bottom // 2), left // 2, -(-right // 2)
@@ -256,12 +264,12 @@ def _add_up(pyramid: list[Doubles], rows: range, columns: range) -> None:
         np.add(two[:, 0::2], two[:, 1::2], out=above[top:bottom, left:right])
 
 
-def side_for(n: int, height: int, width: int) -> int:
-    """Pixels along the side of a tile: `SIDE`, or as many more as keep all sums within `ROOM`."""
+def tile_side(n: int, height: int, width: int) -> int:
+    """Return the side of a tile in pixels: `SIDE`, or more to keep all sums within `ROOM`."""
     node_bytes = 3 * (n * n + n + 1) * 8
-    side = SIDE
+    side = TILE_SIDE
     # There are at most four nodes for each tile, inner ones and unused leaves included.
-    while 4 * node_bytes * -(-height // side) * -(-width // side) > ROOM and side < max(
+    while 4 * node_bytes * -(-height // side) * -(-width // side) > MAX_SUM_BYTES and side < max(
         height, width
     ):
         side *= 2
@@ -269,7 +277,7 @@ def side_for(n: int, height: int, width: int) -> int:
 
 
 def _tiles(along: slice, length: int, side: int) -> range:
-    """Numbers of the tiles that a slice of pixels touches."""
+    """Return the numbers of the tiles that a slice of pixels touches."""
     start, stop, step = along.indices(length)
     if step < 0:
         raise ValueError("the slices of a region go forwards: give steps > 0")

@@ -1,1 +1,1 @@
-"""Losses of a picture beside its painting, and the linear problems that stand for them."""
+"""Losses of a picture against its painting, and the linear problems that stand for them."""

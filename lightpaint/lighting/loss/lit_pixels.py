@@ -1,4 +1,4 @@
-"""Pixels that count, and what lights do to them: all that a descent looks at, again and again."""
+"""Pixels that count, with the light of each lamp on them: the data of a descent."""
 
 from dataclasses import dataclass
 
@@ -10,8 +10,8 @@ from lightpaint.basis.planes import Planes
 from lightpaint.lighting.loss.loss import Loss, PixelLoss
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Part of the pixels that must not count for it to be worth a copy of the others.
-FEW_LEFT_OUT = 0.1
+#: Share of pixels without importance from which a copy of the others is worth its time.
+MIN_SKIPPED_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -27,20 +27,20 @@ class LitPixels:
 
     @classmethod
     def whole(cls, basis: Basis, loss: Loss) -> "LitPixels":
-        """All there are."""
+        """Return all pixels."""
         return cls(basis.planes, loss.pixels)
 
     @classmethod
     def of(cls, basis: Basis, loss: Loss) -> "LitPixels":
-        """Those that count."""
+        """Return the pixels that count."""
         whole = cls.whole(basis, loss)
         counted = np.flatnonzero(whole.pixels.importance)
-        if counted.size > (1 - FEW_LEFT_OUT) * len(whole.pixels):
+        if counted.size > (1 - MIN_SKIPPED_SHARE) * len(whole.pixels):
             return whole
-        return cls(basis.planes.picked(counted), whole.pixels.at(counted), counted)
+        return cls(basis.planes.picked(counted), whole.pixels.subset(counted), counted)
 
     def predicted(self, weights: Doubles) -> Doubles:
-        """Σ w_i Φ_i, (3, p), in float64: a float32's round-off would hide the last steps."""
+        """Return Σ w_i Φ_i, (3, p), in float64: a float32's round-off would hide the last steps."""
         made = np.empty((3, len(self.pixels)))
 
         def mix(where: slice, _: PixelLoss) -> None:
@@ -48,11 +48,11 @@ class LitPixels:
             for c in range(3):
                 made[c, where] = weights[:, c] @ lit[..., c].astype(np.float64)
 
-        self.pixels.each(mix)
+        self.pixels.map_strips(mix)
         return made
 
     def objective_and_gradient(self, weights: Doubles) -> tuple[float, Doubles]:
-        """The loss of weights, (n, 3), and half its gradient, (n, 3)."""
+        """Return the loss of weights, (n, 3), and half its gradient, (n, 3)."""
 
         def its(where: slice, pixels: PixelLoss) -> tuple[float, Doubles]:
             rows = self.planes.pixels(where).transpose(2, 0, 1).astype(np.float64, order="C")
@@ -60,20 +60,21 @@ class LitPixels:
             value, slope = pixels.objective_and_gradient(x)
             return value, np.stack([lit @ s for lit, s in zip(rows, slope, strict=True)], axis=1)
 
-        values, slopes = zip(*self.pixels.each(its), strict=True)
+        values, slopes = zip(*self.pixels.map_strips(its), strict=True)
         return sum(values), np.asarray(sum(slopes))
 
     def slope(self, image: Doubles, weight: Doubles, x: Doubles, ahead: Doubles) -> float:
-        """Half of how Σ weight (image − x)² falls on the way from x to `ahead`, at x."""
+        """Return half of the slope at which Σ weight (image − x)² falls at x on the way to
+        `ahead`."""
 
         def its(where: slice, _: PixelLoss) -> float:
             at = x[:, where]
             return float((weight[:, where] * (image[:, where] - at) * (ahead[:, where] - at)).sum())
 
-        return sum(self.pixels.each(its))
+        return sum(self.pixels.map_strips(its))
 
     def equations(self, image: Doubles, weight: Doubles) -> NormalEquations:
-        """The linear problem of squares, (3, p) each."""
+        """Return the linear problem of squares, (3, p) each."""
         shape = (*self.planes.size, 3)
         its, weights = image.T.reshape(shape), weight.T.reshape(shape)
         return NormalEquations(*self.planes.sums(weights, its))

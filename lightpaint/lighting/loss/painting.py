@@ -1,4 +1,4 @@
-"""The painting as the solve takes it."""
+"""The losses that paintings stand for."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,21 +10,21 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import TargetError
 from lightpaint.lighting.fit import Emitters, Fit
-from lightpaint.lighting.loss.emitter_paint import asks_no_less, dark_of
+from lightpaint.lighting.loss.emitter_paint import dark_threshold, find_glow_paint
 from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target
 
 
-def at_its_word(
+def literal_squares(
     image: Floats, importance: Floats, *, seen: Bools, current: Floats | None, unpainted: float
 ) -> Squares:
-    """The squares that a painting stands for, of any part of its pixels.
+    """Return the literal squares of a painting, or of a part of its pixels.
 
     image: (h, w, 3); importance: (h, w), a; seen: (h, w), where the camera sees an emitter;
-    current: (h, w, 3), the present look, needed only for unpainted > 0: the weight of what is not
-    painted against it. A pixel then minimises a ‖Ψ − x‖² + unpainted (1 − a) ‖current − x‖²,
+    current: (h, w, 3), the present look, needed only for unpainted > 0, the weight that holds
+    unpainted pixels to it. A pixel then minimises a ‖Ψ − x‖² + unpainted (1 − a) ‖current − x‖²,
     which is one residual of weight a + unpainted (1 − a) against the weighted mean of both images.
     """
     a = importance.astype(np.float64)[..., None]
@@ -38,22 +38,23 @@ def at_its_word(
     return Squares(mixed, total, np.where(total > 0, 1 - a / counted, 0))
 
 
-def left_out(target: Target, seen: Bools, emitters: Emitters) -> Bools:
-    """(h, w), what is painted and counts nothing, since an emitter is `seen` there, (h, w).
+def ignored_paint(target: Target, seen: Bools, emitters: Emitters) -> Bools:
+    """Return, (h, w), the painted pixels that do not count because an emitter is `seen` there.
 
-    Unless somebody painted them: at unit emission they would outshine everything the light falls
-    on.
+    seen: (h, w). Emitters count if somebody painted them; otherwise, at unit emission, they would
+    outshine everything that their light falls on.
     """
     skips = target.everything if emitters == "auto" else emitters == "skip"
     return np.asarray(seen & (target.importance > 0) & skips)
 
 
-def what_counts(target: Target, seen: Bools, emitters: Emitters = "auto") -> Target:
-    """`target` whose importance says it all. seen, emitters: as of `left_out`.
+def resolve_importance(target: Target, seen: Bools, emitters: Emitters = "auto") -> Target:
+    """Return `target` with the final importance of each pixel. seen, emitters: see `left_out`.
+    seen, emitters: as of `left_out`.
 
     Raises TargetError if nothing is left.
     """
-    importance = np.where(left_out(target, seen, emitters), np.float32(0), target.importance)
+    importance = np.where(ignored_paint(target, seen, emitters), np.float32(0), target.importance)
     if not importance.any():
         raise TargetError(
             f"target {target.name}: the camera sees an emitter in every painted pixel, so none "
@@ -62,21 +63,21 @@ def what_counts(target: Target, seen: Bools, emitters: Emitters = "auto") -> Tar
     return replace(target, importance=importance, everything=False)
 
 
-def with_emitters_read(target: Target, basis: Basis, fit: Fit) -> Target:
-    """`target`, painted over the look of `basis`, with "at least" where it paints emitters in view.
+def resolve_emitter_paint(target: Target, basis: Basis, fit: Fit) -> Target:
+    """Return `target`, painted over the look of `basis`, with "at least" for its emitters in view.
 
-    Once: where it is not taken at its word, and nobody says that emitters count as painted. fit:
-    with nothing left open.
+    This happens once, unless the target is literal or the fit says how emitters count. fit: with
+    nothing left open.
     """
     if fit.literal or fit.emitters != "auto" or not (target.over_look and target.reads_emitters):
         return target
-    glows = asks_no_less(
+    glows = find_glow_paint(
         target.image,
         target.importance,
         basis.present_look,
         basis.emitters_seen,
         fit.transform,
-        dark=dark_of(basis.present_look, basis.emitters_seen),
+        dark=dark_threshold(basis.present_look, basis.emitters_seen),
     )[..., None]
     at_least = glows if target.at_least is None else target.at_least | glows
     its = np.broadcast_to(at_least, target.image.shape) if glows.any() else target.at_least
@@ -84,14 +85,14 @@ def with_emitters_read(target: Target, basis: Basis, fit: Fit) -> Target:
 
 
 def present_look(basis: Basis, unpainted: float) -> Floats | None:
-    """(h, w, 3), what unpainted pixels are held to; None if nothing is."""
+    """Return the look (h, w, 3) that holds unpainted pixels; None if it does not."""
     return basis.mix(basis.present_weights) if unpainted > 0 else None
 
 
-def squares_of(basis: Basis, target: Target, *, unpainted: float = 0.0) -> Squares:
-    """The linear problem of one painting, taken at its word, of the size of the basis."""
-    counted = what_counts(target, basis.emitters_seen)
-    return at_its_word(
+def target_squares(basis: Basis, target: Target, *, unpainted: float = 0.0) -> Squares:
+    """Return the literal squares of one painting of the size of the basis."""
+    counted = resolve_importance(target, basis.emitters_seen)
+    return literal_squares(
         counted.image,
         counted.importance,
         seen=basis.emitters_seen,
@@ -100,13 +101,13 @@ def squares_of(basis: Basis, target: Target, *, unpainted: float = 0.0) -> Squar
     )
 
 
-def weight_of_rest(views: Views, fit: Fit) -> float:
-    """Return the weight of each pixel that is not painted, as of `rest_weight`."""
-    return rest_weight(*painted_and_rest(views), fit)
+def unpainted_weight_of(views: Views, fit: Fit) -> float:
+    """Return the weight of each unpainted pixel, as `rest_weight` does."""
+    return unpainted_weight(*importance_sums(views), fit)
 
 
-def rest_weight(painted: float, rest: float, fit: Fit) -> float:
-    """Return the weight of each pixel that is not painted, h Σ D / Σ (1 − D) for hold h.
+def unpainted_weight(painted: float, rest: float, fit: Fit) -> float:
+    """Return the weight of each unpainted pixel, h Σ D / Σ (1 − D) for hold h.
 
     painted, rest: Σ D and Σ (1 − D). It is at most that of a painted pixel, so that a small rest
     does not outweigh the painting.
@@ -116,8 +117,8 @@ def rest_weight(painted: float, rest: float, fit: Fit) -> float:
     return min(fit.hold * painted / rest, 1.0) if rest > 0 else 0.0
 
 
-def painted_and_rest(views: Views) -> tuple[float, float]:
-    """Σ D and Σ (1 − D), the latter of the pixels in which no emitter is seen."""
+def importance_sums(views: Views) -> tuple[float, float]:
+    """Return Σ D and Σ (1 − D), the latter over pixels without a visible emitter."""
     painted, rest = 0.0, 0.0
     for basis, target in zip(views.bases, views.targets, strict=True):
         a = target.importance.astype(np.float64)
@@ -127,9 +128,9 @@ def painted_and_rest(views: Views) -> tuple[float, float]:
 
 
 def joint_squares(views: Views, *, unpainted: float) -> Squares:
-    """All paintings, each taken at its word, as one problem."""
+    """Return the literal squares of all paintings as one problem."""
     each = [
-        squares_of(basis, target, unpainted=unpainted)
+        target_squares(basis, target, unpainted=unpainted)
         for basis, target in zip(views.bases, views.targets, strict=True)
     ]
     return Squares(
@@ -139,38 +140,38 @@ def joint_squares(views: Views, *, unpainted: float) -> Squares:
     )
 
 
-def loss_of(
-    word: Squares,
+def choose_loss(
+    literal: Squares,
     at_least: Bools,
     transform: ViewTransform | None,
     *,
     painted: Callable[[], Doubles],
     current: Callable[[], Floats],
 ) -> Loss:
-    """Choose what a picture costs: `word` itself where it says all.
+    """Choose the loss: `literal` itself if it is equal to it.
 
-    at_least: (h, w, 3), where brighter is as good. painted, current: Ψ and the present look, asked
-    for where they are needed.
+    at_least: (h, w, 3), where brighter is as good. painted, current: Ψ and the present look,
+    called if they are needed.
     """
-    if transform is None and not (at_least.any() and at_least[word.weight[..., 0] > 0].any()):
-        return word
+    if transform is None and not (at_least.any() and at_least[literal.weight[..., 0] > 0].any()):
+        return literal
     return PaintingLoss(
         painted=painted(),
-        importance=word.weight[..., 0],
-        share=word.share[..., 0],
+        importance=literal.weight[..., 0],
+        share=literal.share[..., 0],
         current=current(),
         at_least=at_least,
         transform=transform,
     )
 
 
-def brighter_will_do(views: Views) -> Bools:
-    """Where something brighter than the painting is as good, of all views."""
+def at_least_mask(views: Views) -> Bools:
+    """Return where brighter than the painting is as good, in all views."""
     nowhere = [np.zeros((*basis.size, 3), bool) for basis in views.bases]
     given = [target.at_least for target in views.targets]
     return views.join([n if a is None else a for a, n in zip(given, nowhere, strict=True)])
 
 
-def painted_light(views: Views) -> Doubles:
-    """Ψ of all views in float64."""
+def target_light(views: Views) -> Doubles:
+    """Return Ψ of all views in float64."""
     return views.join([target.image.astype(np.float64) for target in views.targets])

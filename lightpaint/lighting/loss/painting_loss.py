@@ -1,4 +1,4 @@
-"""The loss of a painting that knows "at least this bright", and what a display shows."""
+"""The loss of a painting with "at least this bright", in light or as a display shows it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,19 +12,19 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.loss.channel_loss import PaintedPixels
-from lightpaint.lighting.loss.loss import STRIP, Cut, Loss, image_of, planes_of
+from lightpaint.lighting.loss.loss import STRIP_PIXELS, Cut, Loss, image_of, planes_of
 
 
 @dataclass(frozen=True)
 class PaintingLoss(Loss):
-    """The loss of pictures beside a painting, as a display shows both, or as light.
+    """The loss of pictures against a painting, as a display shows both, or as light.
 
     With the importance D, the part q of it that is for the current look C, and the view
     transform V:
 
         F(x) = Σ D [(1 − q) ‖V(ψ) − V(x)‖² + q ‖V(C) − V(x)‖²]
 
-    ψ is the painting Ψ; but where Ψ says only "at least this bright", it is x if that is brighter.
+    ψ is the painting Ψ; where Ψ means only "at least this bright", it is x if that is brighter.
     V is the identity in linear light, and F then is convex.
 
     painted: (h, w, 3), Ψ, linear. importance: (h, w), D. share: (h, w), q. current: (h, w, 3), C,
@@ -50,7 +50,7 @@ class PaintingLoss(Loss):
 
     @cached_property
     def pixels(self) -> PaintedPixels:
-        """All of them, channel by channel."""
+        """All pixels, channel by channel."""
         return PaintedPixels(
             planes_of(self.painted),
             np.asarray(self.importance, np.float64).ravel(),
@@ -60,25 +60,25 @@ class PaintingLoss(Loss):
             self.transform,
         )
 
-    def shown(self, image: Floats) -> Doubles:
+    def encode(self, image: Floats) -> Doubles:
         """Return V of linear pixels, (…, 3)."""
         if self.transform is None:
             return np.array(image, np.float64)
         planes = planes_of(image)
         out = np.empty_like(planes)
-        for start in range(0, planes.shape[1], STRIP):
-            where = slice(start, start + STRIP)
+        for start in range(0, planes.shape[1], STRIP_PIXELS):
+            where = slice(start, start + STRIP_PIXELS)
             out[:, where] = self.transform.encode_planes(planes[:, where])
         return image_of(out, image.shape[:-1])
 
-    def meant(self, x: Floats) -> Doubles:
+    def goal(self, x: Floats) -> Doubles:
         """Return (1 − q) ψ + q C at a picture x, (h, w, 3) linear."""
         q = self.share[..., None]
-        return np.asarray((1 - q) * self._moved(x) + q * self.current, np.float64)
+        return np.asarray((1 - q) * self._psi(x) + q * self.current, np.float64)
 
-    def missed(self, x: Floats) -> Doubles:
+    def residual(self, x: Floats) -> Doubles:
         """Return V(ψ) − V(x), (h, w, 3)."""
-        return np.asarray(self.shown(self._moved(x)) - self.shown(x))
+        return np.asarray(self.encode(self._psi(x)) - self.encode(x))
 
     def exceeds(self, x: Floats | float) -> Bools:
         return self.at_least & (x > self.painted) if self._may_exceed else self.at_least
@@ -87,12 +87,12 @@ class PaintingLoss(Loss):
     def _may_exceed(self) -> bool:
         return bool(self.at_least.any())
 
-    def _moved(self, x: Floats) -> Doubles:
+    def _psi(self, x: Floats) -> Doubles:
         """Return ψ at x, (h, w, 3)."""
         return np.asarray(np.where(self.exceeds(x), x, self.painted), np.float64)
 
-    def of_blocks(self, parts: Sequence[tuple[Cut, Doubles]], side: int) -> "PaintingLoss":
-        each = [self.cut(cut)._averaged(counts, side) for cut, counts in parts]
+    def block_means(self, parts: Sequence[tuple[Cut, Doubles]], side: int) -> "PaintingLoss":
+        each = [self.cut(cut)._block_average(counts, side) for cut, counts in parts]
 
         def row(name: str) -> npt.NDArray[Any]:
             arrays = [getattr(part, name) for part in each]
@@ -102,7 +102,7 @@ class PaintingLoss(Loss):
         rows: dict[str, Any] = {name: row(name) for name in names}
         return replace(self, **rows)
 
-    def _averaged(self, counts: Doubles, side: int) -> "PaintingLoss":
+    def _block_average(self, counts: Doubles, side: int) -> "PaintingLoss":
         """Return the loss of means over blocks of one view. counts: (h, w), the importance."""
         total = block_sums(counts, side)
         painted, held = (1 - self.share) * counts, self.share * counts

@@ -1,10 +1,10 @@
 """Pixels averaged in blocks, where single ones are mostly noise.
 
-What a display shows of a noisy pixel is not, on average, what it shows of the light there: its
-curve is bent, and steepest in the dark. A fit of noisy pixels makes up for that with light that
-nobody painted, and a lamp of which the samples show little but stray pixels may become anything.
-The remedy is the average of a block: as many more samples of nearly the same light. How large
-blocks have to be follows from the noise of the present look, as the display shows it.
+The mean display value of a noisy pixel differs from the display value of its mean light, since the
+curve of the display is bent, and steepest in the dark. A fit of noisy pixels makes up for that with
+light that nobody painted, and a lamp with little but stray pixels may get any weight. The remedy is
+the average of a block: many more samples of nearly the same light. The noise of the present look,
+as the display shows it, determines the size of blocks.
 """
 
 from collections.abc import Sequence
@@ -20,21 +20,21 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Cut, Loss
-from lightpaint.lighting.loss.weight_penalty import to_present
+from lightpaint.lighting.loss.weight_penalty import pull_to_present
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.views import Views
 
-#: Noise of the present look beside the display's range, root mean square, up to which single pixels
+#: Largest RMS noise of the present look, relative to the display's range, at which single pixels
 #: are fitted: that of some 32 samples per pixel on the shipped scenes (docs/benchmarks.md).
 NOISY_DISPLAY = 0.035
 
-#: Sides of blocks that are tried, and blocks along the shorter side of a picture, at least.
-SIDES, FEWEST_BLOCKS = (1, 2, 3, 4, 6, 8), 16
-#: Pixels that are enough to know the noise of a picture, and rows of a strip of them.
-ENOUGH, STRIP_ROWS = 2**16, 24
+#: Sides of blocks to try, and the fewest blocks along the shorter side of a picture.
+BLOCK_SIDES, MIN_BLOCKS = (1, 2, 3, 4, 6, 8), 16
+#: Pixels that suffice to measure the noise of a picture, and rows of a strip of them.
+NOISE_PIXELS, STRIP_ROWS = 2**16, 24
 
-#: Strength of the pull to the present by what is noise of a light.
-PRIOR = 0.1
+#: Strength of the pull to the present in proportion to the noise of a light.
+PRIOR_STRENGTH = 0.1
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class BinnedPixels:
     """Blocks of all views behind each other, as a picture of one row.
 
     Attributes:
-        basis: (n, 1, p, 3) images of the lights, means over each block of what counts in it.
-        loss: What a picture of these blocks costs; one counts as much as all its pixels.
+        basis: (n, 1, p, 3) images of the lights, means over each block, weighted by importance.
+        loss: The loss of a picture of these blocks; one counts as much as all its pixels.
         side: Pixels along the side of a block.
     """
 
@@ -53,38 +53,38 @@ class BinnedPixels:
 
     @cached_property
     def equations(self) -> NormalEquations:
-        """The linear problem of what was meant at the present, each block as important as its
-        pixels.
-        """
-        meant = self.loss.meant(self.basis.mix(self.basis.present_weights))
+        """The linear problem at the present lighting, with the importance of all pixels of a
+        block."""
+        meant = self.loss.goal(self.basis.mix(self.basis.present_weights))
         return NormalEquations.of(self.basis, meant, self.loss.importance[..., None])
 
     @cached_property
     def prior(self) -> NormalEquations:
-        """s Σᵢ Nᵢ (wᵢ − presentᵢ)², Nᵢ the noise's power in the blocks of light i, s `PRIOR`.
+        """The pull s Σᵢ Nᵢ (wᵢ − presentᵢ)², Nᵢ the noise's power in the blocks of light i, s
+        `PRIOR`.
 
-        What the samples show of a light is what they show beside its noise: of which that is all,
-        the present is the best guess. N is part of M anyway, where it pulls towards no light.
+        Samples determine a light as far as its power exceeds its noise; for a light that is all
+        noise the present is the best guess. M contains N anyway, where it pulls towards 0.
         """
         present = self.basis.present_weights
         at = LitPixels.whole(self.basis, self.loss).predicted(present)
         _, weight = self.loss.pixels.squares(at, from_clipping=False)
         halves = self.basis.noise.pixels(slice(None)).astype(np.float64)
         power = np.einsum("cp,npc->nc", weight, np.square(halves))
-        return to_present(PRIOR * power, present)
+        return pull_to_present(PRIOR_STRENGTH * power, present)
 
 
 def block_side(bases: Sequence[Basis], transform: ViewTransform | None) -> int:
-    """Return the side, in pixels, of blocks whose noise is small on a display: 1 for no blocks.
+    """Return the side, in pixels, of blocks whose noise is small on a display; 1 for no blocks.
 
-    Noise is that of the present look: what is painted has no say in it, so that no stroke changes
-    what is solved elsewhere. Where nothing is known of noise it is 1, as in linear light, whose
-    noise is taken out of the equations.
+    The noise is that of the present look, not of the painting, so that no stroke changes the
+    problem elsewhere. The side is 1 for unknown noise, and in linear light, where the equations
+    are corrected for noise.
     """
     if transform is None or not all(basis.knows_noise for basis in bases):
         return 1
     shortest = min(min(basis.size) for basis in bases)
-    sides = [side for side in SIDES if shortest >= FEWEST_BLOCKS * side]
+    sides = [side for side in BLOCK_SIDES if shortest >= MIN_BLOCKS * side]
     if len(sides) < 2:
         return 1
     strips = [_strips(basis) for basis in bases]
@@ -96,11 +96,12 @@ def block_side(bases: Sequence[Basis], transform: ViewTransform | None) -> int:
 
 
 def _strips(basis: Basis) -> tuple[Floats, Floats, Bools]:
-    """Return the present look of enough of a picture, half its difference, and where emitters are.
+    """Return the present look of enough of a picture, its half difference, and the pixels of
+    emitters.
 
-    Of strips of whole blocks, whatever their side, all over the picture.
+    The strips, of whole blocks of any side, are spread over the picture.
     """
-    every = max(1, basis.emitters_seen.size // ENOUGH)
+    every = max(1, basis.emitters_seen.size // NOISE_PIXELS)
     rows = np.flatnonzero(np.arange(basis.size[0]) // STRIP_ROWS % every == 0)
     weights = basis.present_weights
     its = np.flatnonzero(np.repeat(np.isin(np.arange(basis.size[0]), rows), basis.size[1]))
@@ -112,7 +113,7 @@ def _strips(basis: Basis) -> tuple[Floats, Floats, Bools]:
 def _display_noise(
     look: Floats, half: Floats, seen: Bools, transform: ViewTransform, side: int
 ) -> Doubles:
-    """Return squared half differences of what a display shows of blocks, (k,), without emitters."""
+    """Return squared half differences of display values of blocks, (k,), without emitters."""
     unseen = (~seen).astype(np.float64)
     counts = block_sums(unseen, side)
     safe = np.where(counts > 0, counts, 1)[..., None]
@@ -121,10 +122,10 @@ def _display_noise(
     return np.asarray(np.square(np.subtract(*ends, dtype=np.float64) / 2)[counts > 0].ravel())
 
 
-def binned_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
-    """Return the blocks of a loss over all `views`, each pixel weighed by how much it counts.
+def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
+    """Return the blocks of a loss over all `views`, with pixels weighted by importance.
 
-    None for a loss that is always one of single pixels.
+    None for a loss that only fits single pixels.
     """
     planes: list[list[Doubles]] = [[], []]
     parts: list[tuple[Cut, Doubles]] = []
@@ -132,7 +133,7 @@ def binned_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
         cut = partial(views.part, k=k)
         its = loss.cut(cut)
         counts = its.importance.astype(np.float64)
-        # Emitters that may be brighter say something where a block has nothing else.
+        # Emitters that may be brighter count in a block that has nothing else.
         glows = basis.emitters_seen & its.exceeds(np.inf).all(axis=-1)
         others = enlarged(block_sums(np.where(glows, 0, counts), side), side)
         counts[glows & (others[: counts.shape[0], : counts.shape[1]] > 0)] = 0
@@ -142,7 +143,7 @@ def binned_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
             means = [block_sums(x * counts[..., None], side) / safe[..., None] for x in pictures]
             made.append(np.stack(means).reshape(len(means), -1, 3))
         parts.append((cut, counts))
-    if (blocks := loss.of_blocks(parts, side)) is None:
+    if (blocks := loss.block_means(parts, side)) is None:
         return None
     images, halves = (np.concatenate(x, axis=1)[:, None].astype(np.float32) for x in planes)
     basis = replace(

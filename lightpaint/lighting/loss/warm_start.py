@@ -1,9 +1,8 @@
-"""Near the optimum by few pixels: where exact rounds begin, so that one or two are enough.
+"""Solves with few pixels that lead near the optimum, after which one or two exact rounds suffice.
 
-A sample of the pixels stands for all, those that say much about a light rather than others. Its
-own optimum is near that of all. By how much its gradient is wrong there is then taken off, as a
-tilt: the tilted sample has the true gradient where that was found, and its optimum is nearer by
-as much as its curvature is like the true one.
+A sample of the pixels stands for all, preferring those that determine a light. Its optimum is near
+that of all pixels. A tilt then corrects its gradient: the tilted sample has the true gradient where
+this was measured, and its optimum is closer the more its curvature resembles the true one.
 """
 
 import numpy as np
@@ -13,79 +12,86 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Loss, PixelLoss
-from lightpaint.lighting.loss.reweighting import STEP, Asked, Solve, change, rounds, value_of
+from lightpaint.lighting.loss.reweighting import (
+    MIN_STEP,
+    Solver,
+    WeightTerms,
+    relative_change,
+    run_rounds,
+    total_loss,
+)
 from lightpaint.lighting.normal_equations import NormalEquations
 
-#: Pixels in a sample, or more, for each light.
-SAMPLE, EACH = 2**13, 2**6
+#: The least number of pixels in a sample, and the pixels for each light.
+MIN_SAMPLE, PIXELS_PER_LIGHT = 2**13, 2**6
 
-#: Larger parts of the pixels are no sample: all of them are as quick.
-PART = 0.5
+#: Largest sample as a share of the pixels: with more, all pixels are as quick.
+MAX_SAMPLE_SHARE = 0.5
 
-#: Part of a sample that is drawn without asking what a pixel says about a light.
-EVENLY = 0.5
+#: Share of a sample that is drawn evenly, whatever lights a pixel shows.
+EVEN_SHARE = 0.5
 
-#: Change of a light's picture that ends the rounds over a sample, at first as much as a sample is
-#: wrong, later beside the change that the correction before has made.
-FIRST, LEFT = 1e-4, 1e-3
+#: Change of a light's picture that ends the rounds over a sample: at first the error of a sample,
+#: later a share of the change that the last correction made.
+FIRST_STEP, STEP_RATIO = 1e-4, 1e-3
 
-#: Part of the loss by which it fell last where exact rounds are as good.
-NEARLY = 1e-9
+#: Share of the loss by which it fell last below which exact rounds are as good.
+MIN_GAIN = 1e-9
 
-#: Corrections at most, and the part of the one before that one may be and worth another.
-CORRECTIONS, SHRUNK = 8, 0.7
+#: The most corrections, and the largest ratio to the last one at which another is worth its time.
+MAX_CORRECTIONS, MAX_STEP_RATIO = 8, 0.7
 
 
-def near_optimum(
+def find_near_optimum(
     basis: Basis,
     loss: Loss,
     equations: NormalEquations,
     start: Doubles,
-    solve: Solve,
+    solve: Solver,
     *,
     pull: NormalEquations | None = None,
 ) -> Doubles | None:
-    """Weights (n, 3) near those where rounds over all pixels end; None where that is not quicker.
+    """Return weights (n, 3) near the end of rounds over all pixels; None if that is not quicker.
 
-    equations: of the pixels, as important as in `loss`. Others as of `descend`.
+    equations: of the pixels with the importance of `loss`. For the others see `descend`.
     """
-    size = max(SAMPLE, EACH * len(start))
-    if loss.pixels.has_pieces or np.count_nonzero(loss.importance) * PART < size:
+    size = max(MIN_SAMPLE, PIXELS_PER_LIGHT * len(start))
+    if loss.pixels.has_pieces or np.count_nonzero(loss.importance) * MAX_SAMPLE_SHARE < size:
         return None
     lit = LitPixels.of(basis, loss)
-    part = sample(lit, np.einsum("cii->ic", equations.M), size)
-    asked = Asked(pull)
-    near, least = None, value_of(lit.pixels, asked, start, lit.predicted(start))
-    w = rounds(part, asked, start, solve, from_clipping=True, until=FIRST).weights
-    before, until = np.inf, LEFT * FIRST
-    for _ in range(CORRECTIONS):
+    part = sample_pixels(lit, np.einsum("cii->ic", equations.M), size)
+    terms = WeightTerms(pull)
+    near, least = None, total_loss(lit.pixels, terms, start, lit.predicted(start))
+    w = run_rounds(part, terms, start, solve, from_clipping=True, until=FIRST_STEP).weights
+    before, until = np.inf, STEP_RATIO * FIRST_STEP
+    for _ in range(MAX_CORRECTIONS):
         value, slope = lit.objective_and_gradient(w)
-        value += asked.value(w)
+        value += terms.value(w)
         if value > least:
             return near
         near, fell, least = w, least - value, value
-        if fell <= NEARLY * value:
+        if fell <= MIN_GAIN * value:
             return near
-        tilted = Asked(pull, part.objective_and_gradient(w)[1] - slope, w)
-        led = rounds(part, tilted, w, solve, from_clipping=False, until=until)
-        step, w = change(led.equations, w, led.weights), led.weights
-        if step > SHRUNK * before:
+        tilted = WeightTerms(pull, part.objective_and_gradient(w)[1] - slope, w)
+        result = run_rounds(part, tilted, w, solve, from_clipping=False, until=until)
+        step, w = relative_change(result.equations, w, result.weights), result.weights
+        if step > MAX_STEP_RATIO * before:
             return near
-        if step <= STEP:
+        if step <= MIN_STEP:
             return w
-        before, until = step, LEFT * min(step, FIRST)
+        before, until = step, STEP_RATIO * min(step, FIRST_STEP)
     return w
 
 
-def sample(lit: LitPixels, power: Doubles, size: int) -> LitPixels:
-    """About that many of the pixels, each as important as all that it stands for.
+def sample_pixels(lit: LitPixels, power: Doubles, size: int) -> LitPixels:
+    """Draw about `size` of the pixels, each as important as all those that it stands for.
 
-    power: (n, 3), Σ D Φ², of the lights. One pixel is drawn for each `size`-th part of the sum of
-    what they say about the lights, in the order they have; those that say more are in it anyway.
+    power: (n, 3), Σ D Φ², of the lights. One pixel is drawn, in order, for each `size`-th part of
+    the total information on the lights; pixels with more than that are certain.
     """
-    said = _said(lit, power)
-    chance = size * ((1 - EVENLY) * said / max(said.sum(), 1e-300) + EVENLY / said.size)
-    # What the certain ones do not need is for the others.
+    said = _information(lit, power)
+    chance = size * ((1 - EVEN_SHARE) * said / max(said.sum(), 1e-300) + EVEN_SHARE / said.size)
+    # The others share the size that certain pixels leave.
     for _ in range(4):
         certain = chance >= 1
         left = size - np.count_nonzero(certain)
@@ -93,14 +99,14 @@ def sample(lit: LitPixels, power: Doubles, size: int) -> LitPixels:
         chance = np.where(certain, 1, chance * (left / rest if rest > 0 else 1))
     chance = np.minimum(chance, 1)
     drawn = np.flatnonzero(np.diff(np.floor(np.cumsum(chance) + 0.5), prepend=0))
-    pixels = lit.pixels.at(drawn).weighed(1 / chance[drawn])
-    # In the order in which they are walked, again and again.
+    pixels = lit.pixels.subset(drawn).scaled(1 / chance[drawn])
+    # Memory in the order of the walks, of which there are many.
     rows = np.ascontiguousarray(lit.planes.pixels(drawn))
     return LitPixels(MemoryPlanes(rows[:, None]), pixels)
 
 
-def _said(lit: LitPixels, power: Doubles) -> Doubles:
-    """(p,), how much of what is known of the lights is in a pixel: Σ D Φ² / power over them."""
+def _information(lit: LitPixels, power: Doubles) -> Doubles:
+    """Return the information on lights in each pixel, (p,): Σ D Φ² / power over the lights."""
     part = np.where(power > 0, 1 / np.where(power > 0, power, 1), 0).astype(np.float32)
 
     def its(where: slice, pixels: PixelLoss) -> Doubles:
@@ -108,4 +114,4 @@ def _said(lit: LitPixels, power: Doubles) -> Doubles:
         said = sum(part[:, c] @ squares[..., c] for c in range(3))
         return np.asarray(said * pixels.importance)
 
-    return np.concatenate(lit.pixels.each(its))
+    return np.concatenate(lit.pixels.map_strips(its))

@@ -344,7 +344,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         name = " + ".join(target.name for target in snapshot.painted_targets)
         if widget_arguments.same_paintings(targets, self.targets):
             targets = self.targets
-        lighting = lighting.named(name)
+        lighting = lighting.for_target(name)
         return {
             "target": targets[0],
             "targets": targets,

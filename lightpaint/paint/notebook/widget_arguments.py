@@ -15,7 +15,7 @@ from lightpaint.colour.display.view_transform import TransformChoice, ViewTransf
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.loss.painting import what_counts
+from lightpaint.lighting.loss.painting import resolve_importance
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.database import OTHER_FOLDER, START_AFRESH
@@ -139,7 +139,7 @@ def _pixels_to_load(session: Session, view: int, target: Target | None) -> Pixel
         return Pixels.unpainted(session.views[view].present)
     its = session.views[view]
     return _pixels_of(
-        what_counts(target, its.basis.emitters_seen, session.live_answer.fit.emitters)
+        resolve_importance(target, its.basis.emitters_seen, session.live_answer.fit.emitters)
     )
 
 

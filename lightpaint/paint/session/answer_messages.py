@@ -11,21 +11,21 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analysis import Analysis
-from lightpaint.lighting.analysis.appearance.appearance import UNSEEN, Seen
+from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Seen
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
-from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere
-from lightpaint.lighting.analysis.diagnosis import parts_of_miss
+from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
+from lightpaint.lighting.analysis.diagnosis import error_shares
 from lightpaint.paint.protocol import Advice, Closeness, Findings, LightAnswer, LightInfo
 from lightpaint.report.sentences import (
-    MET,
+    NO_ERROR,
+    bound_sentences,
+    hold_clause,
     spoken_amount,
     spoken_changed,
     spoken_errors,
     spoken_part,
     spoken_percent,
     spoken_place,
-    what_holds,
-    while_held,
 )
 from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 
@@ -230,18 +230,18 @@ def why_not_closer(analysis: Analysis) -> list[str]:
     Where it is missed most stands in `sketch_headline`, below the pictures.
     """
     seen, diagnosis = analysis.seen, analysis.diagnosis
-    if not (parts := parts_of_miss(diagnosis)):
-        return [MET]
+    if not (parts := error_shares(diagnosis)):
+        return [NO_ERROR]
     problem = analysis.solution.problem
     words = MISS_TEXTS | (
-        CONSTRAINED_MISS_TEXTS if problem.asks or problem.fit.colors != "free" else {}
+        CONSTRAINED_MISS_TEXTS if problem.is_constrained or problem.fit.colors != "free" else {}
     )
-    words |= {"unreachable": MISS_TEXTS["unreachable"] + while_held(seen)}
+    words |= {"unreachable": MISS_TEXTS["unreachable"] + hold_clause(seen)}
     shares = ", ".join(f"{spoken_percent(share)} {words[part]}" for part, share in parts.items())
     sentences = [f"Of what is missed (great misses count most), {shares}."]
     if seen.place is None and diagnosis.place is not None:
         sentences.append(spoken_place(diagnosis.place))
-    return sentences + what_holds(diagnosis, seen)
+    return sentences + bound_sentences(diagnosis, seen)
 
 
 def removable_reason(seen: Seen) -> Reason | None:
@@ -273,12 +273,12 @@ def _closeness(analysis: Analysis) -> Closeness:
         help=advice(seen),
         delta_e=seen.delta_e,
         delta_e_asked=seen.asked,
-        sentences=() if seen.is_close else tuple(what_holds(analysis.diagnosis, seen)),
+        sentences=() if seen.is_close else tuple(bound_sentences(analysis.diagnosis, seen)),
     )
 
 
 def preview_text(
-    closes: float, rest: Elsewhere | None, *, delta_e: tuple[float, float], is_at_cost: bool
+    closes: float, rest: UnpaintedChange | None, *, delta_e: tuple[float, float], is_at_cost: bool
 ) -> tuple[str, bool]:
     """Say what a change would bring, before it is made, and whether it changes more than it gains.
 
@@ -290,7 +290,7 @@ def preview_text(
         text = f"Closes {spoken_percent(closes)} of what is missed (ΔE {now} becomes {then})"
     else:
         text = "Brings the answer no closer"
-    if rest is None or rest.worst < UNSEEN:
+    if rest is None or rest.worst < INVISIBLE:
         return f"{text}.", False
     text = f"{text}, and changes {spoken_changed(rest)}."
     more = " That is more than it brings." if is_at_cost else ""

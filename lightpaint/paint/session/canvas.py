@@ -97,7 +97,7 @@ class Canvas:
             self.painting = self.painting._replace(at_least=np.zeros(self.image.shape, bool))
         if self.painting.at_least is not None:
             self.painting.at_least[where] = False if at_least is None else at_least & painted
-        self.live.painted(where, with_importance=not same)
+        self.live.update(where, with_importance=not same)
 
     def paint(self, region: Region, pixels: Pixels) -> None:
         """Paint pixels by hand: they belong to the open stroke."""

@@ -7,8 +7,8 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_fit
-from lightpaint.lighting.linear_problem import reduced_by
-from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.linear_problem import reduce_lights
+from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.pipeline.settings import Settings
@@ -43,7 +43,7 @@ class LiveAnswer:
     def set_views(self, views: Sequence[LiveView]) -> None:
         """Continue with these views."""
         self._basis = views[0].basis
-        self._live = Live(views, fit=self.fit, constraints=self._constraints(self.requests))
+        self._live = LiveSolver(views, fit=self.fit, constraints=self._constraints(self.requests))
         self._live.prepare()
 
     @property
@@ -78,7 +78,7 @@ class LiveAnswer:
 
     def check(self, requests: LightRequests) -> None:
         """Raise LightpaintError for what cannot be asked, before anything is changed."""
-        reduced_by(self._constraints(requests), self._basis.lights, self._fit(requests))
+        reduce_lights(self._constraints(requests), self._basis.lights, self._fit(requests))
 
     def set_requests(self, requests: LightRequests) -> None:
         """Set the requests; a moving slider has come to rest."""
@@ -87,7 +87,7 @@ class LiveAnswer:
 
     def _apply(self, requests: LightRequests) -> None:
         self.requests = requests
-        self._live.asks(self.fit, self._constraints(requests))
+        self._live.constrain(self.fit, self._constraints(requests))
 
     def move_slider(self, requests: LightRequests) -> None:
         """Set requests while a slider moves. Raises LightpaintError, and changes nothing then."""

@@ -12,8 +12,8 @@ from lightpaint.basis.clean import CleanPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.analysis.appearance.appearance import NOTICED
-from lightpaint.lighting.analysis.appearance.display_difference import Looking
-from lightpaint.lighting.analysis.appearance.unpainted_change import what_changes
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
 from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
@@ -119,13 +119,16 @@ class SessionSnapshot:
             )
         judged = view if view in self.painted_views else self.painted_views[0]
         view_solution = solution.views[self.painted_views.index(judged)]
-        look, target = Looking.at(view_solution.problem), view_solution.problem.views.targets[0]
+        look, target = (
+            PaintComparison.of_problem(view_solution.problem),
+            view_solution.problem.views.targets[0],
+        )
         pictures = [self.bases[judged].mix(x) for x in (weights, after)]
-        lights = [look.of(picture) for picture in pictures]
-        cost_now, cost_then = (look.mean(look.costs(light)) for light in lights)
+        lights = [look.pixels(picture) for picture in pictures]
+        cost_now, cost_then = (look.mean(look.fit_errors(light)) for light in lights)
         closes = 1 - cost_then / cost_now if cost_now > 0 else 0.0
-        elsewhere = what_changes(look, self.bases[judged], target.importance > 0, *pictures)
-        missed_ = look.mean(look.missed(lights[0])), look.mean(look.missed(lights[1]))
+        elsewhere = unpainted_change(look, self.bases[judged], target.importance > 0, *pictures)
+        missed_ = look.mean(look.difference(lights[0])), look.mean(look.difference(lights[1]))
         gained = missed_[0] - missed_[1]
         is_at_cost = (
             elsewhere is not None and elsewhere.worst > NOTICED and elsewhere.delta_e > gained

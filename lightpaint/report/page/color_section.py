@@ -1,4 +1,4 @@
-"""What each choice of `colors` would come to, in words and as a part of the report."""
+"""The answers of all choices of `colors`, in words and as a part of the report."""
 
 from html import escape
 
@@ -11,8 +11,8 @@ from lightpaint.lighting.fit import Colors
 from lightpaint.report.page.html import row, table
 from lightpaint.screen import some_names
 
-#: What the lamps may do, in few words.
-MEANING: dict[Colors, str] = {
+#: The colours that lamps may have, in few words.
+COLOR_MEANINGS: dict[Colors, str] = {
     "free": "any colour",
     "gentle": "their own colour, unless the painting clearly asks for another",
     "white": "whites, from warm to cool",
@@ -21,23 +21,23 @@ MEANING: dict[Colors, str] = {
 #: Headings of the table.
 HEADS = ("lamps may have", "mean ΔE", "what would change")
 
-#: ΔE by which another choice must be closer to be told at once, and below which it is as close.
-NOTICED, SAME = 1.0, 0.1
+#: ΔE by which a closer choice is mentioned at once, and below which it is as close.
+MIN_GAIN, SAME_DELTA_E = 1.0, 0.1
 
 
 def spoken_choice(choice: ColorChoice, chosen: ColorChoice) -> str:
-    """`free: ΔE 2.1 instead of 2.6, but pendant turns green`."""
+    """Return `free: ΔE 2.1 instead of 2.6, but pendant turns green`."""
     gains = chosen.delta_e - choice.delta_e
     told = f"ΔE {choice.delta_e:.1f} instead of {chosen.delta_e:.1f}"
-    if abs(gains) < SAME:
+    if abs(gains) < SAME_DELTA_E:
         told = f"as close (ΔE {choice.delta_e:.1f})"
     turns = spoken_turn(choice)
-    joint = ", but " if gains >= SAME else ", and "
+    joint = ", but " if gains >= SAME_DELTA_E else ", and "
     return f"{choice.colors}: {told}{joint + turns if turns else ''}"
 
 
 def spoken_turn(choice: ColorChoice) -> str:
-    """`pendant turns green`; "" where nobody would see a light change its hue."""
+    """Return `pendant turns green`; "" if no light visibly changes its hue."""
     if not choice.light:
         return ""
     before, after = (np.array(x) for x in (choice.before, choice.color))
@@ -54,25 +54,25 @@ def spoken_turn(choice: ColorChoice) -> str:
 
 
 def closer_choice(choices: Choices) -> str:
-    """`free: ΔE 2.1 …`, where another choice comes notably closer; else ""."""
+    """Return `free: ΔE 2.1 …`, if another choice is notably closer; else ""."""
     chosen = next((choice for choice in choices if choice.is_chosen), None)
     best = min(choices, key=lambda choice: choice.delta_e, default=None)
-    if chosen is None or best is None or chosen.delta_e - best.delta_e < NOTICED:
+    if chosen is None or best is None or chosen.delta_e - best.delta_e < MIN_GAIN:
         return ""
     return spoken_choice(best, chosen)
 
 
 def colors_section(choices: Choices) -> str:
-    """The choices beside the one that was made. Empty where there is none."""
+    """Return the section on the choices; empty if there are none. Empty where there is none."""
     chosen = next((choice for choice in choices if choice.is_chosen), None)
     if chosen is None:
         return ""
     rows = [
         row(
             f"{choice.colors}{', as solved' if choice.is_chosen else ''}<br>"
-            f"<small>{MEANING[choice.colors]}</small>",
+            f"<small>{COLOR_MEANINGS[choice.colors]}</small>",
             f"{choice.delta_e:.1f}",
-            escape(_change(choice, chosen)),
+            escape(_change_cell(choice, chosen)),
         )
         for choice in choices
     ]
@@ -84,10 +84,10 @@ def colors_section(choices: Choices) -> str:
     )
 
 
-def _change(choice: ColorChoice, chosen: ColorChoice) -> str:
-    """In a cell of the table."""
+def _change_cell(choice: ColorChoice, chosen: ColorChoice) -> str:
+    """Return the text of a cell of the table."""
     if choice is chosen:
         return ""
     gains = chosen.delta_e - choice.delta_e
-    near = "as close" if abs(gains) < SAME else "closer" if gains > 0 else "farther"
+    near = "as close" if abs(gains) < SAME_DELTA_E else "closer" if gains > 0 else "farther"
     return "; ".join(filter(None, (near, spoken_turn(choice))))

@@ -1,4 +1,4 @@
-"""The part of the report on what constraints cost the picture. Returns HTML."""
+"""The section of the report on the cost of constraints to the picture. Returns HTML."""
 
 import numpy as np
 
@@ -14,11 +14,11 @@ from lightpaint.report.page.figures import PagePicture, figure
 from lightpaint.report.page.html import SHOWN, SPARE, row, share_cell, table
 from lightpaint.report.sentences import spoken_percent
 
-#: Width in pixels that the pictures are reduced to, by a whole factor: this to twice this.
-WIDTH = 320
+#: Least width in pixels of reduced pictures; a whole factor gives up to twice as much.
+MIN_WIDTH = 320
 
-#: How many lights fewer and more than asked for have their picture.
-AROUND = 2
+#: Numbers of lights below and above the answer's that get a picture.
+NEIGHBOURS = 2
 
 
 def constraints_section(
@@ -29,9 +29,9 @@ def constraints_section(
     transform: ViewTransform,
     looks: CleanLooks | None = None,
 ) -> str:
-    """The best lighting without constraints, `free`, beside the one as asked, from the basis.
+    """Return the best answer without constraints, `free`, beside the answer, from the basis.
 
-    With `sparse`, what other numbers of lights would miss. Empty where there is none.
+    With `sparse`, also the errors of other numbers of lights. Empty without constraints.
     """
     if free is None:
         return ""
@@ -53,11 +53,11 @@ def constraints_section(
 
 
 def _curve(solution: Solution, free: Solution) -> str:
-    """With `sparse`, what is missed by number of lights."""
+    """Return, with `sparse`, the table of errors by number of lights."""
     curve = solution.certificate.curve
     if not curve:
         return ""
-    used, near = _used(solution), list(curve)
+    used, near = _used_count(solution), list(curve)
     if len(curve) > SHOWN + SPARE:
         near = sorted(sorted(curve, key=lambda point: abs(point[0] - used))[: SHOWN - 1])
     told = [
@@ -73,12 +73,12 @@ def _curve(solution: Solution, free: Solution) -> str:
 def _numbers(
     basis: Basis, solution: Solution, transform: ViewTransform, looks: CleanLooks | None
 ) -> str:
-    """With `sparse`, pictures with fewer and with more lights."""
-    used, missed_with = _used(solution), dict(solution.certificate.curve)
+    """Return, with `sparse`, pictures with fewer and with more lights."""
+    used, missed_with = _used_count(solution), dict(solution.certificate.curve)
     pictures = [
         (weights, f"With {_lights(count)}", f"{spoken_percent(missed_with[count])} missed.")
         for count, weights in solution.tried
-        if count in missed_with and 0 < abs(count - used) <= AROUND
+        if count in missed_with and 0 < abs(count - used) <= NEIGHBOURS
     ]
     return _figures(basis, pictures, transform, looks)
 
@@ -89,8 +89,8 @@ def _figures(
     transform: ViewTransform,
     looks: CleanLooks | None,
 ) -> str:
-    """Pictures of weights (n, 3), each with its name and a caption."""
-    factor = max(1, min(basis.size[1] // WIDTH, *basis.size))
+    """Return pictures of weights (n, 3), each with its name and a caption."""
+    factor = max(1, min(basis.size[1] // MIN_WIDTH, *basis.size))
     figures = []
     for weights, name, caption in pictures:
         # Reduced it is quick to denoise, and needs no features.
@@ -100,8 +100,8 @@ def _figures(
     return "".join(figures)
 
 
-def _used(solution: Solution) -> int:
-    """The number of lights of the curve that the answer has."""
+def _used_count(solution: Solution) -> int:
+    """Return the number of lights of the curve that the answer has."""
     most = solution.problem.constraints.sparse or 0
     return max((count for count, _ in solution.certificate.curve if count <= most), default=0)
 

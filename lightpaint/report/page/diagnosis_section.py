@@ -1,4 +1,4 @@
-"""The parts of the report on how sure the answer is and what is missed. Each returns HTML."""
+"""The sections of the report on uncertainty and on the error. Each returns HTML."""
 
 from html import escape
 
@@ -22,40 +22,40 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import PagePicture, figure, signed_scale
-from lightpaint.report.page.html import folded, listed, name_of, row, share_cell, table
+from lightpaint.report.page.html import breakable_name, fold, name_list, row, share_cell, table
 from lightpaint.report.sentences import (
     brightness,
-    how_sure,
+    error_sentences,
     relative_errors,
     spoken_errors,
     spoken_hold,
     spoken_percent,
-    what_is_missed,
+    uncertainty_sentence,
 )
 
-#: Headings of the table of errors, and rows of it and of that of bounds that are not folded.
-SURE, ROWS = ("light", "solved", "95 % between", "of it", "of the picture"), 6
+#: Headings of the table of uncertainty, and rows of both tables that are not folded.
+ERROR_HEADS, SHOWN_ROWS = ("light", "solved", "95 % between", "of it", "of the picture"), 6
 
-#: Headings of the table of what holds lights back.
-BOUNDS = ("light", "held by", "less missed<br>without that", "at first")
+#: Headings of the table of bounds.
+BOUND_HEADS = ("light", "held by", "less missed<br>without that", "at first")
 
 #: Bounds with a smaller share of the miss are not worth a row.
 SMALLEST_GAIN = 0.002
 
 
 def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> str:
-    """How far noise may have moved the answer: a sentence, and the lights it matters for."""
+    """Return the section on uncertainty: a sentence, and the lights that it matters for."""
     if uncertainty is None:
         return ""
     shares = energy_shares(basis, solution.lighting)
     errors, spoken = relative_errors(uncertainty), spoken_errors(uncertainty, len(shares))
     solved, low, high = brightness(uncertainty)
     effect = np.where(np.isfinite(errors) & ~uncertainty.untold, errors, 0) * shares
-    # Those that are off and may be on come behind, by how bright they may be.
+    # Lights that are off and may be on come last, by their possible brightness.
     order = sorted(range(len(shares)), key=lambda k: (-effect[k], -high[k]))
     rows = [
         row(
-            name_of(basis.names[k]),
+            breakable_name(basis.names[k]),
             f"{solved[k]:.3g}",
             f"{low[k]:.3g} … {high[k]:.3g}",
             spoken[k] if np.isfinite(errors[k]) or uncertainty.untold[k] else "–",
@@ -71,16 +71,16 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
     )
     return (
         '<section><h2>How sure</h2><div class="explained">'
-        f"<div><p>{escape(how_sure(basis, solution, uncertainty))}</p>"
+        f"<div><p>{escape(uncertainty_sentence(basis, solution, uncertainty))}</p>"
         "<p>Together these errors miss about "
         f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).</p>"
-        f"{_steps(solution)}{folded('How to read the table', meaning)}</div>"
-        f"<div>{table(SURE, rows, kind='sure', shown=ROWS)}</div></div></section>"
+        f"{_steps(solution)}{fold('How to read the table', meaning)}</div>"
+        f"<div>{table(ERROR_HEADS, rows, kind='sure', shown=SHOWN_ROWS)}</div></div></section>"
     )
 
 
 def _steps(solution: Solution) -> str:
-    """What was done against noise, besides sampling."""
+    """Return the measures against noise, besides sampling."""
     steps = []
     if solution.problem.noise_removed:
         steps.append(
@@ -104,10 +104,10 @@ def missed_section(
     transform: ViewTransform,
     seen: Seen | None = None,
 ) -> str:
-    """Why it does not look like the painting: sentences, shares, maps and bounds."""
+    """Return the section on the error: sentences, shares, maps and bounds."""
     if diagnosis is None:
         return ""
-    sentences = "".join(f"<p>{escape(text)}</p>" for text in what_is_missed(diagnosis, seen))
+    sentences = "".join(f"<p>{escape(text)}</p>" for text in error_sentences(diagnosis, seen))
     return (
         f'<section><h2>What is missed</h2><div class="explained"><div>{sentences}</div>'
         f"{_shares(diagnosis)}</div>"
@@ -148,7 +148,7 @@ def _maps(
         (
             "Forbidden",
             diagnosis.forbidden_map,
-            "What only light below zero, or beyond what is asked, would mend."
+            "Would need light below zero, or beyond the constraints."
             + " So is what other views ask for." * (diagnosis.compromise > 0),
         ),
     ]
@@ -183,7 +183,7 @@ def _maps(
 
 
 def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTransform) -> float:
-    """The end of the scale of all maps of what is missed."""
+    """Return the end of the scale of all maps of the error."""
     counted = solution.importance > 0
     maps = (diagnosis.unreachable_map, diagnosis.forbidden_map)
     sizes = np.concatenate([np.abs(luminance(image))[counted] for image in maps])
@@ -193,13 +193,13 @@ def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTrans
 def _bounds(diagnosis: Diagnosis) -> str:
     rows = [
         row(
-            listed(bound.lights),
-            escape(_held_by(bound)),
-            spoken_percent(diagnosis.gained(bound)),
+            name_list(bound.lights),
+            escape(_bound_words(bound)),
+            spoken_percent(diagnosis.gain_share(bound)),
             f'<td class="rgb">{_multiplier(bound)}</td>',
         )
         for bound in diagnosis.bounds
-        if diagnosis.gained(bound) >= SMALLEST_GAIN
+        if diagnosis.gain_share(bound) >= SMALLEST_GAIN
     ]
     if not rows:
         return ""
@@ -215,13 +215,13 @@ def _bounds(diagnosis: Diagnosis) -> str:
     )
     return (
         '<div class="explained" style="margin-top: 32px"><div><h3>What holds the lights back</h3>'
-        f"{others}{folded('How to read the table', meaning)}</div>"
-        f"<div>{table(BOUNDS, rows, kind='bounds', shown=ROWS)}</div></div>"
+        f"{others}{fold('How to read the table', meaning)}</div>"
+        f"<div>{table(BOUND_HEADS, rows, kind='bounds', shown=SHOWN_ROWS)}</div></div>"
     )
 
 
-def _held_by(bound: Bound) -> str:
-    """Zero, so that nobody takes it for somebody's wish, or what else holds."""
+def _bound_words(bound: Bound) -> str:
+    """Return the bound in words; zero is called zero, unlike a wish for off."""
     held = spoken_hold(bound)
     return held.replace("off", "zero") if bound.kind == "zero" else held
 

@@ -32,25 +32,26 @@ UNCOUNTED, COUNTED = "#393939", "#e8d8a2"
 SIGNED = [f"rgb({red} {green} {blue})" for red, green, blue in to_8_bit(DIVERGING)]
 
 #: A picture whose PNG is larger than this many bytes goes into the page as JPEG.
-LARGEST_PNG = 150_000
+MAX_PNG_BYTES = 150_000
 
 #: Lines of a picture in a row that tell how well they pack.
-STRIP = 8
+STRIP_LINES = 8
 
 #: JPEG quality of pictures with their noise, which is what takes the room.
 RAW_QUALITY = 75
 
 #: Width of the lights' pictures in the table, in pixels.
-THUMBNAIL = 144
+THUMBNAIL_WIDTH = 144
 #: Pixels in a row that one of such a picture averages, from which on it is not denoised.
-ENOUGH = 4
+CLEAN_REDUCTION = 4
 
 
 @dataclass(frozen=True)
 class PagePicture:
-    """A picture of the page, (h, w, 3) in display values. alt: what it shows, in words.
+    """A picture of the page, (h, w, 3) in display values. alt: its content in words. alt: what it
+    shows, in words.
 
-    raw: the same as it was rendered, where `pixels` were denoised.
+    raw: the same without denoising, if `pixels` were denoised.
     """
 
     name: str
@@ -60,9 +61,9 @@ class PagePicture:
 
 
 def data_uri(
-    image_8_bit: npt.NDArray[np.uint8], *, largest_png: int = LARGEST_PNG, quality: int = 91
+    image_8_bit: npt.NDArray[np.uint8], *, largest_png: int = MAX_PNG_BYTES, quality: int = 91
 ) -> str:
-    """An (h, w, 3) picture as a data: URI: lossless while it is small, else a good JPEG."""
+    """Return an (h, w, 3) picture as a data: URI: lossless while it is small, else a good JPEG."""
     data, kind = _small_png(image_8_bit, largest_png), "png"
     if data is None:
         buffer = io.BytesIO()
@@ -72,9 +73,9 @@ def data_uri(
 
 
 def _small_png(image_8_bit: npt.NDArray[np.uint8], largest: int) -> bytes | None:
-    """A picture as a PNG of that many bytes at most, if it can be one."""
-    # Every fourth strip of it tells what will be too large.
-    quarter = image_8_bit[np.arange(len(image_8_bit)) // STRIP % 4 == 0]
+    """Return a picture as a PNG of at most that many bytes; None if it is larger."""
+    # Every fourth strip tells whether it will be too large.
+    quarter = image_8_bit[np.arange(len(image_8_bit)) // STRIP_LINES % 4 == 0]
     if largest == 0 or len(png_bytes(quarter)) > 0.3 * largest:
         return None
     data = png_bytes(image_8_bit)
@@ -84,23 +85,25 @@ def _small_png(image_8_bit: npt.NDArray[np.uint8], largest: int) -> bytes | None
 def thumbnail(
     image: Floats, emitters_seen: npt.NDArray[np.bool_], *, is_clean: bool = False
 ) -> tuple[Floats, float]:
-    """A small display-encoded picture of what one light does, and its exposure in stops.
+    """Return a small display-encoded picture of one light, and its exposure in stops.
 
-    image: (h, w, 3) linear. The 98th percentile of what it lights, seen emitters aside, is
-    brought to white; reduced in linear light. is_clean: whether it is denoised then.
+    image: (h, w, 3) linear. The 98th percentile of what it lights, without visible emitters,
+    becomes white. The reduction is in linear light. is_clean: whether to denoise it then.
     """
     width = image.shape[1]
     stops = exposure_of(image, emitters_seen)
-    if width > THUMBNAIL:
-        image = resized(image, THUMBNAIL / width)
+    if width > THUMBNAIL_WIDTH:
+        image = resized(image, THUMBNAIL_WIDTH / width)
     # Where many pixels make one, their mean has hardly any noise left to take out.
-    if is_clean and width < ENOUGH * THUMBNAIL:
+    if is_clean and width < CLEAN_REDUCTION * THUMBNAIL_WIDTH:
         image = denoised(image)
     return encode_display(image, stops=stops), stops
 
 
 def resized(image: Floats, factor: float) -> Floats:
-    """An (h, w, 3) picture at `factor` of its size, box-filtered; no side is less than a pixel."""
+    """Return an (h, w, 3) picture at `factor` of its size, box-filtered; no side is less than a
+    pixel.
+    """
     height, width = (max(1, round(side * factor)) for side in image.shape[:2])
     box = Image.Resampling.BOX
     planes = [
@@ -111,7 +114,9 @@ def resized(image: Floats, factor: float) -> Floats:
 
 
 def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
-    """Stops that bring the 98th percentile of what a light lights to white, seen emitters aside."""
+    """Return stops that bring the 98th percentile of what a light lights to white, without visible
+    emitters.
+    """
     bright = largest(image)
     lit = bright[(bright > 0) & ~emitters_seen]
     lit = lit if lit.size else bright[bright > 0]
@@ -125,7 +130,7 @@ def _raw_uri(look: PagePicture) -> str:
 
 
 def wipe(looks: list[PagePicture]) -> str:
-    """Two of the looks over each other, with a movable border between them."""
+    """Return two of the looks over each other, with a movable border between them."""
     # The verification may be larger than the rest, which the page then enlarges.
     height, width = max(look.pixels.shape[:2] for look in looks)
     # The prediction first: it is the answer, and less noisy than the render that checks it.
@@ -177,10 +182,10 @@ def maps(
     transform: ViewTransform,
     missed: Residual | None = None,
 ) -> str:
-    """False-colour pictures: what is missed, what counts, and where the render disagrees.
+    """Return false-colour pictures: the error, the importance, and where the render disagrees.
 
-    predicted: (h, w, 3) linear, as rendered; current: behind what does not count. missed: what
-    `residual_of` says.
+    predicted: (h, w, 3) linear, as rendered; current: behind what does not count. missed: the
+    result of `residual_of`.
     """
     missed = missed or residual_of(solution, predicted, transform=transform)
     picture = residual_picture(missed, solution, current, transform=transform)
@@ -216,7 +221,7 @@ def maps(
 
 
 def figure(picture: PagePicture, caption: str, legend: str) -> str:
-    """A map with its legend, as `scale` makes it, and what it shows."""
+    """Return a map with its legend, from `scale`, and its caption."""
     height, width = picture.pixels.shape[:2]
     return (
         f'<figure><img width="{width}" height="{height}" alt="{picture.alt} {caption}" '
@@ -226,12 +231,12 @@ def figure(picture: PagePicture, caption: str, legend: str) -> str:
 
 
 def signed_scale(limit: float) -> str:
-    """The legend of what is too dark or too bright, up to `limit`."""
+    """Return the legend of errors that are too dark or too bright, up to `limit`."""
     return scale(SIGNED, f"−{limit:g} too dark", "0", f"too bright +{limit:g}")
 
 
 def scale(colours: list[str], *ends: str) -> str:
-    """The legend of a map: its colours from left to right, and what they are in words."""
+    """Return the legend of a map: its colours from left to right, and their meaning in words."""
     words = "".join(f"<span>{end}</span>" for end in ends)
     gradient = f"linear-gradient(to right, {', '.join(colours)})"
     return (

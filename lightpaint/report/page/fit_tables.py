@@ -1,4 +1,4 @@
-"""The tables of the report beside that of lights: fit, renders, verification. Each returns HTML.
+"""The tables of the report besides that of lights: fit, renders, verification. Each returns HTML.
 
 Names of lights, targets and scenes come from other people's files and are escaped here.
 """
@@ -10,18 +10,18 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.software_versions import Software, version
-from lightpaint.lighting.loss.painting import left_out
+from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
 from lightpaint.report.measures import (
-    brighter_as_allowed,
-    codes_missed,
+    count_at_least_pixels,
+    error_in_codes,
     linear_residual,
     noise_residual,
     relative_residual,
 )
-from lightpaint.report.page.html import facts, listed, row
+from lightpaint.report.page.html import facts, name_list, row
 from lightpaint.report.sentences import partly_reached
 from lightpaint.screen import some_of
 from lightpaint.target.target import Target
@@ -29,7 +29,9 @@ from lightpaint.version import __version__
 
 
 def fit_table(solution: Solution) -> str:
-    """Objective with its standard error, optimality and sweeps, per channel and in all."""
+    """Return rows of the objective with its standard error, optimality and sweeps, per channel and
+    in all.
+    """
     q = solution.certificate
     norm2 = np.where(solution.norm2 > 0, solution.norm2, 1)
     errors = None if q.objective_error is None else np.array(q.objective_error)
@@ -53,7 +55,7 @@ def fit_table(solution: Solution) -> str:
 
 
 def verification_table(verification: Verification | None) -> str:
-    """How far prediction and render are apart, each number beside what is allowed."""
+    """Return the differences of prediction and render, each beside its limit."""
     if verification is None:
         return facts([("Result", "not verified")])
     v = verification
@@ -72,7 +74,7 @@ def verification_table(verification: Verification | None) -> str:
 
 
 def _power(v: Verification) -> list[tuple[str, str]]:
-    """Return a row: how likely an error in each light was to be seen, the least likely first."""
+    """Return a row on the chance of detecting an error in each light, the smallest first."""
     if not v.power:
         return []
     in_order = sorted(v.power.items(), key=lambda its: its[1])
@@ -87,12 +89,12 @@ def render_table(
     predicted: Estimate,
     verification: Verification | None,
 ) -> str:
-    """Where the basis comes from, and which pixels and lights took no part."""
+    """Return facts on the origin of the basis, and on pixels and lights that took no part."""
     origin, q = basis.origin, solution.certificate
     height, width = basis.size
     stopped = f"no: stopped after {max(q.sweeps)} sweeps"
     seen = int(basis.emitters_seen.sum())
-    out = int(left_out(target, basis.emitters_seen, solution.problem.fit.emitters).sum())
+    out = int(ignored_paint(target, basis.emitters_seen, solution.problem.fit.emitters).sum())
     adjusted = int((~basis.is_fixed).sum())
     told: list[tuple[str, str]] = [
         ("Solve converged", "yes" if q.converged else stopped),
@@ -104,12 +106,12 @@ def render_table(
     ]
     missed, noise = relative_residual(solution), noise_residual(solution, predicted)
     told.append(("Missed (RMS)", f"{missed:.3g} of what was asked; noise adds {noise:.3g}"))
-    told += _fitted(solution, predicted)
+    told += _display_facts(solution, predicted)
     for light in basis.lights:
         if light.is_fixed:
-            told.append(("Kept as they are", listed(light.members)))
+            told.append(("Kept as they are", name_list(light.members)))
     if q.unreached:
-        told.append(("Reach nothing painted, so kept", listed(q.unreached)))
+        told.append(("Reach nothing painted, so kept", name_list(q.unreached)))
     for channels in partly_reached(solution.lighting):
         told.append(("Reach nothing painted in a channel", channels))
     if target.not_finite:
@@ -117,8 +119,8 @@ def render_table(
     return facts([(what, value) for what, value in told if value])
 
 
-def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
-    """What was compared with the painting, where it was not plain light."""
+def _display_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
+    """Return facts on the comparison with the painting, if it was not in plain linear light."""
     if solution.problem.is_linear or solution.reweighting is None:
         return []
     q = solution.certificate
@@ -128,7 +130,8 @@ def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
             ("Fitted in display space", f"as {q.display} shows it"),
             (
                 "Missed on the display",
-                f"{codes_missed(solution):.1f} of 255 codes, {relative_residual(solution):.3g} of "
+                f"{error_in_codes(solution):.1f} of 255 codes, {relative_residual(solution):.3g} "
+                f"of "
                 "the painting (RMS)",
             ),
             (
@@ -136,7 +139,7 @@ def _fitted(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
                 f"{linear_residual(solution, predicted):.3g} of the painting (RMS)",
             ),
         ]
-    if (at_least := brighter_as_allowed(solution, predicted.image)) is not None:
+    if (at_least := count_at_least_pixels(solution, predicted.image)) is not None:
         pixels, brighter = at_least
         text = f"{pixels} pixels, {brighter} of which are brighter now"
         told.append(("Painted as at least so bright", text))
@@ -157,7 +160,7 @@ def _full_size(basis: Basis, verification: Verification | None) -> str:
 
 
 def versions(basis: Basis) -> str:
-    """What made this: lightpaint and the libraries under it, as installed here."""
+    """Return the versions of lightpaint and the libraries under it, as installed here."""
     parts = [f"lightpaint {__version__}"]
     if basis.origin.lightpaint != __version__:
         parts[0] += f" (basis by {basis.origin.lightpaint})"

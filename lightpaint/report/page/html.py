@@ -1,4 +1,6 @@
-"""Pieces of HTML that several parts of the report are made of. What goes in is escaped before."""
+"""Pieces of HTML for several parts of the report. Callers escape what goes in. What goes in is
+escaped before.
+"""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -7,10 +9,10 @@ from typing import Any
 
 
 class Html(str):
-    """What is HTML already, where text is escaped."""
+    """A text that is HTML already, and is not escaped."""
 
 
-#: Rows of a table, or names of a list, that are shown of many, and how many more are not worth a
+#: Rows of a table, or names of a list, that are shown of many, and the most others that need no
 #: fold.
 SHOWN, SPARE = 10, 3
 
@@ -18,7 +20,7 @@ SHOWN, SPARE = 10, 3
 def table(
     headings: Iterable[str], rows: Sequence[str], *, kind: str = "", shown: int = SHOWN
 ) -> str:
-    """A table under its headings, those rows first that matter most; of many the rest is folded.
+    """Return a table under its headings, the most important rows first; the rest of many is folded.
 
     kind: its class. It scrolls by itself where it is wider than the page.
     """
@@ -32,41 +34,41 @@ def table(
 
     if len(rows) <= shown + SPARE:
         return part(rows)
-    return part(rows[:shown]) + folded(f"{len(rows) - shown} more", part(rows[shown:]))
+    return part(rows[:shown]) + fold(f"{len(rows) - shown} more", part(rows[shown:]))
 
 
-def folded(summary: str, content: str) -> str:
-    """Content that opens if it is asked for, or if the browser's search finds something in it."""
+def fold(summary: str, content: str) -> str:
+    """Return content that opens on demand, or if the browser's search finds something in it."""
     return f'<details class="more"><summary>{summary}</summary>{content}</details>'
 
 
-def name_of(name: str) -> Html:
-    """A name, escaped here, that may break behind what joins its words, and in very long ones."""
+def breakable_name(name: str) -> Html:
+    """Return a name, escaped, that may break after what joins its words, and in very long ones."""
     words = re.findall(r"[^_./-]{1,14}[_./-]*|[_./-]+", name, re.DOTALL)
     return Html("<wbr>".join(map(escape, words)))
 
 
-def listed(names: Sequence[str]) -> Html:
-    """Names with commas, escaped here; of many the rest is folded."""
+def name_list(names: Sequence[str]) -> Html:
+    """Return names with commas, escaped; the rest of many is folded."""
     first, more = names, ""
     if len(names) > SHOWN + SPARE:
         first, rest = names[:SHOWN], names[SHOWN:]
-        more = folded(f"and {len(rest)} more", ", ".join(map(name_of, rest)))
-    return Html(", ".join(map(name_of, first)) + more)
+        more = fold(f"and {len(rest)} more", ", ".join(map(breakable_name, rest)))
+    return Html(", ".join(map(breakable_name, first)) + more)
 
 
 def row(name: str, *cells: str) -> str:
-    """A row of a table, headed by its name."""
+    """Return a row of a table, headed by its name."""
     return f'<tr><th scope="row">{name}</th>{"".join(map(cell, cells))}</tr>'
 
 
 def cell(content: str) -> str:
-    """One of a row; what is a cell already stays as it is."""
+    """Return a cell of a row; a cell stays as it is."""
     return content if content.startswith("<td") else f"<td>{content}</td>"
 
 
 def share_cell(text: str, share: float) -> str:
-    """A share in words, and as a bar."""
+    """Return a cell with a share in words, and as a bar."""
     return (
         f'<td class="share"><span>{text}</span><div class="bar" aria-hidden="true">'
         f'<i style="width: {100 * share:.2f}%"></i></div></td>'
@@ -74,6 +76,6 @@ def share_cell(text: str, share: float) -> str:
 
 
 def facts(told: Iterable[tuple[str, Any]]) -> str:
-    """Terms and what they are, escaped here unless it is HTML."""
+    """Return terms with their values, which are escaped here unless they are HTML."""
     texts = ((k, v if isinstance(v, Html) else escape(str(v))) for k, v in told)
     return "".join(f"<dt>{escape(k)}</dt><dd>{v}</dd>" for k, v in texts)

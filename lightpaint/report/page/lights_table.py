@@ -18,11 +18,11 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.basis_memo import once
-from lightpaint.report.clean_pictures import MOST_THUMBNAILS
-from lightpaint.report.measures import energy_shares, largest_shares, that_do_most
+from lightpaint.report.basis_memo import make_once
+from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
+from lightpaint.report.measures import energy_shares, largest_shares, most_visible_lights
 from lightpaint.report.page.figures import data_uri, thumbnail
-from lightpaint.report.page.html import SHOWN, SPARE, folded, name_of, share_cell
+from lightpaint.report.page.html import SHOWN, SPARE, breakable_name, fold, share_cell
 from lightpaint.report.sentences import (
     UNTOLD,
     UNTOLD_HERE,
@@ -53,17 +53,18 @@ def lights_table(
     *,
     is_clean: bool = False,
 ) -> str:
-    """One row per light, in document order; of many those that do most, and the rest folded.
+    """Return a row per light, in document order; of many those with the largest shares, and the
+    rest folded.
 
-    What a light does is its part of the picture's energy, now or as solved, whichever is more.
-    is_clean: whether its pictures are denoised.
+    Shares are of the picture's energy, now or as solved, whichever is more. is_clean: whether to
+    denoise the pictures.
     """
-    is_clean = is_clean and len(basis.lights) <= MOST_THUMBNAILS
+    is_clean = is_clean and len(basis.lights) <= MAX_CLEAN_THUMBNAILS
     rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
     if len(rows) <= SHOWN + SPARE:
         return _table(rows, solution)
     shares = largest_shares(basis, solution.lighting)
-    most = that_do_most(basis, solution.lighting)
+    most = most_visible_lights(basis, solution.lighting)
     rest = np.setdiff1d(np.arange(len(rows)), most)
     told = (
         f"{len(rest)} more lights, none of which is more than "
@@ -72,7 +73,7 @@ def lights_table(
     return (
         f"<p>The {len(most)} that do most in the picture, now or as solved.</p>"
         + _table([rows[k] for k in most], solution)
-        + folded(told, _table([rows[k] for k in rest], solution))
+        + fold(told, _table([rows[k] for k in rest], solution))
     )
 
 
@@ -106,29 +107,32 @@ def _rows(
             f'<tr><td class="thumb"><img src="{uri}" '
             f'width="{shape[1]}" height="{shape[0]}" alt="{what}" '
             f'title="{what}"></td>'
-            f'<th scope="row" class="name">{name_of(light.name)}<small>{escape(light.plugin)}'
+            f'<th scope="row" class="name">{breakable_name(light.name)}'
+            f"<small>{escape(light.plugin)}"
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
             f"{_emission_cells(light, setting, solution.lighting)}"
-            f'<td class="change">{change(light, setting)}{error}{_asked(setting)}</td>'
+            f'<td class="change">{change(light, setting)}{error}{_constraint_note(setting)}</td>'
             f"{share_cell(f'{100 * shares[k]:.1f} %', shares[k])}</tr>"
         )
     return rows
 
 
 def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int, ...], float]]:
-    """What each light lights alone: data: URI, size and exposure. is_clean: whether denoised."""
+    """Return the picture of each light alone: data: URI, size and exposure. is_clean: whether
+    denoised.
+    """
 
     def shown(k: int) -> tuple[str, tuple[int, ...], float]:
         picture, stops = thumbnail(basis.planes.plane(k), basis.emitters_seen, is_clean=is_clean)
         return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
 
-    return once(
+    return make_once(
         basis, ("thumbnails", is_clean), lambda: side_by_side(shown, range(len(basis.lights)))
     )
 
 
 def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:
-    """Colour, emission before and after, their unit, and what an eye makes of it."""
+    """Return cells with colour, emission before and after, their unit, and photometry."""
     seen = lighting.photometry(setting)
     if light.is_fixed:
         return "".join(f'<td class="{kind}"></td>' for kind, _ in COLUMNS[2:7])
@@ -142,7 +146,9 @@ def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting
 
 
 def change(light: BasisLight, setting: LightSetting) -> str:
-    """In words or as a ratio of luminance, what happens to a light where it reaches anything."""
+    """Return the change of a light in words or as a ratio of luminance, for channels that reach
+    anything.
+    """
     if light.is_fixed:
         return "kept as it is"
     if not any(setting.reached):
@@ -163,19 +169,19 @@ def _changed(light: BasisLight, setting: LightSetting) -> str:
     return f"×{after / before:.3g} <small>{stops}</small>"
 
 
-def _asked(setting: LightSetting) -> str:
-    """What was asked of a light, and whether that holds it."""
+def _constraint_note(setting: LightSetting) -> str:
+    """Return the constraint on a light, and whether it holds the light."""
     holds = " (holds it)" if setting.is_active else ""
     return f" <small>{escape(setting.constraint)}{holds}</small>" if setting.constraint else ""
 
 
 def hex_color(emission: RGB) -> str | None:
-    """Colour of a light as #rrggbb, its brightest channel at full; None if it is off."""
+    """Return the colour of a light as #rrggbb, its brightest channel at full; None if it is off."""
     return rgb_to_hex(np.array(emission)) if any(emission) else None
 
 
 def _swatch(setting: LightSetting, seen: Photometry) -> str:
-    """The colour of a light; of one whose own is not known, that of its factor."""
+    """Return the colour of a light; for a multiplier, the colour of its factor."""
     if setting.is_partly_reached:
         return '<span class="swatch none"></span><small>not known</small>'
     emission = setting.emission
@@ -191,14 +197,14 @@ def _swatch(setting: LightSetting, seen: Photometry) -> str:
 
 
 def _amounts(seen: Photometry) -> str:
-    """Luminous quantity and flux; without a scale, the flux in proportion."""
+    """Return luminous quantity and flux; without a scale, the relative flux."""
     if seen.luminous is not None or seen.flux_lm is not None:
         return " <br>".join(filter(None, seen.amounts))
     return "" if seen.flux_y is None else f"{seen.flux_y:.3g}"
 
 
 def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
-    """A line for each channel, in brackets where nothing tells it."""
+    """Return a line for each channel, in brackets if it is undetermined."""
     if not any(emission):
         return "off"
     told = zip(emission, reached, strict=True)

@@ -1,8 +1,8 @@
-"""The light mixer of a page: its lights by hand, with no server behind it.
+"""The light mixer of a page, which sets lights by hand, without a server.
 
-The mix is what the painter's own browser modules make of planes that stand in the page, one for
-each light that matters, small and compact; what is left is one more. A page that is sent by mail is
-a mixer in any browser, offline.
+The page contains a small, compact plane for each light that matters and one for all others. The
+painter's own browser modules mix them, so that a page sent by mail is a mixer in any browser,
+offline.
 """
 
 import base64
@@ -27,14 +27,14 @@ from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.light_setting import ALL_REACHED
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
-from lightpaint.report.basis_memo import once, planes_of
-from lightpaint.report.measures import that_do_most
-from lightpaint.report.page.figures import ENOUGH, data_uri
+from lightpaint.report.basis_memo import cached_clean_planes, make_once
+from lightpaint.report.measures import most_visible_lights
+from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.threads import side_by_side
 from lightpaint.viewer.bundle import bundled, styles
 
 #: Pixels of a plane from left to right, and of all planes together, at most.
-WIDEST, MOST_PIXELS = 480, 1_000_000
+MAX_WIDTH, MAX_PIXELS = 480, 1_000_000
 
 #: Colour temperatures of the sliders, in kelvin, evenly in mireds; and the distance from Planck's
 #: locus up to which a colour is one.
@@ -43,8 +43,8 @@ COOLEST, WARMEST, STEPS, WHITE = 15000.0, 1500.0, 41, 0.02
 #: Points of the table of a transform: as a curve, as each side of a lattice; its ends in stops.
 CURVE, SIDE, LOW, HIGH = 256, 32, -14.0, 7.0
 
-#: What stands above it.
-ABOUT = (
+#: The text above the mixer.
+INTRODUCTION = (
     "Every light by hand, from the answer on. Stops count from the light as it is in the scene; S "
     "shows one alone, M the picture without it."
 )
@@ -60,61 +60,61 @@ def mixer_html(
     scene: str | None = None,
     title: str = "Light mixer",
 ) -> str:
-    """A section of HTML; a page with any of them needs `mixer_assets` after the last.
+    """Return a section of HTML; a page with mixers needs `mixer_assets` after the last.
 
     Args:
-        basis: What the lights do.
-        lighting: The answer, which it starts from.
-        painting: (h, w, 3) display values, to be wiped over the mix.
-        transform: What the mix is seen through.
-        is_clean: Whether planes are denoised.
-        scene: For the command line; None where there is no scene to relight.
+        basis: The basis of the lights.
+        lighting: The answer, from which it starts.
+        painting: (h, w, 3) display values, for the wipe over the mix.
+        transform: The view transform of the mix.
+        is_clean: Whether to denoise planes.
+        scene: For the command line; None without a scene to relight.
         title: Heading.
     """
-    shown = that_do_most(basis, lighting)
-    size, planes = _told(basis, lighting, shown, is_clean=is_clean)
+    shown = most_visible_lights(basis, lighting)
+    size, planes = _shown_planes(basis, lighting, shown, is_clean=is_clean)
     transform = transform or ViewTransform()
     data = {
         "size": size,
         "planes": planes,
         "lights": [_light(basis, lighting, k) for k in shown],
         "rest": _rest(basis, lighting, shown),
-        "kelvins": kelvins(),
-        "transform": told_transform(transform),
+        "kelvins": kelvin_colors(),
+        "transform": transform_data(transform),
         "painting": None if painting is None else _painting(painting, basis, len(planes)),
-        "lighting": told_file(lighting),
+        "lighting": lighting_data(lighting),
         "command": None if scene is None else f"lightpaint relight {scene} lighting.json",
     }
     # In a script nothing is escaped, and only `<` can end it.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     text = text.replace("<", "\\u003c")
     return (
-        f'<section class="mixer" hidden><h2>{title}</h2><p>{ABOUT}</p>'
+        f'<section class="mixer" hidden><h2>{title}</h2><p>{INTRODUCTION}</p>'
         f'<script type="application/json">{text}</script></section>'
     )
 
 
 def mixer_assets() -> str:
-    """Style and script of all mixers of a page."""
+    """Return style and script of all mixers of a page."""
     style, script = styles("viewer/mixer/mixer.css"), bundled("viewer/mixer/mixer.js")
     return f'<style>\n{style}</style><script type="module">\n{script}</script>'
 
 
 def _factor(basis: Basis, count: int) -> int:
-    """Side of the blocks of pixels that one of a plane stands for."""
+    """Return the side of the blocks of pixels that become one pixel of a plane."""
     height, width = basis.size
-    factor = max(1, -(-width // WIDEST))
-    while count * (height // factor) * (width // factor) > MOST_PIXELS and factor < min(
+    factor = max(1, -(-width // MAX_WIDTH))
+    while count * (height // factor) * (width // factor) > MAX_PIXELS and factor < min(
         height, width
     ):
         factor += 1
     return min(factor, height, width)
 
 
-def _told(
+def _shown_planes(
     basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool
 ) -> tuple[list[int], list[dict[str, Any]]]:
-    """Size and planes of each light; then all others, as they are in the answer and at present."""
+    """Return size and planes of each light; then of all others, in the answer and at present."""
     rest = np.setdiff1d(np.arange(len(basis.lights)), shown)
     if not rest.size:
         return planes_for_page(basis, is_clean=is_clean)
@@ -122,23 +122,25 @@ def _told(
         np.where(np.isin(np.arange(len(x)), rest)[:, None], x, 0)
         for x in (lighting.weights_for(basis), basis.present_weights)
     ]
-    return _made(basis, shown, looks, is_clean=is_clean)
+    return _compact_planes(basis, shown, looks, is_clean=is_clean)
 
 
 def planes_for_page(basis: Basis, *, is_clean: bool) -> tuple[list[int], list[dict[str, Any]]]:
-    """Height and width of what stands in a page for the plane of each light, and these.
+    """Return height and width of the planes in a page, and the plane of each light.
 
     is_clean: whether they are denoised.
     """
     every = np.arange(len(basis.lights))
-    return once(basis, ("mixer", is_clean), lambda: _made(basis, every, [], is_clean=is_clean))
+    return make_once(
+        basis, ("mixer", is_clean), lambda: _compact_planes(basis, every, [], is_clean=is_clean)
+    )
 
 
-def _made(
+def _compact_planes(
     basis: Basis, lights: Indices, mixes: Sequence[Doubles], *, is_clean: bool
 ) -> tuple[list[int], list[dict[str, Any]]]:
-    """Planes of some lights and mixes of others, (n, 3) each, small and written."""
-    planes = planes_of(basis) if is_clean else None
+    """Return planes of some lights and mixes of others, (n, 3) each, compact for the page."""
+    planes = cached_clean_planes(basis) if is_clean else None
     factor = _factor(basis, len(lights) + len(mixes))
 
     def small(k: int) -> Floats:
@@ -149,24 +151,24 @@ def _made(
         return np.asarray(block_mean(made, factor), np.float32)
 
     pictures = side_by_side(small, range(len(lights) + len(mixes)))
-    if is_clean and planes is None and factor < ENOUGH:
+    if is_clean and planes is None and factor < CLEAN_REDUCTION:
         features = basis.features and basis.features.reduced(factor)
         pictures = [denoised(picture, features) for picture in pictures]
-    return list(pictures[0].shape[:2]), side_by_side(told_plane, pictures)
+    return list(pictures[0].shape[:2]), side_by_side(plane_data, pictures)
 
 
 def _light(basis: Basis, lighting: Lighting, k: int) -> dict[str, Any]:
     light = basis.lights[k]
     looks = {"present": light.emission, "answer": lighting[light.name].emission}
     return {
-        **told_light(light),
+        **light_data(light),
         **{look: [float(x) for x in emission] for look, emission in looks.items()},
         "kelvin": {look: _kelvin(emission, light.unit) for look, emission in looks.items()},
     }
 
 
-def told_light(light: BasisLight) -> dict[str, Any]:
-    """A light for the page, whatever it is set to."""
+def light_data(light: BasisLight) -> dict[str, Any]:
+    """Return the data of a light for the page, without its setting."""
     return {
         "name": light.name,
         "unit": light.unit,
@@ -196,8 +198,8 @@ def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | 
     }
 
 
-def kelvins() -> list[Any]:
-    """Colours of luminance 1 by temperature, for the sliders."""
+def kelvin_colors() -> list[Any]:
+    """Return colours of luminance 1 by temperature, for the sliders."""
     mireds = np.linspace(1e6 / COOLEST, 1e6 / WARMEST, STEPS)
     return [
         [float(1e6 / mired), [round(float(x), 6) for x in kelvin_to_rgb(float(1e6 / mired))]]
@@ -205,8 +207,8 @@ def kelvins() -> list[Any]:
     ]
 
 
-def told_transform(transform: ViewTransform) -> dict[str, Any]:
-    """A transform for the page: sRGB it knows; else a curve, or where channels mix a lattice."""
+def transform_data(transform: ViewTransform) -> dict[str, Any]:
+    """Return a transform for the page: sRGB by name, a curve, or a lattice if channels mix."""
     about: dict[str, Any] = {"stops": transform.stops, "low": LOW, "high": HIGH}
     plain = ViewTransform(transform.name)
     curve, lattice = None, None
@@ -214,7 +216,7 @@ def told_transform(transform: ViewTransform) -> dict[str, Any]:
         curve = [round(float(x), 5) for x in curve_of(plain, CURVE, LOW, HIGH)]
     elif transform.name != "srgb":
         table = lattice_of(plain, SIDE, LOW, HIGH).reshape(SIDE * SIDE, SIDE, 3)
-        lattice = _written(compact(table, dropped=1))
+        lattice = _plane_data(compact(table, dropped=1))
     return {**about, "curve": curve, "lattice": lattice}
 
 
@@ -223,18 +225,18 @@ def _painting(painting: Floats, basis: Basis, count: int) -> str:
     return data_uri(to_8_bit(np.clip(small, 0, 1)))
 
 
-def told_plane(picture: Floats) -> dict[str, Any]:
-    """A picture of light, (h, w, 3), for the page."""
-    return _written(compact(picture))
+def plane_data(picture: Floats) -> dict[str, Any]:
+    """Return a picture of light, (h, w, 3), for the page."""
+    return _plane_data(compact(picture))
 
 
-def _written(its: Compact) -> dict[str, Any]:
+def _plane_data(its: Compact) -> dict[str, Any]:
     data = "data:;base64," + base64.b64encode(its.data).decode("ascii")
     return {"data": data, "scale": its.scale, "dropped": its.dropped, "size": list(its.size)}
 
 
-def told_file(lighting: Lighting) -> dict[str, Any]:
-    """The answer's file without what is said of the answer alone."""
+def lighting_data(lighting: Lighting) -> dict[str, Any]:
+    """Return the data of the answer's file without what only holds for the answer itself."""
     lights = tuple(
         replace(
             light,

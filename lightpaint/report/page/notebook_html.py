@@ -1,4 +1,4 @@
-"""What notebooks show of scenes, bases, targets and answers: small tables and pictures.
+"""Small tables and pictures of scenes, bases, targets and answers for notebooks.
 
 `screen.Shown` calls `html_of` and `png_of`. All has inline styles and takes the notebook's own
 colours. Names come from other people's files and are escaped here.
@@ -27,17 +27,17 @@ from lightpaint.lighting.analysis.appearance.appearance import Seen
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import Verification
-from lightpaint.report.answer_pictures import coverage, transform_of, unpainted_look
-from lightpaint.report.comparison import SURROUND, TEXT, fitted
-from lightpaint.report.page.figures import THUMBNAIL, data_uri, thumbnail
+from lightpaint.report.answer_pictures import coverage, report_transform, unpainted_look
+from lightpaint.report.comparison import SURROUND, TEXT, shorten_to_width
+from lightpaint.report.page.figures import THUMBNAIL_WIDTH, data_uri, thumbnail
 from lightpaint.report.page.lights_table import change, hex_color
 from lightpaint.report.sentences import UNTOLD_HERE
 from lightpaint.report.verdict import agreement, verdict
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
 
-#: Lights that are shown of many, those that matter most; pictures of a contact sheet, and in a row.
-MOST, SHEET, ACROSS = 10, 12, 4
+#: The most lights in a table; the most pictures of a contact sheet, and in a row.
+MAX_LIGHTS, MAX_PICTURES, MAX_COLUMNS = 10, 12, 4
 #: Pixels of a picture in a page, and width of one that stands alone.
 PIXELS, WIDTH = 2**16, 480
 
@@ -46,19 +46,19 @@ CELL = "text-align: left; padding: 0 1em 0 0"
 
 @singledispatch
 def html_of(shown: object) -> str | None:
-    """A small page of it; None for what is shown as a picture alone."""
+    """Return a small page of an object; None if it is shown as a picture alone."""
     return None
 
 
 @singledispatch
 def png_of(shown: object) -> bytes | None:
-    """A small PNG of it; None for what is shown as a page."""
+    """Return a small PNG of an object; None if it is shown as a page."""
     return None
 
 
 @html_of.register
 def scene_html(scene: Scene) -> str:
-    """Its lights: what they are, how bright, and where."""
+    """Return the lights of a scene: kind, brightness and form."""
     (height, width), lights = scene.size, scene.lights
 
     def row(k: int) -> Sequence[str]:
@@ -75,7 +75,7 @@ def scene_html(scene: Scene) -> str:
 
 @html_of.register
 def lighting_html(lighting: Lighting) -> str:
-    """Its lights and, of a solve, how good that was."""
+    """Return the lights of a lighting and, of a solve, its certificate."""
 
     def row(k: int) -> Sequence[str]:
         light = lighting.lights[k]
@@ -84,7 +84,7 @@ def lighting_html(lighting: Lighting) -> str:
         asked = ", ".join(filter(None, (asked, UNTOLD_HERE if light.untold else "")))
         colour, output = _swatch(light.emission, seen), " ".join(seen.amounts)
         if light.is_partly_reached:
-            colour = _Html("")
+            colour = _Markup("")
         return light.name, colour, _rgb(light.emission), light.unit, output, asked
 
     told = "" if lighting.certificate is None else f"<p>{escape(str(lighting.certificate))}</p>"
@@ -94,7 +94,8 @@ def lighting_html(lighting: Lighting) -> str:
 
 @html_of.register
 def solution_html(solution: Solution) -> str:
-    """What happens to each light, of those that change the picture most, and how good that is."""
+    """Return the change of each light, for those that change the picture most, and the
+    certificate."""
     basis, lighting = solution.basis, solution.lighting
 
     def row(k: int) -> Sequence[str]:
@@ -103,7 +104,7 @@ def solution_html(solution: Solution) -> str:
         told = change(light, setting).replace("<small>", " ").replace("</small>", "")
         told += f", {UNTOLD_HERE}" if setting.untold else ""
         colour = _swatch(setting.emission, lighting.photometry(setting))
-        colour = _Html("") if setting.is_partly_reached else colour
+        colour = _Markup("") if setting.is_partly_reached else colour
         now, new = _rgb(light.emission), _rgb(setting.emission)
         return light.name, colour, now, new, told, setting.constraint
 
@@ -114,7 +115,7 @@ def solution_html(solution: Solution) -> str:
 
 @html_of.register
 def verification_html(verification: Verification) -> str:
-    """The render, and whether it is what was predicted."""
+    """Return the render, and whether it agrees with the prediction."""
     said = agreement(verification)
     return (
         _picture("verified", [verification.verified.image], _transform(verification.verified.image))
@@ -131,13 +132,13 @@ def look_html(
     *,
     seen: Seen | None = None,
 ) -> str:
-    """Painting, prediction and render side by side, the verdict, and what the lights do."""
+    """Return painting, prediction and render side by side, the verdict, and the lights."""
     images = [_on_grey(target.image, target.importance), predicted.image]
     names = ["target", "predicted"]
     if verification is not None:
         images.append(covered(verification.verified.image, predicted.size))
         names.append("verified")
-    transform = transform_of(target, solution.basis, predicted.image)
+    transform = report_transform(target, solution.basis, predicted.image)
     said = verdict(solution, predicted, verification, seen=seen)
     return (
         _picture(", ".join(names), images, transform, paintings=1)
@@ -147,24 +148,26 @@ def look_html(
 
 @png_of.register
 def basis_png(basis: Basis) -> bytes:
-    """A contact sheet: what each light does alone, at exposures of their own."""
+    """Return a contact sheet of each light alone, at exposures of their own."""
     power = (basis.present_weights * basis.totals) @ LUMINANCE
-    chosen = _most(power, SHEET)
+    chosen = _largest_indices(power, MAX_PICTURES)
     pictures = [
         _wide(thumbnail(basis.planes.plane(k), basis.emitters_seen, is_clean=True)[0])
         for k in chosen
     ]
     height, width = pictures[0].shape[:2]
     text = 12
-    rows, columns = -(-len(chosen) // ACROSS), min(ACROSS, len(chosen))
+    rows, columns = -(-len(chosen) // MAX_COLUMNS), min(MAX_COLUMNS, len(chosen))
     left = len(basis.lights) - len(chosen)
     size = (columns * (width + 4) + 4, rows * (height + 2 * text) + 4 + (2 * text if left else 0))
     sheet = Image.new("RGB", size, SURROUND)
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(text)
     for k, (light, picture) in enumerate(zip(chosen, pictures, strict=True)):
-        x, y = 4 + k % ACROSS * (width + 4), 4 + k // ACROSS * (height + 2 * text)
+        x, y = 4 + k % MAX_COLUMNS * (width + 4), 4 + k // MAX_COLUMNS * (height + 2 * text)
         sheet.paste(Image.fromarray(to_8_bit(picture)), (x, y))
-        draw.text((x, y + height + 2), fitted(basis.names[light], font, width), TEXT, font)
+        draw.text(
+            (x, y + height + 2), shorten_to_width(basis.names[light], font, width), TEXT, font
+        )
     if left:
         draw.text((4, size[1] - 2 * text), f"and {left} more", TEXT, font)
     return png_bytes(np.asarray(sheet))
@@ -172,7 +175,7 @@ def basis_png(basis: Basis) -> bytes:
 
 @png_of.register
 def target_png(target: Target) -> bytes:
-    """The painting; dim and hatched where nothing was painted."""
+    """Return the painting; dim and hatched where nothing was painted."""
     transform = target.transform or _transform(target.image)
     share = _sized(coverage(target.importance)[..., None], WIDTH)
     image = _sized(target.image, WIDTH)
@@ -181,38 +184,40 @@ def target_png(target: Target) -> bytes:
 
 
 def _table(heads: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any) -> str:
-    """The rows of the largest, and how many are left; cells that are no HTML are escaped."""
+    """Return the rows of the largest, and the number of others; texts that are not HTML are
+    escaped.
+    """
 
     def cells(kind: str, texts: Iterable[str]) -> str:
-        made = (x if isinstance(x, _Html) else escape(_cut(x)) for x in texts)
+        made = (x if isinstance(x, _Markup) else escape(_shorten(x)) for x in texts)
         row = "".join(f'<{kind} style="{CELL}">{x}</{kind}>' for x in made)
         return f"<tr>{row}</tr>"
 
-    chosen = _most(np.asarray(sizes, np.float64), MOST)
+    chosen = _largest_indices(np.asarray(sizes, np.float64), MAX_LIGHTS)
     body = "".join(cells("td", row(k)) for k in chosen)
     left = len(sizes) - len(chosen)
     more = f"<p>… and {left} more, which matter less</p>" if left else ""
     return f"<table>{cells('th', heads)}{body}</table>{more}"
 
 
-class _Html(str):
-    """What is HTML already."""
+class _Markup(str):
+    """A text that is HTML already."""
 
 
-def _most(sizes: Any, count: int) -> list[int]:
-    """Indices of the largest, in their order."""
+def _largest_indices(sizes: Any, count: int) -> list[int]:
+    """Return indices of the largest, in their order."""
     return sorted(np.argsort(-sizes, kind="stable")[:count].tolist())
 
 
 def _sizes(lights: Sequence[Any]) -> Doubles:
-    """How bright lights are: their flux or, where that is not known of all, their emission."""
+    """Return the brightness of lights: their flux or, if it is unknown for some, their emission."""
     emission = np.array([light.emission for light in lights])
     if all(light.unit_flux is not None for light in lights):
         emission = emission * [light.unit_flux for light in lights]
     return np.asarray(emission @ LUMINANCE)
 
 
-def _cut(text: str, room: int = 120) -> str:
+def _shorten(text: str, room: int = 120) -> str:
     return text if len(text) <= room else text[: room - 1] + "…"
 
 
@@ -220,14 +225,14 @@ def _rgb(emission: RGB) -> str:
     return " ".join(f"{v:.4g}" for v in emission) if any(emission) else "off"
 
 
-def _swatch(emission: RGB, seen: Photometry) -> _Html:
-    """The colour of a light; of one whose own is not known, that of its factor."""
+def _swatch(emission: RGB, seen: Photometry) -> _Markup:
+    """Return the colour of a light; for a multiplier, the colour of its factor."""
     color = (seen.hex or hex_color(emission)) if any(emission) else None
     if color is None:
-        return _Html("")
+        return _Markup("")
     box = f"display: inline-block; width: 1em; height: 1em; background: {color}"
     kelvin = "" if seen.kelvin is None else f" {seen.kelvin:.0f} K"
-    return _Html(f'<span style="{box}" title="{color}"></span>{kelvin}')
+    return _Markup(f'<span style="{box}" title="{color}"></span>{kelvin}')
 
 
 def _transform(image: Floats) -> ViewTransform:
@@ -235,7 +240,8 @@ def _transform(image: Floats) -> ViewTransform:
 
 
 def _on_grey(image: Floats, importance: Floats) -> Floats:
-    """(h, w, 3) linear, what is not painted in a dim grey of its own luminance."""
+    """Return an image (h, w, 3), linear, with unpainted parts in a dim grey of their own
+    luminance."""
     share = coverage(importance)[..., None]
     return np.asarray(share * image + (1 - share) * 0.2 * luminance(image)[..., None])
 
@@ -243,7 +249,7 @@ def _on_grey(image: Floats, importance: Floats) -> Floats:
 def _picture(
     alt: str, images: Sequence[Floats], transform: ViewTransform, *, paintings: int = 0
 ) -> str:
-    """Linear pictures side by side, at one size, as an element of HTML.
+    """Return linear pictures side by side, at one size, as an element of HTML.
 
     paintings: how many of them, the first, were not rendered.
     """
@@ -259,7 +265,7 @@ def _picture(
 
 
 def _sized(image: Floats, width: int) -> Floats:
-    """(h, w, n) no wider than that, averaged in linear light."""
+    """Return an image (h, w, n) no wider than that, averaged in linear light."""
     height, wide = image.shape[:2]
     if wide <= width:
         return image
@@ -269,6 +275,6 @@ def _sized(image: Floats, width: int) -> Floats:
     return np.stack(shrunk, axis=-1)
 
 
-def _wide(picture: Floats, width: int = THUMBNAIL) -> Floats:
-    """A small picture with larger pixels, as wide as a thumbnail or nearly so."""
+def _wide(picture: Floats, width: int = THUMBNAIL_WIDTH) -> Floats:
+    """Return a small picture with larger pixels, about as wide as a thumbnail."""
     return np.asarray(enlarged(picture, max(1, width // picture.shape[1])))

@@ -1,7 +1,7 @@
 """report.html: one self-contained page about one result.
 
-The page's frame is page.html.in; what is filled in comes from the other modules here. Pictures
-are data: URIs; nothing is loaded from anywhere, and the page's own content policy forbids it.
+page.html.in is the frame of the page; the other modules here fill it in. Pictures are data: URIs;
+the page loads nothing from anywhere, which its own content policy forbids.
 """
 
 import shlex
@@ -27,11 +27,11 @@ from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import (
     Residual,
     brighter_than_white,
+    report_transform,
     target_picture,
-    transform_of,
 )
-from lightpaint.report.clean_pictures import MOST_THUMBNAILS, CleanLooks
-from lightpaint.report.influences import spoken_meaning
+from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS, CleanLooks
+from lightpaint.report.influences import fit_sentence
 from lightpaint.report.page.color_section import colors_section
 from lightpaint.report.page.constraint_section import constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
@@ -42,7 +42,7 @@ from lightpaint.report.page.lights_table import lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.suggestion_section import suggestion_section
 from lightpaint.report.verdict import verdict
-from lightpaint.report.visible_emitters import emitters_in_view
+from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
 from lightpaint.threads import side_by_side
 
@@ -64,14 +64,14 @@ def report_page(
     color_choices: Choices = (),
     missed: Residual | None = None,
 ) -> str:
-    """The page as HTML text.
+    """Return the page as HTML text.
 
-    verification: None where nothing was rendered to check the prediction.
+    verification: None without a render that checks the prediction.
     command: the shell command that made the result.
-    uncertainty, diagnosis, unconstrained, suggestions: without them the page has no section on
-    what they tell. seen: what `what_is_seen` says, where somebody has looked.
-    looks: the pictures without their grain, which then have it on a switch. color_choices: what
-    other colours would come to, if that is known. missed: what `residual_of` says.
+    uncertainty, diagnosis, unconstrained, suggestions: without them the page has no such section.
+    seen: the result of `what_is_seen`, if known. looks: the pictures without their grain, which a
+    switch then shows. color_choices: the answers of other colours, if known. missed: the result of
+    `residual_of`.
 
     Raises SizeError if target and basis differ in size.
     """
@@ -79,7 +79,7 @@ def report_page(
     verified = None if verification is None else verification.verified.image
     raw = CleanLooks.raw(basis, predicted.image, verified)
     looks = looks or raw
-    transform = looks.through(transform_of(target, basis, predicted.image))
+    transform = looks.encoder(report_transform(target, basis, predicted.image))
     current = looks.current
     template = resources.files("lightpaint.report.page").joinpath("page.html.in")
     # Pictures take the time, and none waits for another.
@@ -108,10 +108,10 @@ def report_page(
         target=escape(target.name),
         scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
         verdict=escape(verdict(solution, predicted, verification, seen=seen)),
-        meant=escape(spoken_meaning(solution)),
-        banner=_banner(verification) + _notes(emitters_in_view(target, solution, predicted)),
+        meant=escape(fit_sentence(solution)),
+        banner=_banner(verification) + _notes(emitter_remarks(target, solution, predicted)),
         wipe=pictures,
-        exposure=_exposure(transform, predicted.image, looks.how),
+        exposure=_exposure(transform, predicted.image, looks.denoiser),
         maps=of_pixels,
         missed=what_is_missed + constraints + colors_section(color_choices),
         suggestions=suggestion_section(
@@ -127,16 +127,16 @@ def report_page(
         render=render_table(basis, target, solution, predicted, verification),
         mixer=mixer + mixer_assets(),
         command=escape(command or "(made from Python, without a command line)"),
-        again=_paint_again(basis, target, verification),
+        again=_next_steps(basis, target, verification),
         versions=escape(versions(basis)),
     )
 
 
 def prepare_page(basis: Basis) -> None:
-    """Make what a page shows of a basis whatever the answer: `report_page` then finds it there."""
+    """Make the parts of a page that depend on the basis alone; `report_page` then finds them."""
     if len(basis.lights) <= SHOWN + SPARE:
         planes_for_page(basis, is_clean=True)
-    thumbnails_of(basis, is_clean=len(basis.lights) <= MOST_THUMBNAILS)
+    thumbnails_of(basis, is_clean=len(basis.lights) <= MAX_CLEAN_THUMBNAILS)
 
 
 def _wipe(
@@ -147,7 +147,7 @@ def _wipe(
     *,
     transform: ViewTransform,
 ) -> str:
-    """What can be put side by side, in the order of its lists."""
+    """Return the pictures to compare, in the order of the page's lists."""
 
     def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> PagePicture:
         size = looks.predicted.shape[:2]
@@ -177,7 +177,7 @@ def _wipe(
 def _mixer(
     basis: Basis, target: Target, solution: Solution, looks: CleanLooks, *, transform: ViewTransform
 ) -> str:
-    """The lights by hand."""
+    """Return the mixer of the lights."""
     scene = basis.origin.scene
     return mixer_html(
         basis,
@@ -185,17 +185,17 @@ def _mixer(
         target_picture(target, solution, looks.current, transform=transform),
         transform=transform,
         is_clean=looks.is_clean,
-        scene=shlex.quote(_from_any_folder(scene)) if scene.endswith(".xml") else None,
+        scene=shlex.quote(_absolute_path(scene)) if scene.endswith(".xml") else None,
     )
 
 
-def _from_any_folder(path: str) -> str:
-    """Return the path of a file that is there as any folder has it, or what it was called."""
+def _absolute_path(path: str) -> str:
+    """Return the absolute path of a file that exists, or its name otherwise."""
     return str(Path(path).absolute()) if Path(path).exists() else path
 
 
 def _banner(verification: Verification | None) -> str:
-    """What must be known before looking: loud where the render contradicts the prediction."""
+    """Return what readers must know first: a warning if the render contradicts the prediction."""
     if verification is None:
         return (
             '<p class="note">Not verified: there is no render of the relit scene to compare with, '
@@ -216,7 +216,7 @@ def _notes(remarks: list[str]) -> str:
 
 
 def _exposure(transform: ViewTransform, predicted: Floats, how: str) -> str:
-    """How linear light became these pictures, and what of it they cannot show."""
+    """Return how linear light became these pictures, and how much of it they cannot show."""
     at = f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
     clipped = brighter_than_white(predicted, transform)
     text = f"All at {at}, {'sRGB' if transform.name == 'srgb' else transform.name}."
@@ -227,8 +227,9 @@ def _exposure(transform: ViewTransform, predicted: Floats, how: str) -> str:
     return text
 
 
-def _paint_again(basis: Basis, target: Target, verification: Verification | None) -> str:
-    """How to change the painting and solve once more, for those who open the page much later."""
+def _next_steps(basis: Basis, target: Target, verification: Verification | None) -> str:
+    """Return how to change the painting and solve again, for readers who open the page much
+    later."""
     text = (
         "Open the painting with its layers, change it, save it under the same name, and give the "
         "command again. The basis is kept"
@@ -237,7 +238,7 @@ def _paint_again(basis: Basis, target: Target, verification: Verification | None
     if target.content:
         text += " What counts is what differs from the template."
     elif target.everything and basis.origin.scene.endswith(".xml"):
-        scene = shlex.quote(_from_any_folder(basis.origin.scene))
+        scene = shlex.quote(_absolute_path(basis.origin.scene))
         make = f"<code>lightpaint template {escape(scene)}</code>"
         text += f" Here every pixel counts; painted over what {make} renders, only the paint does."
     return text

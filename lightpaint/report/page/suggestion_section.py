@@ -1,4 +1,4 @@
-"""Lights that would help, in words and as a part of the report. Sections are HTML."""
+"""Suggested lights, in words and as a section of the report. Sections are HTML."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ RING = (
 
 
 def spoken_suggestions(suggestions: Sequence[Suggestion]) -> str:
-    """How much the suggested lights would help, in one sentence."""
+    """Return the gain of the suggested lights in one sentence."""
     if not suggestions:
         return "No point light would surely take away a hundredth of what is missed."
     first, last = suggestions[0], suggestions[-1]
@@ -34,7 +34,7 @@ def spoken_suggestions(suggestions: Sequence[Suggestion]) -> str:
 
 
 def spoken_position(suggestion: Suggestion) -> str:
-    """`(1.02, 2.03, 3.57)`, in units of the scene."""
+    """Return `(1.02, 2.03, 3.57)`, in units of the scene."""
     return f"({', '.join(f'{v:.4g}' for v in suggestion.position)})".replace("-", "−")
 
 
@@ -45,9 +45,9 @@ def suggestion_section(
     cd_per_unit: float | None = None,
     is_clean: bool = False,
 ) -> str:
-    """Each suggested light: the picture without and with it, where it is, what to paste.
+    """Return each suggested light: the picture without and with it, its place, and its XML.
 
-    None, where nobody asked, is no section. is_clean: whether the pictures are denoised.
+    None gives no section. is_clean: whether to denoise the pictures.
     """
     if suggestions is None:
         return ""
@@ -59,7 +59,7 @@ def suggestion_section(
         else ""
     )
     shown = "".join(
-        _shown(
+        _suggestion_html(
             replace(x, without=denoised(x.without), with_it=denoised(x.with_it)) if is_clean else x,
             before=k > 0,
             transform=transform,
@@ -73,10 +73,12 @@ def suggestion_section(
     )
 
 
-def _shown(
+def _suggestion_html(
     suggestion: Suggestion, *, before: bool, transform: ViewTransform, cd_per_unit: float | None
 ) -> str:
-    """before: whether others are suggested before it, which then are in both pictures."""
+    """Return one suggested light. before: whether there are earlier ones, which are in both
+    pictures.
+    """
     seen = suggestion.photometry(cd_per_unit)
     amounts = ", ".join(filter(None, seen.amounts))
     told = [

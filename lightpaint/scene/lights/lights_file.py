@@ -26,7 +26,7 @@ MAX_BYTES = 2**20
 
 
 @dataclass(frozen=True)
-class LightRequests:
+class SceneRequests:
     """What a lights file asks of the lights in the solve: CONSTRAINTS, as they stand there.
 
     source: the file, for errors; "" where there is none, and nothing is asked.
@@ -36,7 +36,7 @@ class LightRequests:
     source: str = ""
 
     @classmethod
-    def of(cls, path: Path, data: Mapping[str, Any]) -> "LightRequests":
+    def of(cls, path: Path, data: Mapping[str, Any]) -> "SceneRequests":
         """Of all keys of the lights file at `path`."""
         return cls({key: data[key] for key in (*CONSTRAINTS, *OLDER) if key in data}, str(path))
 
@@ -57,7 +57,7 @@ class LightsFile:
     path: Path | None = None
     lights: Iterable[str] | None = None
     groups: Mapping[str, Iterable[str]] = field(default_factory=dict)
-    requests: LightRequests = field(default_factory=LightRequests)
+    requests: SceneRequests = field(default_factory=SceneRequests)
     group_alike: bool = True
 
     def with_more(
@@ -100,7 +100,7 @@ def read_lights_file(path: Path) -> LightsFile:
         path,
         _names(path, "lights", data["lights"]) if "lights" in data else None,
         {name: _names(path, f"groups.{one_line(name)}", its) for name, its in groups.items()},
-        LightRequests.of(path, data),
+        SceneRequests.of(path, data),
         group_alike,
     )
 

@@ -176,7 +176,7 @@ def _solved(make_basis: Any, seed: int) -> Any:
 
 def _tangent(solution: Any, light: int) -> Any:
     """The emissions that a light of a range of white mixes about its answer."""
-    knobs = solution.problem.about_answer.knobs
+    knobs = solution.problem.local_reduction.knobs
     [knob] = (knob for knob in knobs if knob.lights == (light,))
     return _on(6, light, [rgb for unknown in knob.unknowns for _, rgb in unknown.columns])
 
@@ -394,7 +394,7 @@ def test_of_many_bounds_those_that_seem_to_matter_most_are_looked_into(
     solution = solve(basis, target, constraints=Constraints.of(wish))
     every, none = release.bounds_of(solution)
     assert none == 0
-    monkeypatch.setattr(release, "RELEASED", 2)
+    monkeypatch.setattr(release, "MAX_RELEASED", 2)
     found = diagnose(solution)
     assert len(found.bounds) == 2
     assert found.bounds_left_out == len(every) - 2
@@ -405,10 +405,10 @@ def test_of_many_bounds_those_that_seem_to_matter_most_are_looked_into(
 def test_the_estimate_is_a_lower_limit(make_basis: Any, seed: int) -> None:
     """By moving one light alone nothing is gained that moving all would not gain."""
     basis, _, solution, _ = _solved(make_basis, seed)
-    answer = release._answer(solution, solution.problem.solved)
+    answer = release._bounded_answer(solution, solution.problem.solved)
     norm2 = float(solution.equations.target_norm2.sum())
     gains = {(b.lights, b.kind): b.gain for b in release.bounds_of(solution)[0]}
-    for h in held.all_held(answer):
+    for h in held.find_active_bounds(answer):
         names = tuple(basis.names[k] for k in h.lights)
         if (names, h.kind) in gains and len(names) == 1:
             assert h.estimate <= gains[names, h.kind] + SAME * norm2
@@ -419,7 +419,7 @@ def test_bounds_stand_in_the_answer_file(make_basis: Any, tmp_path: Any) -> None
     found = diagnose(solution)
     assert found.bounds
     path = tmp_path / "lighting.json"
-    write_lighting(path, solution.told(bounds=found.bounds).lighting)
+    write_lighting(path, solution.with_certificate_fields(bounds=found.bounds).lighting)
     assert read_lighting(path).certificate.bounds == found.bounds  # type: ignore[union-attr]
     data = json.loads(path.read_text(encoding="utf-8"))
     assert set(data["solve"]["bounds"][0]) == {

@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.grain import grain
 from lightpaint.lighting.solve import solve
-from lightpaint.report.sentences import what_is_missed
+from lightpaint.report.sentences import error_sentences
 from lightpaint.target.target import Target
 
 SIZE = (90, 120)
@@ -100,9 +100,9 @@ def test_a_render_as_painting_lacks_nothing_that_lights_could_give(
     plain, painted = diagnosis(image), diagnosis(image + stroke)
     assert plain.share(plain.unreachable) < 0.03
     assert plain.share(plain.painting_noise) > (0.9 if known else 0.95)
-    assert "no mix of the lights can reach" not in " ".join(what_is_missed(plain)).split(",")[0]
+    assert "is out of reach of any mix" not in " ".join(error_sentences(plain)).split(",")[0]
     whose = "of the painting, as renders have" if known else "of the painting or of the lights'"
-    assert whose in what_is_missed(plain)[0]
+    assert whose in error_sentences(plain)[0]
     # The stroke is there as before, and is no noise.
     assert painted.painting_noise == pytest.approx(plain.painting_noise, rel=0.05)
     assert painted.unreachable > 0.5 * np.square(stroke).sum()

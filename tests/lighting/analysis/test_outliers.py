@@ -5,12 +5,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.lighting.analysis.noise.peaks import PEAK, TWO_PATHS, WIDER, Peaks
+from lightpaint.lighting.analysis.noise.peaks import PEAK_SHARE, T_RATIOS, TWO_PATHS, Peaks
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.lights_table import lights_table
 from lightpaint.report.page.notebook_html import html_of
-from lightpaint.report.sentences import UNTOLD_HERE, how_sure, spoken_errors, untold_lights
+from lightpaint.report.sentences import (
+    UNTOLD_HERE,
+    spoken_errors,
+    uncertainty_sentence,
+    untold_lights,
+)
 from lightpaint.target.target import Target
 
 SIZE = (24, 24)
@@ -99,7 +104,7 @@ def test_a_light_that_cannot_be_told_is_so_in_words(make_basis: Any):
     assert errors[2] == "cannot be told"
     assert all(error.endswith(" %") for error in errors[:2])
     assert untold_lights(solution.lighting).startswith(f"Light c {UNTOLD_HERE}: ")
-    assert untold_lights(solution.lighting) in how_sure(basis, solution, found)
+    assert untold_lights(solution.lighting) in uncertainty_sentence(basis, solution, found)
     for shown in (
         lights_table(basis, solution, found),
         html_of(solution),
@@ -114,19 +119,19 @@ def test_peaks_by_hand():
     could, push = np.full((1, 101), 1.0), np.full((1, 101), 0.1)
     could[0, 50], push[0, 50] = 10, 0
     # As if the pixels came in blocks: what was a peak of the first is none of all.
-    peaks = Peaks.none(1)
+    peaks = Peaks.empty(1)
     for its in np.array_split(np.arange(101), 4):
-        peaks.see(could[:, its], push[:, its])
+        peaks.add(could[:, its], push[:, its])
     # Half of 200: it says nothing, the others 0.01 each, and it may be twice as noisy.
     assert peaks.total[0] == pytest.approx(200)
     assert peaks.hidden()[0] == pytest.approx(4 * 0.01 * 100)
     # It says 0.04 of itself, and alone it may be 42 times that: more than two paths have.
     push[0, 50] = 2
-    peaks = Peaks.none(1)
-    peaks.see(could, push)
-    assert 0.04 * WIDER[0] ** 2 > TWO_PATHS
+    peaks = Peaks.empty(1)
+    peaks.add(could, push)
+    assert 0.04 * T_RATIOS[0] ** 2 > TWO_PATHS
     assert peaks.hidden()[0] == pytest.approx(TWO_PATHS * 100 - 4)
     # Of many alike none decides.
-    peaks = Peaks.none(1)
-    peaks.see(np.ones((1, int(1 / PEAK) + 1)), np.full((1, int(1 / PEAK) + 1), 0.1))
+    peaks = Peaks.empty(1)
+    peaks.add(np.ones((1, int(1 / PEAK_SHARE) + 1)), np.full((1, int(1 / PEAK_SHARE) + 1), 0.1))
     assert peaks.hidden()[0] == 0

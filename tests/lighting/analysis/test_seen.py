@@ -12,8 +12,8 @@ from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.analysis.appearance import limiting_reasons as held_back
 from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Seen, what_is_seen
-from lightpaint.lighting.analysis.appearance.display_difference import Looking
-from lightpaint.lighting.analysis.appearance.unpainted_change import what_changes
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
@@ -87,7 +87,7 @@ def test_a_painting_that_is_made_is_close(make_basis: Any):
     assert seen.is_close
     assert not seen.is_far
     assert seen.delta_e < 0.1 < 10 < seen.asked
-    assert seen.held == ()
+    assert seen.limit_groups == ()
 
 
 def test_an_untouched_picture_is_close(make_basis: Any):
@@ -112,7 +112,7 @@ def test_a_held_picture_never_meets_the_wish(make_basis: Any, asked: Any, held: 
     limits = Constraints.of(asked.get("constraints", {}))
     seen = what_is_seen(solve(basis, target, hold=asked["hold"], constraints=limits))
     assert seen.is_close == (not held)
-    assert seen.held == held
+    assert seen.limit_groups == held
 
 
 def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
@@ -120,8 +120,8 @@ def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.5)
     target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     locked = Constraints.of({"*": {"lock": True}})
-    assert what_is_seen(solve(basis, target, hold=50.0)).held == ("hold",)
-    both = what_is_seen(solve(basis, target, hold=50.0, constraints=locked)).held
+    assert what_is_seen(solve(basis, target, hold=50.0)).limit_groups == ("hold",)
+    both = what_is_seen(solve(basis, target, hold=50.0, constraints=locked)).limit_groups
     assert both[0] == "constraints"
     assert "hold" in both
 
@@ -162,7 +162,7 @@ def test_the_share_of_a_reason_is_what_the_fit_misses_no_more(make_basis: Any):
 
     def missed(**how: Any) -> float:
         solution = solve(basis, target, **how)
-        loss = solution.problem.loss.missed(basis.mix(solution.weights))
+        loss = solution.problem.loss.residual(basis.mix(solution.weights))
         return float((target.importance[..., None] * np.square(loss)).sum())
 
     now, hold = missed(constraints=off, hold=3.0), missed(constraints=off, hold=0.0)
@@ -183,7 +183,7 @@ def test_what_counts_of_the_few_pixels_is_what_counts_of_all(make_basis: Any):
     target = _over(look, (slice(None), slice(0, 240)), 0.6)
     solution = solve(basis, target, hold=3.0)
     sample = held_back._PixelSample.of(solution)
-    weights = sample.solved((), sample.others)
+    weights = sample.solve((), sample.others)
     np.testing.assert_allclose(weights, solution.weights, rtol=2e-3)  # where both solves stop
 
 
@@ -207,14 +207,14 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     assert 0 < weaker.hold < 10
     sample = held_back._PixelSample.of(solution)
     holds = (weaker.hold, 1.3 * weaker.hold)  # the steps of the search are finer than that
-    brought, less = (sample.share_of(sample.solved((), sample.others, hold=h)) for h in holds)
+    brought, less = (sample.share_of(sample.solve((), sample.others, hold=h)) for h in holds)
     assert brought >= 0.5 * hold.share > less
     assert weaker.share == pytest.approx(brought)
     # And it harms less than none would: of the window, which nobody painted.
-    look_at = Looking.at(solution.problem)
+    look_at = PaintComparison.of_problem(solution.problem)
     before = basis.mix(solution.weights)
     none = basis.mix(solve(basis, target, hold=0.0).weights)
-    harm = what_changes(look_at, basis, target.importance > 0, before, none)
+    harm = unpainted_change(look_at, basis, target.importance > 0, before, none)
     assert harm is not None
     assert weaker.elsewhere is not None
     assert weaker.elsewhere.object == harm.object == "annex"
@@ -270,7 +270,7 @@ def test_colours_that_hold_are_told(make_basis: Any):
     target = _over(_look(basis), (slice(None), slice(0, 24)), (0.1, 0.6, 0.1))
     seen = what_is_seen(solve(basis, target, colors="white"))
     assert seen.is_far
-    assert seen.held == ("colors",)
+    assert seen.limit_groups == ("colors",)
     assert what_is_seen(solve(basis, target, colors="free")).is_close
 
 
@@ -348,12 +348,12 @@ def test_another_view_that_holds_is_named(make_basis: Any, space: Any):
     targets = [_even(x) for x in paints]
     solution = solve(views, targets, space=space)
     stalls, balcony, _ = (what_is_seen(view) for view in solution.views)
-    assert stalls.held == balcony.held == ("views",)
-    assert stalls.held_by_views == ("balcony",)
-    assert balcony.held_by_views == ("stalls", "box")
+    assert stalls.limit_groups == balcony.limit_groups == ("views",)
+    assert stalls.limiting_views == ("balcony",)
+    assert balcony.limiting_views == ("stalls", "box")
     # Views of one sensor go by their paintings.
     same = solve([views[0]] * 3, targets, space=space)
-    assert what_is_seen(same.views[0]).held_by_views == ("0.05 painted",)
+    assert what_is_seen(same.views[0]).limiting_views == ("0.05 painted",)
 
 
 def test_what_holds_beside_other_views_is_told_apart(make_basis: Any):
@@ -363,10 +363,10 @@ def test_what_holds_beside_other_views_is_told_apart(make_basis: Any):
     dim = Constraints.of({"lamp": {"limits": {"max": 0.1}}})
     for view in solve(views, targets, constraints=dim).views:
         seen = what_is_seen(view)
-        assert seen.held == ("constraints",)
-        assert seen.held_by_views == ()
+        assert seen.limit_groups == ("constraints",)
+        assert seen.limiting_views == ()
     for view in solve(views, targets).views:
-        assert what_is_seen(view).held == ()
+        assert what_is_seen(view).limit_groups == ()
 
 
 def _of_view(make_basis: Any, sensor: str) -> Any:

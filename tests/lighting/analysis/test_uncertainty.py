@@ -14,7 +14,7 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
 from lightpaint.lighting.analysis.noise.refinement import refine
 from lightpaint.lighting.analysis.noise.uncertainty import (
-    SIDES,
+    NORMAL_95,
     _one_sided,
     correct_noise,
     error_bars,
@@ -397,7 +397,7 @@ def test_an_interval_at_a_bound_is_that_of_a_cut_off_normal(u: float):
     # Far out SciPy's own loses itself; there its tail is exponential.
     expected = cut_off.isf(0.05) if u <= 30 else 2 * np.log(20) / u
     assert end == pytest.approx(expected, rel=2e-3)
-    assert u > 0 or end == pytest.approx(2 * SIDES, rel=1e-4)
+    assert u > 0 or end == pytest.approx(2 * NORMAL_95, rel=1e-4)
     assert _one_sided(u, 0.0) == 0
 
 

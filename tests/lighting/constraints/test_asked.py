@@ -12,7 +12,7 @@ from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.lighting.problem import Problem
-from lightpaint.scene.lights.lights_file import LightRequests, read_lights_file
+from lightpaint.scene.lights.lights_file import SceneRequests, read_lights_file
 
 FILE = '[light.bulb]\nlock = "40%"\n[light.panel]\nkelvin = 3200\n'
 
@@ -94,7 +94,7 @@ def test_mistakes_are_refused_in_one_line(room: Path, make_basis: Any):
         ({"prefer": 1, "prefer_current": 1}, r"hall\.toml: both prefer_current and prefer"),
     ]:
         with pytest.raises(ConstraintError, match=wrong) as caught:
-            lp.solve(basis.with_requests(LightRequests(keys, "hall.toml")), _target(basis))
+            lp.solve(basis.with_requests(SceneRequests(keys, "hall.toml")), _target(basis))
         assert "\n" not in str(caught.value)
 
 
@@ -127,7 +127,7 @@ def test_the_pull_has_the_name_it_has_in_python_and_the_one_of_older_files(
 
 
 def test_all_views_heed_it(make_basis: Any):
-    asked = LightRequests({"light": {"light 0": {"off": True}}}, "hall.toml")
+    asked = SceneRequests({"light": {"light 0": {"off": True}}}, "hall.toml")
     bases = [make_basis(2, seed=1).with_requests(asked), make_basis(2, seed=1).with_requests(asked)]
     problem = Problem.of(bases, [_target(basis) for basis in bases])
     assert list(problem.reduction.labels) == ["off", ""]

@@ -14,7 +14,7 @@ from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.constraints.reduced_problem import nearest_unknowns, solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.constraints.white_neighbours import next_whites
-from lightpaint.lighting.linear_problem import reduced_by
+from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.normal_equations import NormalEquations
 
 SIZE = (9, 8)
@@ -33,7 +33,7 @@ def _problem(make_basis: Any, seed: int, n: int = 5) -> tuple[NormalEquations, R
         basis.power,
         present,
     )
-    reduction = reduced_by(lp.Constraints(), basis.lights, lp.Fit(colors="gentle"), gamuts)
+    reduction = reduce_lights(lp.Constraints(), basis.lights, lp.Fit(colors="gentle"), gamuts)
     equations = NormalEquations.of(basis, wanted, weight)
     return equations, reduction, present
 

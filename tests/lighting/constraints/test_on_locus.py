@@ -11,8 +11,8 @@ import lightpaint as lp
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.white_neighbours import next_whites
-from lightpaint.lighting.fit import meant_by
-from lightpaint.lighting.live.live import Live
+from lightpaint.lighting.fit import resolve_for_targets
+from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
@@ -120,8 +120,10 @@ def test_a_light_beyond_its_whites_says_to_which_side(make_basis: Any) -> None:
 def test_under_the_brush_all_lights_are_white(make_basis: Any, space: Any) -> None:
     basis = make_basis(4, SIZE, seed=5)
     view = LiveView(basis, image := basis.present_look.copy(), weight := np.zeros(SIZE, np.float32))
-    fit = meant_by(lp.Fit(colors="white", space=space, hold=0.3), [_asked_through(basis)])
-    live = Live([view], fit=fit, constraints=lp.Constraints())
+    fit = resolve_for_targets(
+        lp.Fit(colors="white", space=space, hold=0.3), [_asked_through(basis)]
+    )
+    live = LiveSolver([view], fit=fit, constraints=lp.Constraints())
     answer = live.answer(basis.present_weights)
     present = basis.present_weights
     np.testing.assert_allclose(luminance(answer), luminance(present), rtol=1e-9)
@@ -132,7 +134,7 @@ def test_under_the_brush_all_lights_are_white(make_basis: Any, space: Any) -> No
         region = slice(top, top + 5), slice(left, left + 4)
         image[region] *= rng.uniform(0.2, 3, 3)
         weight[region] = 1
-        view.painted(region)
+        view.update(region)
         answer = live.answer(answer)
         assert max(map(abs, _duvs(answer))) < SEEN
     # Once the brush rests, the painter's answer is that of a whole solve.

@@ -105,10 +105,10 @@ def codes(basis: lp.Basis, weights: Any, transform: lp.ViewTransform) -> Any:
 
 def shown_through(basis: lp.Basis) -> lp.ViewTransform:
     """The transform of the report of `report(basis)`."""
-    from lightpaint.report.answer_pictures import transform_of
+    from lightpaint.report.answer_pictures import report_transform
 
     target, solution = solved(basis)
-    return transform_of(target, basis, lp.combine(basis, solution.lighting).image)
+    return report_transform(target, basis, lp.combine(basis, solution.lighting).image)
 
 
 def move(page: Any, light: int, slider: int, value: float) -> None:

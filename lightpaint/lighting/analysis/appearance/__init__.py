@@ -1,1 +1,1 @@
-"""How an answer looks beside its painting, and what keeps it from looking closer."""
+"""The look of an answer beside its painting, and the reasons why it is not closer."""

@@ -1,8 +1,7 @@
-"""What each choice of `colors` would come to, beside the one that was made.
+"""The answers of all choices of `colors`, for comparison with the one that was made.
 
-In linear light they have the answer's own equations. Where the loss is no linear problem all are
-found over a sample of its pixels, that of the answer too, so that what the sample gets wrong is in
-both, and cancels.
+In linear light they have the answer's own equations. For a loss that is not linear all choices,
+also the answer's, are solved over a sample of its pixels, so that errors of the sample cancel.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,32 +14,37 @@ import numpy as np
 from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.colour.color import luminance
 from lightpaint.errors import ConstraintError
-from lightpaint.lighting.analysis.appearance.display_difference import Looking
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import only_knobs
 from lightpaint.lighting.constraints.white_neighbours import next_whites, solve_on_locus
 from lightpaint.lighting.fit import Colors
-from lightpaint.lighting.linear_problem import reduced_by
+from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.reweighting import Asked, Led, change, rounds
-from lightpaint.lighting.loss.warm_start import sample
-from lightpaint.lighting.loss.weight_penalty import dimming_of
+from lightpaint.lighting.loss.reweighting import (
+    RoundsResult,
+    WeightTerms,
+    relative_change,
+    run_rounds,
+)
+from lightpaint.lighting.loss.warm_start import sample_pixels
+from lightpaint.lighting.loss.weight_penalty import dimming_factors
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, gamuts_for
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import shortly
 
-#: Pixels in a sample, or more, for each light; painted pixels that are looked at.
-SAMPLE, EACH, LOOKED_AT = 2**12, 2**6, 2**12
+#: The least number of pixels in a sample, the pixels for each light, and compared painted pixels.
+MIN_SAMPLE, PIXELS_PER_LIGHT, COMPARED_PIXELS = 2**12, 2**6, 2**12
 
-#: Change of a light's picture in a round, beside the brightest light's, that ends the rounds.
-ENOUGH = 1e-3
+#: Change of a light's picture, relative to the brightest light's, that ends the rounds.
+LAST_STEP = 1e-3
 
-#: Times that lights go on to other whites, or are kept within their gamuts, at most.
-WHITES_TRIED = 5
+#: Most steps of lights to other whites, or into their gamuts.
+MAX_WHITE_STEPS = 5
 
-#: Part of all light that the hue of one must change to be spoken of.
-NOTABLE = 0.03
+#: Share of all light that a change of hue has to affect to be mentioned.
+MIN_HUE_CHANGE = 0.03
 
 
 @dataclass(frozen=True)
@@ -49,13 +53,13 @@ class ColorChoice:
 
     Attributes:
         colors: The choice.
-        is_chosen: Whether it is that of the answer.
-        delta_e: Mean CIEDE2000 over what was painted, as of `Seen`, with noise.
-        light: The light whose hue would differ most from that of the answer, as far as the
-            picture shows it; "" where none does, and of the answer itself.
-        before, color: What that light emits in the answer, or at present where it is off, and what
-            it would emit, at luminance 1; its weights, where these are all there is.
-        weights: (n, 3), in the order of the basis, as a sample of the pixels has it.
+        is_chosen: Whether it is the answer's own choice.
+        delta_e: Mean CIEDE2000 over the paint, as in `Seen`, with noise.
+        light: The light whose hue differs most from the answer's, as far as the picture shows it;
+            "" if none does, and for the answer itself.
+        before, color: The emission of that light in the answer, or at present if it is off, and
+            with this choice, at luminance 1; its weights, if only these are known.
+        weights: (n, 3), in the order of the basis, from a sample of the pixels.
 
     Examples:
         >>> [analysis] = lp.analyse(lp.solve(basis, target, colors="gentle"))
@@ -81,81 +85,81 @@ Choices = tuple[ColorChoice, ...]
 def color_choices(
     solution: Solution, delta_e: Sequence[float], best: Mapping[Colors, Doubles] | None = None
 ) -> tuple[Choices, ...]:
-    """Of each view, what `free`, `gentle` and `white` come to.
+    """Return, for each view, the answers of `free`, `gentle` and `white`.
 
-    delta_e: of the answer, of each view. best: what `best_of_each` found, where somebody has asked
-    it. Nothing where no light may have another colour than it has, and of pictures without colour.
+    delta_e: of the answer, for each view. best: the result of `best_by_colors`, if known. Empty if
+    no light may change its colour, and for pictures without colour.
     """
-    best = best_of_each(solution) if best is None else best
+    best = best_by_colors(solution) if best is None else best
     if not best:
         return tuple(() for _ in solution.views)
     return tuple(
-        _seen_in(view, its, best) for view, its in zip(solution.views, delta_e, strict=True)
+        _view_choices(view, its, best) for view, its in zip(solution.views, delta_e, strict=True)
     )
 
 
-def best_of_each(solution: Solution) -> dict[Colors, Doubles]:
-    """The best weights, (n, 3), with each choice of `colors`; none where there is no choice."""
+def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
+    """Solve with each choice of `colors`; return weights, (n, 3), none if there is no choice."""
     problem = solution.problem
     is_grey = problem.equations.reached.any(axis=0).sum() < 2
     found: dict[Colors, Doubles] = {}
     if is_grey or not _with_colors(problem, "free").keeps_color.any():
         return found
-    best = _finder(solution)
+    best = _solver(solution)
     for colors in get_args(Colors):
-        with suppress(ConstraintError):  # what else is asked of a light may be no white
+        with suppress(ConstraintError):  # another constraint may exclude white
             found[colors] = best(_with_colors(problem, colors))
     return found
 
 
-def _finder(solution: Solution) -> Callable[[Problem], Doubles]:
-    """What finds the weights (n, 3) that are best for the same with other colours."""
-    once = _finder_once(solution)
+def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
+    """Return a function that solves the problem with other colours for its weights (n, 3)."""
+    once = _single_solver(solution)
 
     def best(problem: Problem) -> Doubles:
         weights = once(problem)
         if problem.fit.colors != "gentle" or problem.dimming is not None:
             return weights
-        dimming = dimming_of(problem.basis.present_weights, weights)
+        dimming = dimming_factors(problem.basis.present_weights, weights)
         return once(replace(problem, dimming=dimming))
 
     return best
 
 
-def _finder_once(solution: Solution) -> Callable[[Problem], Doubles]:
-    """The same with the pull to colours that a problem has."""
+def _single_solver(solution: Solution) -> Callable[[Problem], Doubles]:
+    """Return the same function with the pull to colours that a problem has."""
     loss, at, solved = solution.problem.loss, solution.weights, solution.problem.solved
 
     def squares(problem: Problem) -> tuple[Problem, Doubles]:
-        asked = problem.pulled(solved)
+        asked = problem.with_pull(solved)
         reduction, found = solve_on_locus(asked, problem.reduction, at)
-        return problem.reduced(reduction), found.weights
+        return problem.with_whites(reduction), found.weights
 
     if solution.problem.is_linear:
         return lambda problem: squares(problem)[1]
     lit = LitPixels.of(solution.basis, loss)
-    size = max(SAMPLE, EACH * len(at))
+    size = max(MIN_SAMPLE, PIXELS_PER_LIGHT * len(at))
     part = lit
     if np.count_nonzero(loss.importance) > size:
-        part = sample(lit, np.einsum("cii->ic", solution.equations.M), size)
+        part = sample_pixels(lit, np.einsum("cii->ic", solution.equations.M), size)
 
-    def led(problem: Problem, begin: Doubles) -> Led:
+    def led(problem: Problem, begin: Doubles) -> RoundsResult:
         def solve(equations: NormalEquations, begin: Doubles) -> Doubles:
-            return solve_reduced(problem.pulled(equations), problem.reduction, begin).weights
+            return solve_reduced(problem.with_pull(equations), problem.reduction, begin).weights
 
-        asked = Asked(problem.pull)
-        return rounds(part, asked, begin, solve, from_clipping=False, until=ENOUGH)
+        asked = WeightTerms(problem.pull)
+        return run_rounds(part, asked, begin, solve, from_clipping=False, until=LAST_STEP)
 
     def best(problem: Problem) -> Doubles:
         problem, begin = squares(problem)
         found = led(problem, begin)
         its = problem.reduction
-        for _ in range(WHITES_TRIED if its.white_knobs or its.gamut_knobs else 0):
-            asked = problem.pulled(found.equations)
+        for _ in range(MAX_WHITE_STEPS if its.white_knobs or its.gamut_knobs else 0):
+            asked = problem.with_pull(found.equations)
             reduction, near = next_whites(asked, problem.reduction, found.weights)
-            if change(found.equations, found.weights, near.weights) <= ENOUGH:
+            if relative_change(found.equations, found.weights, near.weights) <= LAST_STEP:
                 break
-            problem = problem.reduced(reduction)
+            problem = problem.with_whites(reduction)
             found = led(problem, near.weights)
         return found.weights
 
@@ -163,13 +167,13 @@ def _finder_once(solution: Solution) -> Callable[[Problem], Doubles]:
 
 
 def _with_colors(problem: Problem, colors: Colors) -> Problem:
-    """The problem with that choice, of the lights that `sparse` has chosen.
+    """Return the problem with that choice, for the lights that `sparse` has chosen.
 
-    Raises ConstraintError where a light cannot have it.
+    Raises ConstraintError if a light cannot have it.
     """
     fit = replace(problem.fit, colors=colors)
     gamuts = gamuts_for(problem.basis, problem.views, fit)
-    full = reduced_by(problem.constraints, problem.lights, fit, gamuts)
+    full = reduce_lights(problem.constraints, problem.lights, fit, gamuts)
     reduction = full
     if problem.reduction is not problem.full:
         knobs = enumerate(problem.reduction.knobs)
@@ -177,32 +181,33 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     return replace(problem, fit=fit, full=full, reduction=reduction)
 
 
-def _seen_in(view: Solution, delta_e: float, found: Mapping[Colors, Doubles]) -> Choices:
-    look = Looking.at(view.problem, most=LOOKED_AT)
+def _view_choices(view: Solution, delta_e: float, found: Mapping[Colors, Doubles]) -> Choices:
+    look = PaintComparison.of_problem(view.problem, max_pixels=COMPARED_PIXELS)
     rows = look.rows(view.basis.planes)
 
     def missed(weights: Doubles) -> float:
-        return look.mean(look.missed(np.einsum("npc,nc->pc", rows, weights)))
+        return look.mean(look.difference(np.einsum("npc,nc->pc", rows, weights)))
 
     chosen, told = found[view.problem.fit.colors or "free"], []
     own = missed(chosen)
     for colors, weights in found.items():
-        # Both by the same few pixels, so that they differ by what the colours do.
+        # Both are of the same sample, so that they differ by the effect of colours.
         its = delta_e if weights is chosen else max(delta_e + missed(weights) - own, 0.0)
-        turned = _recoloured(view, chosen, weights)
+        turned = _largest_hue_change(view, chosen, weights)
         told.append(ColorChoice(colors, weights is chosen, its, *turned, weights))
     return tuple(told)
 
 
-def _recoloured(view: Solution, hue: Doubles, weights: Doubles) -> tuple[str, RGB, RGB]:
-    """The light whose change of hue changes the picture most, and its colours; "" for none."""
-    # What was off would have its present hue, or be white.
+def _largest_hue_change(view: Solution, hue: Doubles, weights: Doubles) -> tuple[str, RGB, RGB]:
+    """Return the light whose change of hue changes the picture most, and its colours; "" for
+    none."""
+    # A light that was off gets its present hue, or white.
     for other in (view.basis.present_weights, np.ones_like(hue)):
         hue = np.where(luminance(hue)[:, None] > 0, hue, other)
     hue = hue / luminance(hue)[:, None]
     size, bright = np.sqrt(view.basis.power), luminance(weights)
     changes = np.linalg.norm(size * (weights - bright[:, None] * hue), axis=1)
     k = int(np.argmax(changes))
-    if changes[k] <= NOTABLE * np.linalg.norm(size * weights):
+    if changes[k] <= MIN_HUE_CHANGE * np.linalg.norm(size * weights):
         return "", (1, 1, 1), (1, 1, 1)
     return view.basis.names[k], as_rgb(hue[k]), as_rgb(weights[k] / bright[k])

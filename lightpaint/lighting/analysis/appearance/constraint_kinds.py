@@ -12,10 +12,10 @@ from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied
 ConstraintKind = Literal["off", "lock", "limits", "colour", "tie", "sparse", "prefer_current"]
 
 #: Kinds of constraints on single lights.
-SINGLE_LIGHT: tuple[ConstraintKind, ...] = ("off", "lock", "limits", "colour")
+SINGLE_LIGHT_KINDS: tuple[ConstraintKind, ...] = ("off", "lock", "limits", "colour")
 
-#: The keys of a lights file that each of them stands for.
-KEYS: Mapping[str, tuple[str, ...]] = {
+#: The keys of a lights file for each of them.
+KEYS_BY_KIND: Mapping[str, tuple[str, ...]] = {
     "off": ("off",),
     "lock": ("lock",),
     "limits": ("limits",),
@@ -27,28 +27,30 @@ KEYS: Mapping[str, tuple[str, ...]] = {
 class ConstraintsByLight:
     """Constraints on each light by itself, patterns resolved.
 
-    asked: (n,), keys and values of each light. constraints: as they were given.
+    tables: (n,), keys and values of each light. constraints: those given.
     """
 
     lights: Sequence[BasisLight]
-    asked: Sequence[dict[str, Any]]
+    tables: Sequence[dict[str, Any]]
     constraints: Constraints
 
     @staticmethod
     def of(constraints: Constraints, lights: Sequence[BasisLight]) -> "ConstraintsByLight":
         """Resolve `constraints` on these lights."""
-        asked = [
+        tables = [
             {key: value for key, value in its.items() if value is not False}
             for its, _ in tables_by_light(constraints, lights)
         ]
-        return ConstraintsByLight(lights, asked, constraints)
+        return ConstraintsByLight(lights, tables, constraints)
 
     def kinds(self) -> dict[ConstraintKind, tuple[int, ...]]:
         """Return the kinds of constraints that there are, and places of the lights under each."""
         tied = tied_lights(self.constraints, self.lights)
         found: dict[ConstraintKind, tuple[int, ...]] = {
-            kind: tuple(k for k, its in enumerate(self.asked) if set(KEYS[kind]) & set(its))
-            for kind in SINGLE_LIGHT
+            kind: tuple(
+                k for k, its in enumerate(self.tables) if set(KEYS_BY_KIND[kind]) & set(its)
+            )
+            for kind in SINGLE_LIGHT_KINDS
         }
         found["tie"] = tuple(sorted(tied))
         every = tuple(k for k, light in enumerate(self.lights) if not light.is_fixed)
@@ -68,8 +70,12 @@ class ConstraintsByLight:
             kept = tuple(tie for tie in self.constraints.ties if id(tie) not in gone)
             return replace(self.constraints, ties=kept)
         left = [
-            {key: value for key, value in its.items() if k not in lights or key not in KEYS[kind]}
-            for k, its in enumerate(self.asked)
+            {
+                key: value
+                for key, value in its.items()
+                if k not in lights or key not in KEYS_BY_KIND[kind]
+            }
+            for k, its in enumerate(self.tables)
         ]
         each = tuple(
             (light.name, its, f"light.{light.name}")

@@ -1,4 +1,4 @@
-"""How far a picture looks from what was painted: CIEDE2000 over the paint, as displayed."""
+"""The visible difference of a picture from the paint: CIEDE2000, as displayed."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,20 +13,20 @@ from lightpaint.colour.color_difference import ciede2000, lab
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.srgb import decode_display
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.loss.painting import brighter_will_do, painted_light
+from lightpaint.lighting.loss.painting import at_least_mask, target_light
 from lightpaint.lighting.problem import Problem
 
-#: Painted pixels that are looked at, and pixels of each side of a block that noise is averaged in.
-LOOKED_AT, BLOCK = 2**15, 8
+#: Painted pixels that are compared, and pixels along the side of a block that averages noise.
+MAX_COMPARED_PIXELS, BLOCK = 2**15, 8
 
 
 @dataclass(frozen=True)
-class Looking:
-    """What was painted, as far as it is looked at: every `step`-th pixel of each side.
+class PaintComparison:
+    """The compared pixels of a painting: every `step`-th one along each side.
 
     painted: (h, w, 3) linear. at_least: (h, w, 3), where brighter is as good. weight: (h, w), the
-    importance. transform: through which a display shows it. compared: that through which the fit
-    compares it; None in linear light.
+    importance. transform: the view of a display. compared: the view transform of the fit; None in
+    linear light.
     """
 
     painted: Floats
@@ -37,72 +37,73 @@ class Looking:
     compared: ViewTransform | None = None
 
     @staticmethod
-    def at(problem: Problem, *, most: int = LOOKED_AT) -> "Looking":
-        """At the painting of a problem, of all its views together. most: pixels, about."""
+    def of_problem(problem: Problem, *, max_pixels: int = MAX_COMPARED_PIXELS) -> "PaintComparison":
+        """Choose pixels of the painting of a problem, in all its views. most: pixels, about."""
         views = problem.views
         weight = views.join([target.importance for target in views.targets]).astype(np.float64)
-        step = max(int(np.sqrt((weight > 0).sum() / most)), 1)
+        step = max(int(np.sqrt((weight > 0).sum() / max_pixels)), 1)
         if not weight[::step, ::step].any():
             step = 1
         every = (slice(None, None, step), slice(None, None, step))
-        return Looking(
-            painted_light(views)[every],
-            brighter_will_do(views)[every],
+        return PaintComparison(
+            target_light(views)[every],
+            at_least_mask(views)[every],
             weight[every],
             step,
-            transform_of(problem),
+            display_transform(problem),
             problem.loss.transform,
         )
 
     @cached_property
     def counts(self) -> Bools:
-        """(h, w), what was painted."""
+        """(h, w), the painted pixels."""
         return self.weight > 0
 
-    def of(self, image: Floats) -> Doubles:
-        """(p, 3), the painted pixels of a whole picture (H, W, 3)."""
+    def pixels(self, image: Floats) -> Doubles:
+        """Return the painted pixels of a whole picture (H, W, 3), (p, 3)."""
         return image[:: self.step, :: self.step][self.counts].astype(np.float64)
 
     def rows(self, planes: Planes) -> Floats:
-        """(n, p, 3), the painted pixels of whole pictures (H, W, 3)."""
+        """Return the painted pixels of whole pictures (H, W, 3), (n, p, 3)."""
         return np.stack([x[:: self.step, :: self.step][self.counts] for x in planes])
 
-    def meant(self, pixels: Doubles) -> Doubles:
-        """(p, 3), the paint, or light `pixels` (p, 3) where brighter is as good."""
+    def goal(self, pixels: Doubles) -> Doubles:
+        """Return the goal, (p, 3): the paint, or light `pixels` (p, 3) where brighter is as
+        good."""
         painted = self.painted[self.counts]
         brighter = self.at_least[self.counts] & (pixels > painted)
         return np.asarray(np.where(brighter, pixels, painted), np.float64)
 
-    def missed(self, pixels: Doubles) -> Doubles:
-        """(p,), how far light (p, 3) looks from the paint."""
-        return ciede2000(self.lab(pixels), self.lab_meant(pixels))
+    def difference(self, pixels: Doubles) -> Doubles:
+        """Return the difference of light (p, 3) from the paint, CIEDE2000 (p,)."""
+        return ciede2000(self.lab(pixels), self.lab_goal(pixels))
 
-    def costs(self, pixels: Doubles) -> Doubles:
-        """Return what light x, (p, 3), misses of the paint in the fit, (p,): ‖V(ψ) − V(x)‖².
+    def fit_errors(self, pixels: Doubles) -> Doubles:
+        """Return the error of light x, (p, 3), in the fit, (p,): ‖V(ψ) − V(x)‖².
 
-        Importance is not in it.
+        Importance is not included.
         """
-        missed = self.compare(self.meant(pixels)) - self.compare(pixels)
+        missed = self.compare(self.goal(pixels)) - self.compare(pixels)
         return np.asarray(np.square(missed).sum(axis=-1))
 
     def compare(self, pixels: Doubles) -> Doubles:
-        """V of light (p, 3): what the fit compares."""
+        """Return V of light (p, 3): the values that the fit compares."""
         encoded = pixels if self.compared is None else self.compared.encode(pixels)
         return np.asarray(encoded, np.float64)
 
     def lab(self, pixels: Doubles) -> Doubles:
-        """L*a*b* (p, 3) of what a display shows of light (p, 3)."""
-        if self.transform.name == "srgb":  # encoded and decoded, it is the light itself
+        """Return L*a*b* (p, 3) of light (p, 3) on the display."""
+        if self.transform.name == "srgb":  # encoding and decoding cancel
             return lab(np.clip(pixels * 2.0**self.transform.stops, 0, 1))
         return lab(decode_display(self.transform.encode(pixels)))
 
-    def lab_meant(self, pixels: Doubles) -> Doubles:
-        """L*a*b* (p, 3) of `meant`."""
-        return self.lab(self.meant(pixels)) if self._moves else self._painted_lab
+    def lab_goal(self, pixels: Doubles) -> Doubles:
+        """Return L*a*b* (p, 3) of the goal."""
+        return self.lab(self.goal(pixels)) if self._has_moving_goal else self._painted_lab
 
     @cached_property
-    def _moves(self) -> bool:
-        """Whether what is meant follows the light anywhere."""
+    def _has_moving_goal(self) -> bool:
+        """True if the goal follows the light anywhere."""
         return bool(self.at_least[self.counts].any())
 
     @cached_property
@@ -110,18 +111,19 @@ class Looking:
         return self.lab(self.painted[self.counts].astype(np.float64))
 
     def mean(self, values: Doubles) -> float:
-        """Of the painted pixels, (p,), weighted by importance."""
+        """Return the mean of (p,) over the painted pixels, weighted by importance."""
         return float(np.average(values, weights=self.weight[self.counts]))
 
     def in_blocks(self, values: Doubles) -> Doubles:
-        """(rows, columns, …), means of (p, …) over the paint of each block; 0 where is none."""
+        """Return means of (p, …) over the paint of each block, (rows, columns, …); 0 without
+        paint."""
         weight = self.weight[self.counts].reshape(-1, *[1] * (values.ndim - 1))
         sums, total = self._sums(weight * values), self.block_weights
         total = total.reshape(*total.shape, *[1] * (values.ndim - 1))
         return np.asarray(sums / np.where(total > 0, total, 1))
 
-    def of_blocks(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """(p,), what each painted pixel has of its block's values, (rows, columns)."""
+    def spread_blocks(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return the block's value, of (rows, columns), for each painted pixel, (p,)."""
         height, width = self.weight.shape
         tall = values.repeat(BLOCK, axis=0)[:height]
         return np.asarray(tall.repeat(BLOCK, axis=1)[:, :width][self.counts])
@@ -138,15 +140,15 @@ class Looking:
         return np.asarray(np.add.reduceat(np.add.reduceat(image, rows, 0), columns, 1))
 
     def box(self, row: int, column: int) -> tuple[int, int, int, int]:
-        """Top, left, bottom and right of a block, in pixels of the whole picture."""
+        """Return top, left, bottom and right of a block, in pixels of the whole picture."""
         top, left = (self.step * BLOCK * k for k in (row, column))
         ends = zip((top, left), self.weight.shape, strict=True)
         bottom, right = (self.step * min(start // self.step + BLOCK, n) for start, n in ends)
         return top, left, bottom, right
 
 
-def transform_of(problem: Problem) -> ViewTransform:
-    """What the painting is seen through or, where it holds light, sRGB that shows something."""
+def display_transform(problem: Problem) -> ViewTransform:
+    """Return the view of the painting or, if it holds light, sRGB at a fitting exposure."""
     target = problem.views.targets[0]
     known = problem.fit.transform or target.transform
     if known is not None:

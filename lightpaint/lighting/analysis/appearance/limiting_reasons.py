@@ -1,7 +1,7 @@
 """Reasons that keep the lights from what was painted, and what each of them costs.
 
-All shares are of what the answer misses of the paint, Σ D ‖V(ψ) − V(x)‖², which is what the fit
-minimises there; for each the problem is solved again, of enough of the pixels.
+All shares are of the answer's error over the paint, Σ D ‖V(ψ) − V(x)‖², which the fit minimises
+there; each takes another solve, with a sample of the pixels.
 """
 
 from collections.abc import Collection, Sequence
@@ -20,72 +20,74 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
     ConstraintsByLight,
 )
-from lightpaint.lighting.analysis.appearance.display_difference import Looking
-from lightpaint.lighting.analysis.appearance.unpainted_change import Elsewhere, what_changes
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.unpainted_change import (
+    UnpaintedChange,
+    unpainted_change,
+)
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss.painting import painted_and_rest, rest_weight
+from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.lighting.views import Views
 from lightpaint.target.target import Target
 
-#: What may hold the lights back: unpainted pixels, their colours, what is asked of single ones, and
-#: the paintings of other views.
-Held = Literal["hold", "colors", "constraints", "views"]
+#: Groups of reasons: the hold of unpainted pixels, colours of lights, constraints, and the
+#: paintings of other views.
+LimitGroup = Literal["hold", "colors", "constraints", "views"]
 
-#: Painted pixels, and others, that are enough to tell, of all views together.
-ENOUGH = 2**11
+#: Painted pixels, and unpainted ones, of a sufficient sample, in all views together.
+SAMPLE_PIXELS = 2**11
 
-#: Share of what is missed from which on a reason is known, and from which on a headline names it.
-KNOWN, NAMED = 0.05, 1 / 3
+#: Share of the error from which a reason counts, and from which a headline names it.
+MIN_SHARE, HEADLINE_SHARE = 0.05, 1 / 3
 
-#: Reasons tie that bring this part of what the best one does.
-TIED = 0.9
+#: Reasons tie if they gain this share of the best one's gain.
+TIE_SHARE = 0.9
 
-#: Part of what letting go of all that is asked brings that one thing alone must bring; else it
-#: takes several.
-ALONE = 0.5
+#: Share of the gain without all reasons that a single one must have; else the reasons are joint.
+SINGLE_SHARE = 0.5
 
-#: Part of what all lights of whom the same is asked would bring that some of them must, to be
-#: named alone, and how many these are at most.
-NEARLY, FEW_LIGHTS = 0.75, 3
+#: Share of the gain of all lights under a constraint that a few of them must have to be named
+#: alone, and the most lights of such a few.
+FEW_LIGHTS_SHARE, MAX_FEW_LIGHTS = 0.75, 3
 
-#: Part of what no hold would bring that a weaker one must. Measured (docs/benchmarks.md): in the
-#: mean of two scenes a half brings the answer nearer to what was meant than any other part tried.
-GRADUALLY = 0.5
+#: Share of the gain without hold that a weaker one must have. Measured (docs/benchmarks.md): in the
+#: mean of two scenes a half leads closer to the intended picture than any other share tried.
+LOOSENED_SHARE = 0.5
 
-#: Steps in which the hold is sought, between itself and the part of it that is as good as none.
-STEPS, AS_GOOD_AS_NONE = 6, 1e-3
+#: Steps in the search of the hold, between itself and the share of it that has no effect.
+HOLD_STEPS, NO_HOLD = 6, 1e-3
 
 
 @dataclass(frozen=True)
 class Loosening:
-    """The strongest hold that still brings about half of what none would.
+    """The strongest hold that still has about half of the gain without any.
 
     Attributes:
-        hold: Its strength; 0 where no weaker one does.
-        share: Of what is missed of the paint, what it takes away.
-        elsewhere: What it changes in the picture that is shown now, where nobody painted.
+        hold: Its strength; 0 if no weaker one does.
+        share: The share of the error over the paint that it removes.
+        elsewhere: Its change of unpainted pixels, compared with the present answer.
     """
 
     hold: float
     share: float
-    elsewhere: Elsewhere | None
+    elsewhere: UnpaintedChange | None
 
 
 @dataclass(frozen=True)
 class Reason:
-    """One thing that keeps the lights from the paint.
+    """A reason that keeps the lights from the paint.
 
     Attributes:
-        kind: `hold`, `colors` or `views`; or what was asked of lights.
-        names: Of the lights of which it was asked; of the views; none of the rest.
-        share: Of what is missed of the paint, what would be met without this alone; of one of
-            several that only help together, without all of them.
-        is_joint: Whether it is one of several that only help together.
-        loosening: Of a hold, what to do about it.
+        kind: `hold`, `colors` or `views`; or the kind of a constraint.
+        names: Of the lights under the constraint, or of the views; none otherwise.
+        share: The share of the error over the paint that vanishes without this reason alone; for
+            joint reasons, without all of them.
+        is_joint: Whether it is one of several whose release only helps together.
+        loosening: For a hold, a weaker one that helps.
     """
 
     kind: Literal["hold", "colors", "views"] | ConstraintKind
@@ -96,49 +98,51 @@ class Reason:
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether a person asked it of lights."""
+        """True if it is a constraint by a person."""
         return self.kind not in ("hold", "colors", "views")
 
     @property
-    def held(self) -> Held:
-        """Which of the four that hold lights back it is."""
+    def group(self) -> LimitGroup:
+        """The group of the reason."""
         if self.kind == "hold" or self.kind == "colors" or self.kind == "views":
             return self.kind
         return "constraints"
 
 
 def reasons_of(solution: Solution) -> tuple[Reason, ...]:
-    """Find what keeps the lights from the painting of one view, what would bring most first.
+    """Find the reasons that keep the lights from the painting of one view, the most important
+    first.
 
-    What a person asked of lights goes before what ties with it. Where no single thing brings half
-    of what all together do, it takes several: first the one beside which the others bring least.
+    Constraints by a person go before reasons that tie with them. If no single reason has half of
+    the
+    gain of all, they are joint: first the one without which the others gain least.
     """
     sample = _PixelSample.of(solution)
-    if not sample.asked or sample.now <= 0:
+    if not sample.groups or sample.now <= 0:
         return ()
-    everything = sample.share(sample.asked)
-    if everything < KNOWN:
+    everything = sample.share(sample.groups)
+    if everything < MIN_SHARE:
         return ()
     found: list[Reason] = []
-    for kind in sample.asked:
+    for kind in sample.groups:
         if kind == "constraints":
-            found += _by_hand(sample)
+            found += _constraint_reasons(sample)
         else:
-            found.append(Reason(kind, sample.others_that_matter(kind), sample.share([kind])))
-    found = _ordered([reason for reason in found if reason.share >= KNOWN])
-    if (not found or found[0].share < ALONE * everything) and len(sample.asked) > 1:
-        return _joint(sample, everything)
+            found.append(Reason(kind, sample.limiting_views(kind), sample.share([kind])))
+    found = _sort_reasons([reason for reason in found if reason.share >= MIN_SHARE])
+    if (not found or found[0].share < SINGLE_SHARE * everything) and len(sample.groups) > 1:
+        return _joint_reasons(sample, everything)
     return tuple(
-        replace(reason, loosening=_loosened(solution, sample, reason.share))
+        replace(reason, loosening=_find_loosening(solution, sample, reason.share))
         if reason.kind == "hold"
         else reason
         for reason in found
     )
 
 
-def _ordered(reasons: Sequence[Reason]) -> list[Reason]:
-    """Sort by what brings most; of what ties with that, what a person asked of lights is first."""
-    tied = TIED * max((reason.share for reason in reasons), default=0.0)
+def _sort_reasons(reasons: Sequence[Reason]) -> list[Reason]:
+    """Sort by gain; of reasons that tie with the best, constraints by a person come first."""
+    tied = TIE_SHARE * max((reason.share for reason in reasons), default=0.0)
 
     def rank(reason: Reason) -> tuple[bool, float]:
         comes_first = reason.share >= tied and reason.is_by_hand
@@ -147,82 +151,88 @@ def _ordered(reasons: Sequence[Reason]) -> list[Reason]:
     return sorted(reasons, key=rank)
 
 
-def _by_hand(sample: "_PixelSample") -> list[Reason]:
-    """Return what was asked of lights, by kind, with the fewest lights that bring nearly all."""
+def _constraint_reasons(sample: "_PixelSample") -> list[Reason]:
+    """Return constraints by a person, by kind, with the fewest lights that have nearly the whole
+    gain.
+    """
     by_light, found = sample.by_light, []
     for kind, lights in by_light.kinds().items():
         whole = sample.share_without(kind, lights)
-        if whole < KNOWN:
+        if whole < MIN_SHARE:
             continue
         if kind in ("sparse", "prefer_current"):
             found.append(Reason(kind, (), whole))
             continue
         chosen, gained = lights, whole
         likely = sorted(lights, key=lambda k: -sample.pull[k])
-        # One by one, of those that would move the picture most.
-        alone = [(sample.share_without(kind, [k]), k) for k in likely[: 2 * FEW_LIGHTS]]
+        # One by one, beginning with those of the largest effect.
+        alone = [(sample.share_without(kind, [k]), k) for k in likely[: 2 * MAX_FEW_LIGHTS]]
         best = [k for _, k in sorted(alone, key=lambda its: -its[0])]
-        for count in range(1, min(FEW_LIGHTS, len(lights) - 1) + 1):
+        for count in range(1, min(MAX_FEW_LIGHTS, len(lights) - 1) + 1):
             some = sorted(best[:count])
             part = max(alone)[0] if count == 1 else sample.share_without(kind, some)
-            if part >= NEARLY * whole:
+            if part >= FEW_LIGHTS_SHARE * whole:
                 chosen, gained = tuple(some), part
                 break
         found.append(Reason(kind, tuple(by_light.lights[k].name for k in chosen), gained))
     return found
 
 
-def _joint(sample: "_PixelSample", everything: float) -> tuple[Reason, ...]:
-    """Return all that is asked, where it takes several to bring something."""
+def _joint_reasons(sample: "_PixelSample", everything: float) -> tuple[Reason, ...]:
+    """Return all reasons, where only several together have a gain."""
     order = sorted(
-        sample.asked, key=lambda kind: sample.share([x for x in sample.asked if x != kind])
+        sample.groups, key=lambda kind: sample.share([x for x in sample.groups if x != kind])
     )
     found: list[Reason] = []
     for kind in order:
         if kind == "constraints":
             found += [
-                Reason(constraint, sample.named(constraint, lights), everything, is_joint=True)
+                Reason(
+                    constraint, sample.light_names(constraint, lights), everything, is_joint=True
+                )
                 for constraint, lights in sample.by_light.kinds().items()
             ]
         else:
-            names = sample.others_that_matter(kind)
+            names = sample.limiting_views(kind)
             found.append(Reason(kind, names, everything, is_joint=True))
     return tuple(found)
 
 
-def _loosened(solution: Solution, sample: "_PixelSample", most: float) -> Loosening | None:
-    """Find the strongest hold that brings `GRADUALLY` of `most`, what no hold would bring.
+def _find_loosening(
+    solution: Solution, sample: "_PixelSample", full_gain: float
+) -> Loosening | None:
+    """Find the strongest hold with `LOOSENED_SHARE` of `full_gain`, the gain without a hold.
 
-    Return None where what is not painted counts by the pixel.
+    Return None if unpainted pixels have a weight of their own.
     """
     fit = sample.problem.fit
     if fit.unpainted or not fit.hold:
         return None
 
     def brought(hold: float) -> tuple[float, Doubles]:
-        weights = sample.solved((), sample.others, hold=hold)
+        weights = sample.solve((), sample.others, hold=hold)
         return sample.share_of(weights), weights
 
-    # Between a hold that brings too little and one that brings enough, whose logarithms are halved.
-    little, enough = float(fit.hold), float(fit.hold) * AS_GOOD_AS_NONE
+    # Bisection of logarithms between a hold with too little gain and one with enough.
+    little, enough = float(fit.hold), float(fit.hold) * NO_HOLD
     share, weights = brought(enough)
-    if share < GRADUALLY * most:
+    if share < LOOSENED_SHARE * full_gain:
         enough = 0.0
         share, weights = brought(enough)
-    for _ in range(STEPS if enough else 0):
+    for _ in range(HOLD_STEPS if enough else 0):
         between = round_down(float(np.sqrt(little * enough)))
         if not enough < between < little:
             break
         its, found = brought(between)
-        if its >= GRADUALLY * most:
+        if its >= LOOSENED_SHARE * full_gain:
             enough, share, weights = between, its, found
         else:
             little = between
     [target] = solution.problem.views.targets
     basis = solution.basis
     before, after = (basis.mix(x) for x in (solution.weights, weights))
-    look = Looking.at(solution.problem)
-    changed = what_changes(look, basis, target.importance > 0, before, after)
+    look = PaintComparison.of_problem(solution.problem)
+    changed = unpainted_change(look, basis, target.importance > 0, before, after)
     return Loosening(enough, share, changed)
 
 
@@ -234,9 +244,9 @@ def round_down(value: float) -> float:
 
 @dataclass(frozen=True)
 class _PixelSample:
-    """Some of the pixels of all views, each view in one row.
+    """A sample of the pixels of all views, each view in one row.
 
-    problem: of all pixels of all views. mine: which of the views it is about. names: of the views.
+    problem: of all pixels of all views. mine: the index of the analysed view. names: of the views.
     weights: (n, 3), the answer.
     """
 
@@ -245,25 +255,27 @@ class _PixelSample:
     targets: Sequence[Target]
     mine: int
     names: tuple[str, ...]
-    look: Looking
+    look: PaintComparison
     weights: Doubles
-    _shares: dict[tuple[frozenset[Held], tuple[int, ...]], float] = field(default_factory=dict)
+    _shares: dict[tuple[frozenset[LimitGroup], tuple[int, ...]], float] = field(
+        default_factory=dict
+    )
 
     @staticmethod
     def of(solution: Solution) -> "_PixelSample":
         problem = (solution.whole or solution).problem
-        views = _in_blocks(problem.views, problem.block_side)
+        views = _average_blocks(problem.views, problem.block_side)
         mine = next(k for k, basis in enumerate(problem.views.bases) if basis is solution.basis)
         painted = [(target.importance > 0).ravel() for target in views.targets]
-        # One step for all views, so that each counts as much as it does.
+        # One step for all views, so that each keeps its weight.
         total, rest = (sum(int((x == is_it).sum()) for x in painted) for is_it in (True, False))
-        steps = max(total // ENOUGH, 1), max(rest // ENOUGH, 1)
+        steps = max(total // SAMPLE_PIXELS, 1), max(rest // SAMPLE_PIXELS, 1)
         bases, targets = [], []
         for basis, target, where in zip(views.bases, views.targets, painted, strict=True):
             its = [
                 np.flatnonzero(x)[::step] for x, step in zip((where, ~where), steps, strict=True)
             ]
-            made = _in_a_row(basis, target, np.sort(np.concatenate(its)))
+            made = _pixel_row(basis, target, np.sort(np.concatenate(its)))
             bases.append(made[0])
             targets.append(made[1])
         sensors = tuple(basis.origin.sensor for basis in views.bases)
@@ -275,20 +287,20 @@ class _PixelSample:
             targets,
             mine,
             sensors if len(set(sensors)) == len(sensors) else names,
-            Looking.at(alone),
+            PaintComparison.of_problem(alone),
             solution.weights,
         )
 
     @property
     def others(self) -> Sequence[int]:
-        """The other views."""
+        """The indices of the other views."""
         return [k for k in range(len(self.bases)) if k != self.mine]
 
     @property
-    def asked(self) -> tuple[Held, ...]:
-        """Names of what holds the lights beside the painting, those that are in force."""
+    def groups(self) -> tuple[LimitGroup, ...]:
+        """The groups of reasons besides the painting that are in force."""
         fit = self.problem.fit
-        on: dict[Held, bool] = {
+        on: dict[LimitGroup, bool] = {
             "hold": bool(fit.hold or fit.unpainted),
             "colors": fit.colors != "free",
             "constraints": bool(self.problem.constraints),
@@ -298,14 +310,14 @@ class _PixelSample:
 
     @cached_property
     def by_light(self) -> ConstraintsByLight:
-        """Constraints of each light."""
+        """The constraints on each light."""
         return ConstraintsByLight.of(self.problem.constraints, self.problem.basis.lights)
 
     @cached_property
     def pull(self) -> Doubles:
-        """(n,), how much each light would change what is missed if it were moved alone, at first.
+        """(n,), the initial effect of each light on the error if it moved alone.
 
-        Relative to its power in the picture: by that it may be compared with others.
+        It is relative to the light's power in the picture, so that lights compare.
         """
         problem = self.problem
         gradient = np.abs(problem.equations.gradient(self.weights)).sum(axis=1)
@@ -318,38 +330,38 @@ class _PixelSample:
         return self.cost(self.weights)
 
     def cost(self, weights: Doubles) -> float:
-        """Return what weights (n, 3) miss of the paint of the view, as the fit counts it."""
+        """Return the error of weights (n, 3) over the paint of the view, in the fit."""
         look = self.look
-        return look.mean(look.costs(look.of(self.bases[self.mine].mix(weights))))
+        return look.mean(look.fit_errors(look.pixels(self.bases[self.mine].mix(weights))))
 
     def share_of(self, weights: Doubles) -> float:
-        """Return the share of what is missed that these weights (n, 3) would not miss."""
+        """Return the share of the error that these weights (n, 3) avoid."""
         return 1 - self.cost(weights) / self.now
 
-    def share(self, without: Collection[Held], views: Sequence[int] | None = None) -> float:
-        """Return that share for the best weights without some of what is asked.
+    def share(self, without: Collection[LimitGroup], views: Sequence[int] | None = None) -> float:
+        """Return that share for the best weights without some groups of reasons.
 
-        views: those let go where views are; all others by default. Each is solved for once.
+        views: those to release with the group `views`; all others by default. Results are cached.
         """
         views = self.others if views is None else views
         key = frozenset(without), tuple(views)
         if key not in self._shares:
-            self._shares[key] = self.share_of(self.solved(without, views))
+            self._shares[key] = self.share_of(self.solve(without, views))
         return self._shares[key]
 
     def share_without(self, kind: ConstraintKind, lights: Collection[int]) -> float:
         """Return that share without one kind of constraint on some lights, by their places."""
         asked = self.by_light.without(kind, lights)
-        return self.share_of(self.solved((), self.others, constraints=asked))
+        return self.share_of(self.solve((), self.others, constraints=asked))
 
-    def named(self, kind: ConstraintKind, lights: Collection[int]) -> tuple[str, ...]:
-        """Return names of lights under one kind of constraint; none of what is asked of all."""
+    def light_names(self, kind: ConstraintKind, lights: Collection[int]) -> tuple[str, ...]:
+        """Return names of lights under one kind of constraint; none for kinds that apply to all."""
         if kind in ("sparse", "prefer_current"):
             return ()
         return tuple(self.by_light.lights[k].name for k in lights)
 
-    def others_that_matter(self, kind: Held) -> tuple[str, ...]:
-        """Return names of the views that hold, where that is what holds."""
+    def limiting_views(self, kind: LimitGroup) -> tuple[str, ...]:
+        """Return names of the views that hold the lights, for the group `views`."""
         if kind != "views":
             return ()
         its = self.others
@@ -358,24 +370,25 @@ class _PixelSample:
             its = [k for k in its if self.share(["views"], views=[k]) > part] or its
         return tuple(self.names[k] for k in its)
 
-    def solved(
+    def solve(
         self,
-        without: Collection[Held],
+        without: Collection[LimitGroup],
         views: Sequence[int],
         *,
         constraints: Constraints | None = None,
         hold: float | None = None,
     ) -> Doubles:
-        """Solve for the best weights, (n, 3), without some of what is asked.
+        """Solve for the best weights, (n, 3), without some groups of reasons.
 
-        views: those that are let go where views are. constraints, hold: instead of those there are.
+        views: those to release with the group `views`. constraints, hold: instead of the present
+        ones.
         """
         gone = set(views) if "views" in without else set()
         left = [k for k in range(len(self.bases)) if k not in gone]
         fit = self.problem.fit if hold is None else replace(self.problem.fit, hold=hold)
         change: dict[str, Any] = {"hold": 0.0, "unpainted": 0.0}
         if "hold" not in without:
-            change["unpainted"] = self._weight_of_rest(fit, left)
+            change["unpainted"] = self._unpainted_weight(fit, left)
         if "colors" in without:
             change["colors"] = "free"
         asked = self.problem.constraints if constraints is None else constraints
@@ -388,26 +401,26 @@ class _PixelSample:
         begin = replace(problem, start=self.problem.start)
         return solution_of(begin).weights
 
-    def _weight_of_rest(self, fit: Fit, left: Sequence[int]) -> float:
-        """Return the weight of each of the few unpainted pixels of some views.
+    def _unpainted_weight(self, fit: Fit, left: Sequence[int]) -> float:
+        """Return the weight of each of the sampled unpainted pixels of some views.
 
-        Together they count beside the painted ones what all there are do.
+        Relative to the painted ones, they weigh as much as all unpainted pixels do.
         """
         (painted, rest), (few_painted, few_rest) = (
-            painted_and_rest(
+            importance_sums(
                 Views(tuple(views.bases[k] for k in left), tuple(views.targets[k] for k in left))
             )
             for views in (self.problem.views, Views(tuple(self.bases), tuple(self.targets)))
         )
         if few_rest <= 0 or painted <= 0:
             return 0.0
-        return rest_weight(painted, rest, fit) * (rest / few_rest) * (few_painted / painted)
+        return unpainted_weight(painted, rest, fit) * (rest / few_rest) * (few_painted / painted)
 
 
-def _in_blocks(views: Views, side: int) -> Views:
-    """Average the pixels of views in blocks, where single ones are mostly noise.
+def _average_blocks(views: Views, side: int) -> Views:
+    """Average the pixels of views in blocks, if single ones are mostly noise.
 
-    What makes no whole block at the right and at the bottom is left out.
+    Incomplete blocks at the right and at the bottom are left out.
     """
     sizes = [[side * (n // side) for n in basis.size] for basis in views.bases]
     parts = zip(views.targets, sizes, strict=True)
@@ -437,7 +450,7 @@ def _in_blocks(views: Views, side: int) -> Views:
     return Views(tuple(bases), tuple(targets))
 
 
-def _in_a_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tuple[Basis, Target]:
+def _pixel_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tuple[Basis, Target]:
     """Return some of the pixels of a view as one row. chosen: (p,), places of the pixels."""
 
     def cut(image: npt.NDArray[Any]) -> npt.NDArray[Any]:

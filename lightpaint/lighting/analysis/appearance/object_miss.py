@@ -1,4 +1,4 @@
-"""On which object a miss lies, where it lies on one."""
+"""The object on which an error lies, if there is a single one."""
 
 import re
 from collections import Counter
@@ -8,10 +8,10 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.images.object_map import Objects
 
-#: Part of the miss that must lie on an object, and of the picture that it may be, to be named.
-MOST, LARGE = 0.6, 0.5
+#: Smallest share of the error on a named object, and its largest share of the picture.
+MIN_ERROR_SHARE, MAX_PICTURE_SHARE = 0.6, 0.5
 
-#: Kinds of shapes, and numbers that programs give: no names that tell a person anything.
+#: Kinds of shapes, and numbers that programs give: names without meaning for people.
 NO_NAME = re.compile(
     r"(ply|obj|serialized|mesh|shape|object|unnamed|rectangle|cube|sphere|disk|cylinder|instance|"
     r"merge|sdfgrid|bsplinecurve|linearcurve|ellipsoids(mesh)?|group|default|none)?[\W_\d]*",
@@ -20,9 +20,10 @@ NO_NAME = re.compile(
 
 
 def object_with_most(objects: Objects, index: Indices, missed: Doubles) -> str:
-    """The name of what most is missed on, or the first word that names of several share; "".
+    """Return the object with most of the error, or the first word that several names share; "" for
+    none.
 
-    index, missed: (p,), the object and what is missed, >= 0, of some of the pixels.
+    index, missed: (p,), the object and the error, >= 0, of some of the pixels.
     """
     on_each = np.bincount(index + 1, weights=missed, minlength=len(objects.names) + 1)[1:]
     size = np.bincount(objects.index.ravel() + 1, minlength=len(objects.names) + 1)[1:]
@@ -34,11 +35,15 @@ def object_with_most(objects: Objects, index: Indices, missed: Doubles) -> str:
             on[called(name)] += its
             of[called(name)] += large
         name, most = max(on.items(), key=lambda item: item[1], default=("", 0.0))
-        if most >= MOST * total > 0 and of[name] <= LARGE * pixels and not NO_NAME.fullmatch(name):
+        if (
+            most >= MIN_ERROR_SHARE * total > 0
+            and of[name] <= MAX_PICTURE_SHARE * pixels
+            and not NO_NAME.fullmatch(name)
+        ):
             return name
     return ""
 
 
 def _first_word(name: str) -> str:
-    """`statue` of `statue_head`."""
+    """Return `statue` for `statue_head`."""
     return re.split(r"[_.\-\s]", name, maxsplit=1)[0]

@@ -1,4 +1,4 @@
-"""How much what nobody painted changes its look."""
+"""The visible change of the unpainted part of the picture."""
 
 from dataclasses import dataclass
 
@@ -7,25 +7,25 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color_difference import ciede2000
-from lightpaint.lighting.analysis.appearance.display_difference import Looking
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.object_miss import NO_NAME
 
-#: Part of the picture that a place must have of what is not painted, to be spoken of.
-LARGE_ENOUGH = 0.01
+#: Smallest unpainted share of the picture for a place to be mentioned.
+MIN_PLACE = 0.01
 
 #: Regions along each side of the picture: left, middle, right.
 REGIONS = 3
 
 
 @dataclass(frozen=True)
-class Elsewhere:
-    """How much of the picture that is not painted changes, in CIEDE2000.
+class UnpaintedChange:
+    """The change of the unpainted part of the picture, in CIEDE2000.
 
     Attributes:
-        delta_e: Its mean over all that is not painted.
+        delta_e: Its mean over all unpainted pixels.
         worst: Its mean over the object, or the ninth of the picture, that changes most.
-        object: The name of that object; "" where it has none.
-        region: Row and column of that ninth, 0 to 2, where there is no object.
+        object: The name of that object; "" without a name.
+        region: Row and column of that ninth, 0 to 2, if there is no object.
     """
 
     delta_e: float
@@ -34,10 +34,10 @@ class Elsewhere:
     region: tuple[int, int] = (1, 1)
 
 
-def what_changes(
-    look: Looking, basis: Basis, painted: Bools, before: Floats, after: Floats
-) -> Elsewhere | None:
-    """Return how far the unpainted part looks from how it did; None if all is painted.
+def unpainted_change(
+    look: PaintComparison, basis: Basis, painted: Bools, before: Floats, after: Floats
+) -> UnpaintedChange | None:
+    """Return the difference of two pictures over the unpainted part; None if all is painted.
 
     look: at the painting. painted: (h, w). before, after: (h, w, 3) linear, the two pictures.
     """
@@ -48,7 +48,7 @@ def what_changes(
     labs = (look.lab(x[every][rest].astype(np.float64)) for x in (before, after))
     changed = ciede2000(*labs)
     worst, name, region = _worst(basis, every, rest, changed)
-    return Elsewhere(float(changed.mean()), worst, name, region)
+    return UnpaintedChange(float(changed.mean()), worst, name, region)
 
 
 def _worst(
@@ -57,7 +57,7 @@ def _worst(
     """Return the largest mean of `changed` over one place: its ΔE, object and region."""
     rows, columns = (REGIONS * np.arange(n) // n for n in rest.shape)
     ninth = (REGIONS * rows[:, None] + columns[None, :])[rest]
-    enough = LARGE_ENOUGH * rest.size
+    enough = MIN_PLACE * rest.size
     at, most = _largest_mean(ninth, changed, REGIONS**2, enough)
     region = (at // REGIONS, at % REGIONS)
     objects = basis.objects

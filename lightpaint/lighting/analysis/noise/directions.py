@@ -1,4 +1,4 @@
-"""What may move about an answer: directions of the weights, and the answer to other equations.
+"""The freedom about an answer: directions of the weights, and answers to other equations.
 
 Weights (n, 3) lie flat in a direction, (3 n), channel by channel.
 """
@@ -14,36 +14,36 @@ from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 
-#: Share by which a sum may be short of its limit and be said to be at it.
+#: Relative distance at which a sum counts as at its limit.
 AT_LIMIT = 1e-9
 
 
 @dataclass(frozen=True)
-class Held:
-    """What holds the unknowns of a block, bounds first, then the sums that are at a limit.
+class ActiveLimits:
+    """The active bounds of a block's unknowns, then its active caps.
 
-    ways: (k, h), for each a direction that leaves it, and nothing else that holds, by one unit.
-    room: (h,), how far that may go. of_bounds: (b,), whose bounds they are, for the first b.
-    sums: (h - b, k), coefficients of the others.
+    exits: (k, h), for each a direction that leaves it, and no other, by one unit. distances: (h,),
+    the largest step along it. bound_unknowns: (b,), the unknowns of the first b. sums: (h - b, k),
+    coefficients of the others.
     """
 
-    ways: Doubles
-    room: Doubles
-    of_bounds: Indices
+    exits: Doubles
+    distances: Doubles
+    bound_unknowns: Indices
     sums: Doubles
 
     @property
-    def own(self) -> Doubles:
-        """(k, h), of the ways what they do to the unknowns that are held there themselves."""
-        its = np.zeros(self.ways.shape, dtype=bool)
-        its[self.of_bounds, np.arange(self.of_bounds.size)] = True
-        its[:, self.of_bounds.size :] = self.sums.T != 0
-        return np.where(its, self.ways, 0)
+    def own_exits(self) -> Doubles:
+        """(k, h), the effects of the directions on their own unknowns."""
+        its = np.zeros(self.exits.shape, dtype=bool)
+        its[self.bound_unknowns, np.arange(self.bound_unknowns.size)] = True
+        its[:, self.bound_unknowns.size :] = self.sums.T != 0
+        return np.where(its, self.exits, 0)
 
-    def kept(self, covariance: Doubles) -> Doubles:
-        """A covariance of the unknowns, (k, k), where what holds them does hold."""
+    def constrained(self, covariance: Doubles) -> Doubles:
+        """Return a covariance of the unknowns, (k, k), under the active bounds and caps."""
         kept = covariance.copy()
-        kept[self.of_bounds], kept[:, self.of_bounds] = 0, 0
+        kept[self.bound_unknowns], kept[:, self.bound_unknowns] = 0, 0
         for row in self.sums:
             its = np.flatnonzero(row)
             along = kept[np.ix_(its, its)] @ row[its]
@@ -53,24 +53,26 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Room:
-    """What the unknowns of one block may do about an answer.
+class BlockFreedom:
+    """The freedom of the unknowns of one block about an answer.
 
-    columns: (3 n, k), what each changes of the weights, 0 where a light reaches nothing. emitted:
-    the same there, too. free: (k, m), directions in which no bound and no cap holds them.
+    columns: (3 n, k), the effect of each on the weights, 0 where a light reaches nothing. emitted:
+    the same including such lights. free: (k, m), directions without active bounds and caps.
     """
 
     columns: Doubles
     emitted: Doubles
     free: Doubles
-    held: Held
+    active: ActiveLimits
 
 
-def rooms(solution: Solution, equations: NormalEquations) -> Iterator[Room]:
-    """One for every set of channels that the unknowns couple. equations: what is solved."""
-    reduction, lit = solution.problem.about_answer, solution.equations.reached
+def block_freedoms(solution: Solution, equations: NormalEquations) -> Iterator[BlockFreedom]:
+    """Yield the freedom of each set of channels that the unknowns couple. equations: of the solve.
+    equations: what is solved.
+    """
+    reduction, lit = solution.problem.local_reduction, solution.equations.reached
     x = solve_reduced(equations, reduction, solution.weights).x
-    rows, left = _at_caps(reduction, x)
+    rows, left = _active_caps(reduction, x)
     for block in reduction.blocks:
         its = block.unknowns
         columns = _columns(reduction, its, lit)
@@ -80,28 +82,30 @@ def rooms(solution: Solution, equations: NormalEquations) -> Iterator[Room]:
         inside, bound = np.flatnonzero(may & (at == 0)), np.flatnonzero(at)
         mine = rows[:, its].any(axis=1)
         sums = rows[mine][:, its]
-        free, back = _keeping(sums, inside)
-        held = _held(sums, back, bound, at, np.concatenate([(upper - lower)[bound], left[mine]]))
-        yield Room(columns, _columns(reduction, its, np.ones_like(lit)), free, held)
+        free, back = _keep_sums(sums, inside)
+        held = _active_limits(
+            sums, back, bound, at, np.concatenate([(upper - lower)[bound], left[mine]])
+        )
+        yield BlockFreedom(columns, _columns(reduction, its, np.ones_like(lit)), free, held)
 
 
-def moving(solution: Solution) -> list[Doubles]:
-    """(3 n, k), directions in which nothing holds the answer, for each independent problem."""
-    solved = solution.problem.pulled(solution.problem.solved)
-    return [room.columns @ room.free for room in rooms(solution, solved)]
+def free_directions(solution: Solution) -> list[Doubles]:
+    """Return the free directions about the answer, (3 n, k), for each independent problem."""
+    solved = solution.problem.with_pull(solution.problem.solved)
+    return [room.columns @ room.free for room in block_freedoms(solution, solved)]
 
 
-def answer_to(solution: Solution, equations: NormalEquations) -> Doubles:
-    """The weights (n, 3) that solve `equations` under the same bounds as the answer."""
+def solve_for(solution: Solution, equations: NormalEquations) -> Doubles:
+    """Solve `equations` for weights (n, 3) under the same constraints as the answer."""
     problem = solution.problem
-    asked = problem.pulled(equations)
-    return solve_reduced(asked, problem.about_answer, solution.weights).weights
+    asked = problem.with_pull(equations)
+    return solve_reduced(asked, problem.local_reduction, solution.weights).weights
 
 
 def all_columns(solution: Solution) -> Iterator[Doubles]:
-    """(3 n, k), what every unknown changes of the weights, for each independent problem.
+    """Yield the effect of every unknown on the weights, (3 n, k), for each independent problem.
 
-    As if nothing were asked: kept lights alone stay.
+    Without constraints: only kept lights stay.
     """
     lights = np.flatnonzero(~solution.basis.is_fixed)
     scalar = np.array([light.is_scalar for light in solution.basis.lights], dtype=bool)
@@ -119,7 +123,7 @@ def all_columns(solution: Solution) -> Iterator[Doubles]:
 
 
 def _columns(reduction: Reduction, its: Indices, lit: Bools) -> Doubles:
-    """(3 n, k), C of these unknowns, 0 where a light reaches nothing."""
+    """Return C of these unknowns, (3 n, k), 0 where a light reaches nothing."""
     place = np.full(len(reduction.unknowns), -1)
     place[its] = np.arange(its.size)
     unknown, light, rgb = reduction.columns
@@ -130,8 +134,8 @@ def _columns(reduction: Reduction, its: Indices, lit: Bools) -> Doubles:
     return (made * lit.T[:, :, None]).reshape(3 * len(lit), its.size)
 
 
-def _at_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:
-    """Of the caps whose sums are at a limit: coefficients, and how far they may go from there.
+def _active_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:
+    """Return coefficients of active caps, and the distances to their other limits.
 
     Returns (j, unknowns), negative where the sum may only rise, and (j,).
     """
@@ -147,11 +151,11 @@ def _at_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:
     return np.array(rows).reshape(len(rows), x.size), np.array(room)
 
 
-def _keeping(rows: Doubles, inside: Indices) -> tuple[Doubles, Doubles]:
-    """What the unknowns inside their bounds may do about the sums `rows`, (j, k).
+def _keep_sums(rows: Doubles, inside: Indices) -> tuple[Doubles, Doubles]:
+    """Return the effects of unknowns inside their bounds on the sums `rows`, (j, k).
 
-    Returns (k, m), directions that keep them, and (k, j), for each one that lowers it by one and
-    keeps the others; NaN where there is none.
+    Returns (k, m), directions that keep the sums, and (k, j), for each sum a direction that lowers
+    it by one and keeps the others; NaN if there is none.
     """
     free = np.eye(rows.shape[1])[:, inside]
     if not len(rows):
@@ -164,19 +168,21 @@ def _keeping(rows: Doubles, inside: Indices) -> tuple[Doubles, Doubles]:
     return np.asarray(free @ right[rank:].T), np.asarray(back)
 
 
-def _held(rows: Doubles, back: Doubles, bound: Indices, at: Indices, room: Doubles) -> Held:
-    """What holds a block, as far as each thing can be left by itself.
+def _active_limits(
+    rows: Doubles, back: Doubles, bound: Indices, at: Indices, room: Doubles
+) -> ActiveLimits:
+    """Return the bounds and caps of a block that can be left one by one.
 
-    rows, back: of the sums, (j, k) and (k, j), as of `_keeping`. bound: (b,), unknowns at a bound.
+    rows, back: of the sums, (j, k) and (k, j), see `_keep_sums`. bound: (b,), unknowns at a bound.
     at: (k,), 1 at the lower, -1 at the upper one. room: (b + j,).
     """
     ways = np.eye(len(at))[:, bound] * at[bound]
     pushed = rows @ ways
     for j, b in np.argwhere(pushed != 0):
-        # Those inside make up for what this does to the sum.
+        # Unknowns inside their bounds compensate the effect on the sum.
         ways[:, b] += back[:, j] * pushed[j, b]
     can_leave = np.isfinite(ways).all(axis=0), np.isfinite(back).all(axis=0)
-    return Held(
+    return ActiveLimits(
         np.hstack([ways[:, can_leave[0]], back[:, can_leave[1]]]),
         room[np.concatenate(can_leave)],
         bound[can_leave[0]],

@@ -1,4 +1,4 @@
-"""What the half differences of a basis say of its normal equations, and of a prediction.
+"""The noise of the normal equations and of a prediction, from the half differences of a basis.
 
 The two halves of the samples give two gradients of the objective at the solved weights. Half
 their difference, pixel by pixel, has the covariance of the gradient's noise (docs/method.md,
@@ -17,32 +17,32 @@ from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import one_thread, side_by_side
 
-#: The largest part of M, in any direction of the weights, that is taken to be noise. Beyond,
-#: the estimate of it is itself noise, and what is left of M would soon be indefinite.
-LARGEST_NOISE = 0.5
+#: The largest share of M, in any direction of the weights, that may be removed as noise. Beyond,
+#: the estimate is itself noise, and the rest of M would soon be indefinite.
+MAX_NOISE_SHARE = 0.5
 
-#: Parts of the pixels whose sums are made side by side.
+#: Parts of the pixels that are summed in parallel.
 PARTS = 4
 
-#: Rows of matrices that several threads only wait for.
-SMALL = 256
+#: Most rows of a matrix for which several threads only wait for each other.
+SMALL_MATRIX = 256
 
 #: Eigenvalues of M, scaled to a unit diagonal, below which a direction changes no pixel.
-SINGULAR = 1e-12
+NULL_EIGENVALUE = 1e-12
 
 
 @dataclass(frozen=True)
 class Noise:
     """Sums over pixels of products of half differences, per channel.
 
-    power: (3, n, n), N_ij = Σ D h_i h_j, what the noise adds to M. drawn: (3, n), what the
-    noise of the current look, where that is solved for, adds to b.
+    power: (3, n, n), N_ij = Σ D h_i h_j, the part of M that is noise. target_noise: (3, n), the
+    part of b that is noise of the current look, where this is a goal.
     gradient: (3, n, 3, n), covariance of the gradient. objective: as in `Uncertainty`.
-    hidden: (3, n), what few pixels may add to a light's own, that they do not show (peaks.py).
+    hidden: (3, n), variance of a light that few pixels may have and do not show (peaks.py).
     """
 
     power: Doubles
-    drawn: Doubles
+    target_noise: Doubles
     gradient: Doubles
     objective_error: Doubles
     objective_noise: Doubles
@@ -50,12 +50,12 @@ class Noise:
 
     @property
     def is_hidden(self) -> Bools:
-        """(n, 3), whether most of what pushes a light is what few pixels may hide."""
+        """(n, 3), whether most of the noise on a light may be hidden in few pixels."""
         return np.asarray(self.hidden > np.einsum("cici->ci", self.gradient)).T
 
     @property
-    def whole(self) -> Doubles:
-        """(3, n, 3, n), covariance of the gradient with what is hidden."""
+    def full_covariance(self) -> Doubles:
+        """(3, n, 3, n), covariance of the gradient including the hidden part."""
         made, lights = self.gradient.copy(), np.arange(self.hidden.shape[1])
         deviation = np.sqrt(self.hidden)
         # Where channels are coupled, one path carries all three.
@@ -66,7 +66,7 @@ class Noise:
 
 
 def noise_sums(solution: Solution) -> Noise:
-    """One pass over the pixels that count, by parts of them side by side."""
+    """Sum over the pixels that count in one pass, by parts in parallel."""
     basis, problem, weights = solution.basis, solution.problem, solution.weights
     # (pixels, 1), or (pixels, 3) where channels differ.
     squares = problem.squares
@@ -77,7 +77,7 @@ def noise_sums(solution: Solution) -> Noise:
     pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
     unseen = ~basis.emitters_seen.ravel()
     counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
-    of_all = _Pixels(
+    pixels = _Pixels(
         basis.planes,
         basis.noise,
         weight,
@@ -87,46 +87,47 @@ def noise_sums(solution: Solution) -> Noise:
         basis.noise.mix(basis.present_weights).reshape(-1, 3),
         unseen,
     )
-    # A dimmer, a tie or a limit on luminance spans channels, as the one weight of a scalar light.
+    # A dimmer, a tie or a limit on luminance couples channels, as the one weight of a scalar light.
     is_coupled = len(problem.full.channel_groups) < 3
-    # As many parts on every machine, whose sums are added in order: the bits are the same.
+    # The same parts on every machine, added in order, give the same bits.
     length = BLOCK * max(1, -(-counted.size // (BLOCK * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
-    sums = [_Sums.none(len(weights))] + (
-        side_by_side(lambda its: of_all.sums(its, weights, pulled, is_coupled=is_coupled), parts)
+    sums = [_Sums.zeros(len(weights))] + (
+        side_by_side(lambda its: pixels.sums(its, weights, pulled, is_coupled=is_coupled), parts)
         if len(weights) <= FEW_LIGHTS
-        else [of_all.sums(its, weights, pulled, is_coupled=is_coupled) for its in parts]
+        else [pixels.sums(its, weights, pulled, is_coupled=is_coupled) for its in parts]
     )
     return Noise(
         power=np.asarray(sum(x.power for x in sums)),
-        drawn=np.asarray(sum(x.drawn for x in sums)),
+        target_noise=np.asarray(sum(x.target_noise for x in sums)),
         gradient=np.asarray(sum(x.gradient for x in sums)),
         objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
         objective_noise=(weight * np.square(mixed)).sum(axis=0),
-        hidden=np.array([Peaks.together([x.peaks[c] for x in sums]).hidden() for c in range(3)]),
+        hidden=np.array([Peaks.merged([x.peaks[c] for x in sums]).hidden() for c in range(3)]),
     )
 
 
 @dataclass(frozen=True)
 class _Sums:
-    """Over some pixels. power, drawn, gradient: as in `Noise`. peaks: of each channel."""
+    """Sums over some pixels. power, drawn, gradient: as in `Noise`. peaks: of each channel."""
 
     power: Doubles
-    drawn: Doubles
+    target_noise: Doubles
     gradient: Doubles
     peaks: tuple[Peaks, ...]
 
     @classmethod
-    def none(cls, n: int) -> "_Sums":
-        peaks = tuple(Peaks.none(n) for _ in range(3))
+    def zeros(cls, n: int) -> "_Sums":
+        """Return sums over no pixels."""
+        peaks = tuple(Peaks.empty(n) for _ in range(3))
         return cls(np.zeros((3, n, n)), np.zeros((3, n)), np.zeros((3, n, 3, n)), peaks)
 
 
 @dataclass(frozen=True)
 class _Pixels:
-    """What is known of all pixels.
+    """Data of all pixels.
 
-    planes, noise: of the basis. weight, share: (p, 1) or (p, 3). residual, mixed: (p, 3), as of
+    planes, noise: of the basis. weight, share: (p, 1) or (p, 3). residual, mixed: (p, 3), see
     `residual_and_noise`. present: (p, 3), noise of the current look. unseen: (p,), where no emitter
     is.
     """
@@ -143,8 +144,10 @@ class _Pixels:
     def sums(
         self, counted: Indices, weights: Doubles, pulled: Doubles, *, is_coupled: bool
     ) -> _Sums:
-        """Over some of them. pulled: (n, 3), by how much noise moves the pull."""
-        made = _Sums.none(len(weights))
+        """Sum over some pixels. pulled: (n, 3), the effect of noise on the pull. pulled: (n, 3), by
+        how much noise moves the pull.
+        """
+        made = _Sums.zeros(len(weights))
         for start in range(0, counted.size, BLOCK):
             pixels = run_of(counted[start : start + BLOCK])
             both = self.noise.pixels(pixels), self.planes.pixels(pixels)
@@ -168,7 +171,7 @@ class _Pixels:
         weights: Doubles,
         pulled: Doubles,
     ) -> Doubles:
-        """(n, pixels), what noise adds to the gradient of a channel; all else goes to `made`.
+        """Return the noise in the gradient of a channel, (n, pixels); add all else to `made`.
 
         both: (n, pixels, 3), noise and planes there.
         """
@@ -177,20 +180,20 @@ class _Pixels:
         residual, mixed = self.residual[pixels, c], self.mixed[pixels, c]
         rows = D * (h * residual - lit * mixed)
         size = np.abs(residual) + weights[:, c, None] * lit
-        made.peaks[c].see(D * lit * size, rows)
+        made.peaks[c].add(D * lit * size, rows)
         if pulled.any():
             rows += pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
         made.power[c] += (D * h) @ h.T
         shared = D * self.share[pixels, c % self.share.shape[1]]
-        made.drawn[c] += h @ (shared * self.present[pixels, c])
+        made.target_noise[c] += h @ (shared * self.present[pixels, c])
         return np.asarray(rows)
 
 
 def residual_and_noise(solution: Solution) -> tuple[Doubles, Doubles]:
-    """What the answer misses, and half the difference of what its two halves predict.
+    """Return the residual of the answer, and the half difference of its prediction.
 
     Returns two (pixels, 3): Ψ − Σ w_i Φ_i and Σ w_i h_i, less the noise that Ψ shares where
-    it holds the current look.
+    it is the current look.
     """
     basis, weights, r = solution.basis, solution.weights, solution.problem.refinement
     residual = solution.image.astype(np.float64) - basis.mix(weights)
@@ -203,56 +206,58 @@ def residual_and_noise(solution: Solution) -> tuple[Doubles, Doubles]:
     return residual.reshape(-1, 3), np.asarray(noise, np.float64).reshape(-1, 3)
 
 
-def lacking_gradient(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
-    """Some weights, (n, 3), and what noise made b − M w lack there on average, (3, n)."""
+def gradient_bias(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:
+    """Return some weights, (n, 3), and the mean error of b − M w there by noise, (3, n)."""
     removed, r = solution.problem.noise_removed, solution.problem.refinement
     if r is not None:
-        return r.before, r.lacking
+        return r.before, r.gradient_error
     n = noise.power.shape[1]
-    # At no light at all the noise of the basis lacks nothing in M: all of it is still to come.
+    # Without any light, the noise in M has no effect yet.
     nothing = np.zeros((n, 3))
     if removed == 0:
-        return nothing, -noise.drawn
+        return nothing, -noise.target_noise
     weights = solution.weights
-    lack = np.einsum("cij,jc->ci", noise.power, weights) - noise.drawn
+    lack = np.einsum("cij,jc->ci", noise.power, weights) - noise.target_noise
     return weights, (1 - removed) * lack
 
 
-def without_noise(
-    equations: NormalEquations, power: Doubles, *, most: float = LARGEST_NOISE
+def denoised_matrix(
+    equations: NormalEquations, power: Doubles, *, max_share: float = MAX_NOISE_SHARE
 ) -> Doubles:
-    """M without the noise in it, (3, n, n), positive semidefinite.
+    """Return M without its noise, (3, n, n), positive semidefinite.
 
-    power: (3, n, n), N. M − N, but in no direction less than 1 − `most` of M.
+    power: (3, n, n), N. The result is M − N, but in no direction less than 1 − `max_share` of M.
     """
     made = np.empty_like(equations.M)
     for c in range(3):
         root, inverse = _roots(equations.M[c])
         values, vectors = eigh(inverse @ power[c] @ inverse.T)
-        values = np.clip(values, 0, most)
+        values = np.clip(values, 0, max_share)
         made[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
     return made
 
 
 def eigh(M: Doubles) -> tuple[Doubles, Doubles]:
-    """Eigenvalues and vectors; of small matrices by one thread, which is done before two meet."""
-    with one_thread() if len(M) <= SMALL else nullcontext():
+    """Return eigenvalues and vectors; small matrices on one thread, which is faster."""
+    with one_thread() if len(M) <= SMALL_MATRIX else nullcontext():
         values, vectors = np.linalg.eigh(M)
     return values, vectors
 
 
 def pseudo_inverse(M: Doubles) -> Doubles:
-    """Of a positive semidefinite matrix, whatever the sizes of its unknowns."""
+    """Return the pseudo-inverse of a positive semidefinite matrix, whatever the scales of its
+    unknowns.
+    """
     _, inverse = _roots(M)
     return np.asarray(inverse.T @ inverse)
 
 
 def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
-    """R with R Rᵀ = M and its pseudo-inverse, without the directions that change nothing."""
+    """Return R with R Rᵀ = M and its pseudo-inverse, without the directions that change nothing."""
     scale = np.sqrt(np.diag(M))
     safe = np.where(scale > 0, scale, 1)
     values, vectors = eigh(M / safe[:, None] / safe)
-    seen = values > SINGULAR * values.max(initial=0)
+    seen = values > NULL_EIGENVALUE * values.max(initial=0)
     root = np.sqrt(values[seen])
     inverse = (vectors[:, seen] / root).T / safe
     return np.asarray(safe[:, None] * vectors[:, seen] * root), np.asarray(inverse)

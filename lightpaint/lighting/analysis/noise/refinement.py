@@ -2,9 +2,9 @@
 
 The noise of the basis biases M and with it the weights. A render V of the mix at the present
 weights has noise of its own, which is independent of the basis, so ⟨Φ, Ψ − V⟩ is the gradient
-without that bias; the noisy M only decides how far to go. V may well be noisier than the basis,
-which is rendered with more care than a plain picture: how much of it to believe is decided by
-what the half differences of both say.
+without that bias; the noisy M only determines the length of the step. V may be noisier than the
+basis, which is rendered with more care than a plain picture: the half differences of both determine
+the weight of V.
 """
 
 from dataclasses import replace
@@ -16,9 +16,9 @@ from lightpaint.basis.planes import BLOCK
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.directions import moving
+from lightpaint.lighting.analysis.noise.directions import free_directions
 from lightpaint.lighting.analysis.noise.noise import (
-    lacking_gradient,
+    gradient_bias,
     noise_sums,
     pseudo_inverse,
     residual_and_noise,
@@ -26,14 +26,15 @@ from lightpaint.lighting.analysis.noise.noise import (
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Refinement
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import again
+from lightpaint.lighting.solve import solve_again
 
 
 @keywords()
 def refine(solution: Solution, mixed: Estimate) -> Solution:
-    """One step from the weights w: minimise (w' − w)ᵀM(w' − w) − 2 gᵀ(w' − w) over w' >= 0.
+    """Return improve a solution by one step from w: minimise (w' − w)ᵀM(w' − w) − 2 gᵀ(w' − w) over
+    w' >= 0.
 
-    g = t ⟨Φ, Ψ − V⟩ + (1 − t)(b − M w), of the render of the mix and of what was solved.
+    g = t ⟨Φ, Ψ − V⟩ + (1 − t)(b − M w), of the render of the mix and of the solved equations.
 
     Args:
         solution: Of one view or of several.
@@ -42,8 +43,7 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
 
     Raises:
         SizeError: If it has another size.
-        BasisError: Where nothing is known of the basis' noise: then nothing says how much of the
-            render to believe.
+        BasisError: If the noise of the basis is unknown, and with it the weight of the render.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -70,48 +70,49 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     known = problem.solved.b - np.einsum("cij,jc->ci", M, w)
 
     sums = noise_sums(solution)
-    before, lacking = lacking_gradient(solution, sums)
-    # What the gradient lacked there, and what the noise in M makes it lack on the way here.
+    before, lacking = gradient_bias(solution, sums)
+    # The error of the gradient there, and the error by the noise in M on the way here.
     remains = 1 - problem.noise_removed
     lacking = lacking + remains * np.einsum("cij,jc->ci", sums.power, w - before)
     _, noise = residual_and_noise(solution)
     noise = noise.reshape(mixed.image.shape)
-    # The painting's own noise, where it holds the current look, is not the render's to change.
-    t = _share(solution, lacking, noise, mixed.half_difference.astype(np.float64))
+    # The render does not change the noise of a painting that is the current look.
+    t = _render_share(solution, lacking, noise, mixed.half_difference.astype(np.float64))
 
     gradient = t * rendered + (1 - t) * known
     refinement = Refinement(
         before=w,
         noise=t * mixed.half_difference + (1 - t) * noise,
-        lacking=(1 - t) * lacking,
+        gradient_error=(1 - t) * lacking,
         share=t,
     )
     right = np.einsum("cij,jc->ci", M, w) + gradient
     corrected = NormalEquations(M, right, problem.equations.target_norm2)
-    return again(solution, replace(problem, corrected=corrected, refinement=refinement))
+    return solve_again(solution, replace(problem, corrected=corrected, refinement=refinement))
 
 
-def _share(solution: Solution, lacking: Doubles, known: Floats, rendered: Floats) -> float:
-    """The t that makes the expected excess (1 − t)² (B + K) + t² R least: (B + K) / (B + K + R).
+def _render_share(solution: Solution, lacking: Doubles, known: Floats, rendered: Floats) -> float:
+    """Return the t that minimises the expected excess (1 − t)² (B + K) + t² R: (B + K) / (B + K +
+    R).
 
-    B: excess by what is lacking in the known gradient; K, R: by the noise of the prediction,
-    as known so far and as rendered. All measured by M⁻¹ along what nothing holds.
+    B: excess by the error of the known gradient; K, R: by the noise of the prediction, as known so
+    far and as rendered. All are measured by M⁻¹ along free directions.
     """
     bias, spread = 0.0, np.zeros(2)
-    M = solution.problem.pulled(solution.problem.solved).whole
-    for to in moving(solution):
+    M = solution.problem.with_pull(solution.problem.solved).full_matrix
+    for to in free_directions(solution):
         inverse = pseudo_inverse(to.T @ M @ to)
         lacks = to.T @ lacking.ravel()
         bias += float(lacks @ inverse @ lacks)
         for k, noise in enumerate((known, rendered)):
-            C = _pushed(solution, noise, to)
+            C = _push_covariance(solution, noise, to)
             spread[k] += np.einsum("ij,ij->", inverse, C)
     total = bias + spread.sum()
     return float((bias + spread[0]) / total) if total > 0 else 1.0
 
 
-def _pushed(solution: Solution, noise: Floats, to: Doubles) -> Doubles:
-    """(k, k), covariance of the push that the noise of a prediction gives along `to`, (3 n, k)."""
+def _push_covariance(solution: Solution, noise: Floats, to: Doubles) -> Doubles:
+    """Return the covariance (k, k) of the push by a prediction's noise along `to`, (3 n, k)."""
     basis = solution.basis
     n = len(basis.lights)
     along = to.reshape(3, n, -1)

@@ -1,4 +1,4 @@
-"""How far the noise of the basis may have moved the answer: error bars from half differences.
+"""Error bars: the effect of the basis's noise on the answer, from half differences.
 
 The two halves of the samples give two gradients of the objective at the solved weights. Half
 their difference, pixel by pixel, has the covariance of the gradient's noise, and the inverse
@@ -16,63 +16,64 @@ from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.directions import (
-    Room,
-    answer_to,
-    moving,
-    rooms,
+    BlockFreedom,
+    block_freedoms,
+    free_directions,
+    solve_for,
 )
 from lightpaint.lighting.analysis.noise.noise import (
-    SINGULAR,
+    NULL_EIGENVALUE,
     Noise,
-    lacking_gradient,
+    denoised_matrix,
+    gradient_bias,
     noise_sums,
     pseudo_inverse,
-    without_noise,
 )
-from lightpaint.lighting.analysis.noise.outliers import doubt, weakest
+from lightpaint.lighting.analysis.noise.outliers import noise_doubts, weakest_matrix
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.solve import again
+from lightpaint.lighting.solve import solve_again
 from lightpaint.screen import shortly
 
-#: Standard errors on either side of a 95 % interval, and the part of all cases that is outside.
-SIDES, OUTSIDE = 1.96, 0.05
+#: Standard errors on either side of a 95 % interval, and the share of all cases outside.
+NORMAL_95, OUTSIDE_SHARE = 1.96, 0.05
 
 NORMAL = NormalDist()
 
-#: Standard deviations beyond a bound from which on a normal tail is taken for an exponential one.
-FAR = 30.0
+#: Standard deviations beyond a bound from which a normal tail is approximated by an exponential.
+FAR_DEVIATIONS = 30.0
 
-#: Part of what the prediction's own noise should miss of any other picture: who misses less was
-#: given a sum of the basis itself, whose noise is the same and cancels.
-SAME_NOISE = 1e-4
+#: Share of the error that the prediction's own noise makes against any other picture. With less,
+#: the target is a sum of the basis itself, whose noise is the same and cancels.
+SAME_NOISE_SHARE = 1e-4
 
-#: Steps in which it is decided how much of the noise to take out of M.
-SHARES = 8
+#: Steps of the share of noise to remove from M.
+SHARE_STEPS = 8
 
 
 @keywords()
 @dataclass(frozen=True)
 class Uncertainty:
-    """What noise does to a solve. All are estimates themselves, good to a third or so.
+    """The effect of noise on a solve. All values are estimates, good to a third or so. All are
+    estimates themselves, good to a third or so.
 
-    Of a channel of a light that reaches nothing that counts nothing is known: NaN.
+    A channel in which a light reaches nothing that counts is undetermined: NaN.
 
     Attributes:
         weights: (n, 3), as solved.
-        scatter: (n, 3), standard deviation of the weights from one seed to another. Of a light that
-            is off or at a limit, what is left of it on the side where it may go (see `_one_sided`).
-        bias: (n, 3), how much higher the weights would be without the noise power in M.
-        interval: The 95 % interval of each weight, lower and upper ends, (n, 3) each. Of what is
-            off or at a limit it has one side, which is never empty.
+        scatter: (n, 3), standard deviation of the weights between seeds. For a light that is off
+            or at a limit, the part on the side where it may go (see `_one_sided`).
+        bias: (n, 3), the rise of the weights without the noise power in M.
+        interval: The 95 % interval of each weight, lower and upper ends, (n, 3) each. At 0 or at a
+            limit it has one side, which is never empty.
         objective_error: (3,), standard deviation of the objective.
-        objective_noise: (3,), what the prediction's own noise adds to it.
-        excess: (3,), by how much the objective of these weights, were they rendered without noise,
-            may be expected to exceed the least possible.
-        target_norm2: (3,), ‖Ψ‖², to hold it against.
-        untold: (n,), the lights that cannot be told at these samples: little but stray bright
-            pixels is seen of them, and their interval is wider than they are bright.
+        objective_noise: (3,), the part of the prediction's own noise in it.
+        excess: (3,), the expected excess of the objective over the least possible, for these
+            weights rendered without noise.
+        target_norm2: (3,), ‖Ψ‖², as a scale.
+        untold: (n,), the lights that these samples do not determine: their pictures are little
+            but stray bright pixels, and their interval is wider than they are bright.
 
     Examples:
         >>> bars = lp.error_bars(lp.solve(basis, target))
@@ -95,29 +96,32 @@ class Uncertainty:
 
     @property
     def relative_excess(self) -> float:
-        """What these errors miss of the painting, root mean square."""
+        """The error that these errors make in the picture, relative to the painting, root mean
+        square.
+        """
         norm2 = float(self.target_norm2.sum())
-        # An estimate, which is below zero where hardly anything is left to gain.
+        # An estimate, which may be below zero where hardly any gain remains.
         return float(np.sqrt(max(self.excess.sum(), 0) / norm2)) if norm2 > 0 else 0.0
 
     @property
     def standard_error(self) -> Doubles:
-        """Root mean square of scatter and bias, (n, 3): what the answer is off by."""
+        """Root mean square of scatter and bias, (n, 3): the error of the answer."""
         return np.hypot(self.scatter, self.bias)
 
 
 @keywords()
 def error_bars(solution: Solution) -> Uncertainty | None:
-    """Standard error and bias of every weight that a solve or `refine` found.
+    """Estimate standard error and bias of every weight of a solve or `refine`.
 
-    None where nothing is known of the noise of the basis: that is not the same as none. After
-    reweighting they are of the last linear problem.
+    None if the noise of the basis is unknown, which is not the same as none. After reweighting they
+    are of the last linear problem.
 
-    What is kept or locked has an error of 0; of what reaches nothing none is known. What is off or
-    at a limit may have been pushed there by noise: it has an interval on one side (`_one_sided`).
+    Kept or locked lights have an error of 0; that of lights which reach nothing is unknown. Noise
+    may
+    have pushed a weight to 0 or to a limit: it has an interval on one side (`_one_sided`).
 
     Args:
-        solution: As `solve`, `refine` or `correct_noise` made it.
+        solution: From `solve`, `refine` or `correct_noise`.
 
     Examples:
         >>> bars = lp.error_bars(lp.solve(basis, target))
@@ -129,26 +133,26 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         return None
     equations, solved = problem.equations, problem.solved
     noise = noise_sums(solution)
-    corrected = without_noise(equations, noise.power)
-    before, lacking = lacking_gradient(solution, noise)
+    corrected = denoised_matrix(equations, noise.power)
+    before, lacking = gradient_bias(solution, noise)
     step = solved.b - np.einsum("cij,jc->ci", solved.M, before) + lacking
     right = np.einsum("cij,jc->ci", corrected, before) + step
     unbiased = NormalEquations(corrected, right, equations.target_norm2)
-    bias = np.asarray(answer_to(solution, unbiased) - weights)
+    bias = np.asarray(solve_for(solution, unbiased) - weights)
 
-    # How firmly lights are held, had there been no bias. A render of the mix shows all of an
-    # earlier error, of which a step by the noisy M leaves a part; the unbiased answer, on which the
-    # interval hangs, has the scatter of its own M.
+    # Curvature without bias. A render of the mix shows all of an earlier error, of which a step by
+    # the noisy M leaves a part; the unbiased answer, which determines the interval, has the scatter
+    # of its own M.
     scatters = solved if problem.refinement is None else unbiased
     *sides, excess = _scatter(solution, noise, scatters, unbiased, weights + bias)
-    doubts = doubt(solution, noise.power)
+    doubts = noise_doubts(solution, noise.power)
     if doubts.any():
-        weak = weakest(solution, noise.power, doubts, corrected)
-        # A step from a render of the mix is asked of M alone.
+        weak = weakest_matrix(solution, noise.power, doubts, corrected)
+        # A step from a render of the mix depends on M alone.
         if problem.refinement is not None:
             right = np.einsum("cij,jc->ci", weak, before) + step
         few = NormalEquations(weak, right, equations.target_norm2)
-        far = answer_to(solution, few)
+        far = solve_for(solution, few)
         *sides, _ = _scatter(solution, noise, few, few, far)
         sides = [np.hypot(side, far - weights - bias) for side in sides]
     by_channel = excess.reshape(3, -1).sum(axis=1)
@@ -175,22 +179,22 @@ def _scatter(
     unbiased: NormalEquations,
     at: Doubles,
 ) -> tuple[Doubles, Doubles, Doubles]:
-    """Standard deviations below and above the weights, (n, 3) each, and the excess, (3 n,).
+    """Return standard deviations below and above the weights, (n, 3) each, and the excess, (3 n,).
 
-    scatters: the equations by which the noise of the gradient moves them. unbiased, at: those
-    whose gradient there, (n, 3), says how firmly they are held.
+    scatters: the equations by which the noise of the gradient moves the weights. unbiased, at: the
+    equations and weights, (n, 3), whose gradient tells how firmly bounds hold.
     """
     problem = solution.problem
-    gradient = problem.pulled(unbiased).gradient(at).T.ravel()
-    asked, missed = problem.pulled(scatters), problem.equations.whole
-    M, C = asked.whole, noise.whole.reshape(gradient.size, -1)
+    gradient = problem.with_pull(unbiased).gradient(at).T.ravel()
+    pulled, missed = problem.with_pull(scatters), problem.equations.full_matrix
+    M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
     below, above, excess = (np.zeros(gradient.size) for _ in range(3))
-    for room in rooms(solution, asked):
-        to, held = room.columns, room.held
-        steps, covariance = _propagated(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
+    for room in block_freedoms(solution, pulled):
+        to, held = room.columns, room.active
+        steps, covariance = _propagate(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
         excess += np.einsum("pq,qp->p", missed, to @ covariance @ to.T)
-        both = ((room.emitted @ held.kept(covariance)) * room.emitted).sum(axis=1)
-        own = room.emitted @ (held.own * steps)
+        both = ((room.emitted @ held.constrained(covariance)) * room.emitted).sum(axis=1)
+        own = room.emitted @ (held.own_exits * steps)
         below += both + np.square(np.minimum(own, 0)).sum(axis=1)
         above += both + np.square(np.maximum(own, 0)).sum(axis=1)
     down, up = (np.sqrt(np.maximum(side, 0)).reshape(3, -1).T for side in (below, above))
@@ -198,10 +202,10 @@ def _scatter(
 
 
 def _interval(solution: Solution, bias: Doubles, sides: list[Doubles]) -> tuple[Doubles, Doubles]:
-    """Lower and upper ends, (n, 3) each, within what is allowed. sides: below and above."""
+    """Return lower and upper ends, (n, 3) each, within the constraints. sides: below and above."""
     weights = solution.weights
-    low, high = solution.problem.about_answer.weight_ranges
-    below, above = (SIDES * np.hypot(side, bias) for side in sides)
+    low, high = solution.problem.local_reduction.weight_ranges
+    below, above = (NORMAL_95 * np.hypot(side, bias) for side in sides)
     return (
         np.minimum(np.maximum(weights - below, low), weights),
         np.maximum(np.minimum(weights + above, high), weights),
@@ -209,7 +213,9 @@ def _interval(solution: Solution, bias: Doubles, sides: list[Doubles]) -> tuple[
 
 
 def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
-    """(n,), whether a light may be more than its own luminance brighter or dimmer than it is."""
+    """Return, (n,), whether the interval of a light's luminance reaches farther than the luminance
+    itself.
+    """
     known = np.isfinite(interval[0])
     solved, low, high = (np.where(known, x, 0) @ LUMINANCE for x in (weights, *interval))
     return np.asarray(np.maximum(solved - low, high - solved) > solved)
@@ -217,19 +223,20 @@ def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
 
 @keywords()
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
-    """The solution of the equations without that share of the noise power in M and b.
+    """Solve the equations without a share of the noise power in M and b.
 
-    Where blocks of pixels were fitted, most of the noise is averaged out already, and the solution
-    stays as it is. Where squares stand for another loss, less is taken out until that says, too,
-    that the step is a good one: far from the answer they say nothing.
+    A fit of blocks of pixels has averaged most of the noise already, and its solution stays as it
+    is.
+    If squares stand for another loss, the share is lowered until this loss falls, too: far from the
+    answer the squares do not represent it.
 
     Args:
-        solution: What was solved before; it starts there.
-        share: 0 to 1; that of which most is to be expected, if not given (see `_best_share`).
-            docs/method.md has what it is worth.
+        solution: The solution to correct, where the solve starts.
+        share: 0 to 1; the most promising one by default (see `_best_share`). docs/method.md has
+            measurements.
 
     Raises:
-        BasisError: Where nothing is known of the noise.
+        BasisError: If the noise is unknown.
 
     Examples:
         >>> corrected = lp.correct_noise(lp.solve(basis, target))
@@ -246,49 +253,49 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
         return solution
     noise = noise_sums(solution)
     e = solution.equations
-    least = without_noise(e, noise.power)
+    least = denoised_matrix(e, noise.power)
     if share is None:
         share = _best_share(solution, noise, least)
     while True:
         corrected = NormalEquations(
-            (1 - share) * e.M + share * least, e.b - share * noise.drawn, e.target_norm2
+            (1 - share) * e.M + share * least, e.b - share * noise.target_noise, e.target_norm2
         )
         problem = replace(solution.problem, corrected=corrected, noise_removed=share)
-        found = again(solution, problem)
-        taken = NormalEquations(share * (e.M - least), share * noise.drawn, np.zeros(3))
+        found = solve_again(solution, problem)
+        taken = NormalEquations(share * (e.M - least), share * noise.target_noise, np.zeros(3))
         if problem.is_linear or share == 0 or _loss(found, taken) <= _loss(solution, taken):
             return found
-        share = share / 2 if share > 1 / SHARES else 0.0
+        share = share / 2 if share > 1 / SHARE_STEPS else 0.0
 
 
 def _loss(solution: Solution, taken: NormalEquations) -> float:
-    """Return what a solution misses and what pulls at it, less the noise that is taken out."""
+    """Return the error of a solution with its pull, less the removed noise."""
     pull, weights = solution.problem.pull, solution.weights
     pulled = 0.0 if pull is None else float(pull.objective(weights).sum())
-    # As of `NormalEquations.objective`, which knows of no squares below zero.
+    # As `NormalEquations.objective`, which does not allow squares below zero.
     noise = np.einsum("ic,cij,jc->", weights, taken.M, weights) - 2 * (taken.b.T * weights).sum()
     return sum(solution.certificate.objective) + pulled - float(noise)
 
 
 def _best_share(solution: Solution, noise: Noise, least: Doubles) -> float:
-    """The share s that makes the expected excess of the objective least, in steps of SHARES.
+    """Return the share s with the least expected excess of the objective, in steps of SHARES.
 
-    What is left of the bias costs (1 − s)² δᵀMδ, and the scatter costs tr(M Cov(w)), which
-    grows as M_s = M − s N becomes smaller. None of it where the target is made of this basis, as
-    a template is. least: M without all noise.
+    The remaining bias costs (1 − s)² δᵀMδ, and the scatter costs tr(M Cov(w)), which grows as
+    M_s = M − s N becomes smaller. 0 for a target that is a sum of this basis, as a template is.
+    least: M without all noise.
     """
     e, n = solution.equations, len(solution.weights)
-    if e.objective(solution.weights).sum() < SAME_NOISE * noise.objective_noise.sum():
+    if e.objective(solution.weights).sum() < SAME_NOISE_SHARE * noise.objective_noise.sum():
         return 0.0
-    unbiased = NormalEquations(least, e.b - noise.drawn, noise.objective_noise)
-    bias = answer_to(solution, unbiased) - solution.weights
-    shares = np.linspace(0, 1, SHARES + 1)
+    unbiased = NormalEquations(least, e.b - noise.target_noise, noise.objective_noise)
+    bias = solve_for(solution, unbiased) - solution.weights
+    shares = np.linspace(0, 1, SHARE_STEPS + 1)
     cost = np.square(1 - shares) * np.einsum("ic,cij,jc->", bias, e.M, bias)
-    # What pulls at the weights keeps them from moving, and is no part of what is missed.
+    # A pull keeps the weights from moving, and is no part of the error.
     pull = solution.problem.pull
-    stiffness = np.zeros((3 * n, 3 * n)) if pull is None else pull.whole
-    for to in moving(solution):
-        M, left, stiff = (to.T @ x @ to for x in (e.whole, block_diagonal(least), stiffness))
+    stiffness = np.zeros((3 * n, 3 * n)) if pull is None else pull.full_matrix
+    for to in free_directions(solution):
+        M, left, stiff = (to.T @ x @ to for x in (e.full_matrix, block_diagonal(least), stiffness))
         C = to.T @ noise.gradient.reshape(3 * n, 3 * n) @ to
         for k, s in enumerate(shares):
             inverse = pseudo_inverse((1 - s) * M + s * left + stiff)
@@ -297,7 +304,7 @@ def _best_share(solution: Solution, noise: Noise, least: Doubles) -> float:
 
 
 def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solution:
-    """`solution` with the standard errors of lights and objective, where they are known."""
+    """Return `solution` with the standard errors of lights and objective, if known."""
     if uncertainty is None:
         return solution
     ends = np.stack(uncertainty.interval, axis=-1)
@@ -315,38 +322,41 @@ def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solu
     )
     lighting = replace(solution.lighting, lights=lights)
     error = as_rgb(uncertainty.objective_error)
-    return replace(solution, lighting=lighting).told(objective_error=error)
+    return replace(solution, lighting=lighting).with_certificate_fields(objective_error=error)
 
 
-def _propagated(M: Doubles, C: Doubles, room: Room, gradient: Doubles) -> tuple[Doubles, Doubles]:
-    """How far what holds may be left, (h,), and the covariance of all unknowns, (k, k).
+def _propagate(
+    M: Doubles, C: Doubles, room: BlockFreedom, gradient: Doubles
+) -> tuple[Doubles, Doubles]:
+    """Return how far the active bounds may be left, (h,), and the covariance of all unknowns, (k,
+    k).
 
     M: (k, k); C: (k, k), covariance of the noise of the gradient, (k,). Cov(x) = M⁻¹ C M⁻¹ over
-    what is free, and over what noise alone may hold.
+    free directions, and over those of bounds that noise alone may have activated.
     """
     free = room.free
-    # Left, with what is free making the best of it.
-    ways = room.held.ways - free @ (
-        pseudo_inverse(free.T @ M @ free) @ (free.T @ M @ room.held.ways)
+    # Directions that leave a bound while the free unknowns adapt.
+    ways = room.active.exits - free @ (
+        pseudo_inverse(free.T @ M @ free) @ (free.T @ M @ room.active.exits)
     )
-    stiffness, alone = (((M @ w) * w).sum(axis=0) for w in (ways, room.held.ways))
-    # The others do all that some could do.
-    counts = stiffness > SINGULAR * alone
+    stiffness, alone = (((M @ w) * w).sum(axis=0) for w in (ways, room.active.exits))
+    # Other lights can replace those without stiffness.
+    counts = stiffness > NULL_EIGENVALUE * alone
     safe = np.where(counts, stiffness, 1)
     pushed = np.where(counts, np.maximum(ways.T @ gradient, 0), 0) / safe
     noise = np.maximum(((C @ ways) * ways).sum(axis=0), 0)
     spread = np.where(counts, np.sqrt(noise), 0) / safe
     ends = [_one_sided(u, s) for u, s in zip(pushed.tolist(), spread.tolist(), strict=True)]
-    free = np.hstack([free, ways[:, pushed < SIDES * spread]])
+    free = np.hstack([free, ways[:, pushed < NORMAL_95 * spread]])
     inverse = free @ pseudo_inverse(free.T @ M @ free) @ free.T
-    return np.minimum(ends, room.held.room) / SIDES, inverse @ C @ inverse
+    return np.minimum(ends, room.active.distances) / NORMAL_95, inverse @ C @ inverse
 
 
 def _one_sided(pushed: float, spread: float) -> float:
-    """End of the 95 % interval of something that is at a bound, from there on.
+    """Return the end of the 95 % interval of a value at a bound, from there on.
 
-    Were it free it would be beyond the bound by `pushed`, u, with the standard deviation s of
-    `spread`. Of what is known not to be beyond, the end is U with
+    Without the bound it would be beyond it by `pushed`, u, with the standard deviation s of
+    `spread`. Since it cannot be beyond, the end is U with
 
         P(X > U) = 0.05 P(X > 0),   X ~ N(-u, s²),
 
@@ -356,15 +366,16 @@ def _one_sided(pushed: float, spread: float) -> float:
     if spread <= 0:
         return 0.0
     u = pushed / spread
-    if u > FAR:
+    if u > FAR_DEVIATIONS:
         # The tail of a normal distribution is nearly exp(-u t - t²/2) there.
-        return spread * (math.hypot(u, math.sqrt(-2 * math.log(OUTSIDE))) - u)
+        return spread * (math.hypot(u, math.sqrt(-2 * math.log(OUTSIDE_SHARE))) - u)
     beyond = math.erfc(u / math.sqrt(2)) / 2
-    return spread * (-NORMAL.inv_cdf(OUTSIDE * beyond) - u)
+    return spread * (-NORMAL.inv_cdf(OUTSIDE_SHARE * beyond) - u)
 
 
 def _with_errors(light: LightSetting, error: Doubles, interval: Doubles) -> LightSetting:
-    """A light with its standard error, (3,), and its interval, (3, 2); NaN where nothing tells."""
+    """Return a light with its standard error, (3,), and its interval, (3, 2); NaN if
+    undetermined."""
     r, g, b = (None if np.isnan(e) else float(e) for e in error)
     ends = ((float(low), float(high)) for low, high in interval)
     red, green, blue = (None if np.isnan(low) else (low, high) for low, high in ends)

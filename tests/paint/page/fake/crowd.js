@@ -13,7 +13,7 @@ const named = (k) =>
 
 export const HEADLINE =
   `About half of the way, 46 %, and changes the annex by ΔE 12: slightly brighter light on the ` +
-  `${OBJECT} is missing; what is not painted is held near how it is. Paint more, or loosen it.`;
+  `${OBJECT} is missing; unpainted parts are held near their present look. Paint more, or loosen it.`;
 
 export const LONGEST =
   `35 % of the way, at the cost of the ${OBJECT} (ΔE 49): darker and bluer shade on the ${OBJECT} ` +
