@@ -1,1 +1,1 @@
-"""Lights that are not there yet: where one could stand, and how much it would help."""
+"""Lights that are not there yet: their possible places, and their gains."""

@@ -1,9 +1,9 @@
-"""Which light that is not there would help most? Gains of additional columns of the basis.
+"""The gain of each candidate light as an additional column of the basis.
 
-Each is put beside the lights that there are, the problem is solved again under the same
-constraints, and what is missed then is compared. Of many that are tried some seem to help by
-their noise alone. So the weights are found on one half of the samples and what they miss is
-measured on the other, and the other way around: noise that was fitted does not come again.
+Each candidate joins the present lights, the problem is solved again under the same constraints, and
+the errors are compared. Of many candidates some seem to help by their noise alone. So weights are
+solved with one half of the samples and errors measured with the other, and the other way around:
+noise that was fitted does not repeat.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,24 +20,24 @@ from lightpaint.lighting.constraints.reduced_problem import ReducedProblem, redu
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.placement.candidates import Candidates
 
-#: Candidates that the problem is solved for again, of those that seem to help most.
+#: Most promising candidates that the problem is solved again for.
 SOLVED = 8
 
-#: Share of a column that others cannot make up for, below which it is taken for none.
+#: Share of a column that others cannot replace, below which it counts as none.
 ALONE = 1e-6
 
-#: Standard errors by which a gain must be above 0. Under no gain at all the measured one is
-#: negative on average, since what was fitted to one half does not fit the other.
+#: Standard errors by which a gain must be above 0. Without any gain the measured one is negative on
+#: average, since a fit of one half does not fit the other.
 SURE = 3.0
 
 
 @dataclass(frozen=True)
 class Addition:
-    """One light to add, given those before it.
+    """A light to add, given those before it.
 
-    candidate: index of its image. gain: by how much the objective falls with it, all channels
-    together. weights: (n + k, 3), of the n lights of the basis and of the k additions so far,
-    itself the last. without, with_it: (h, w, 3) linear, the picture solved before and with it.
+    candidate: index of its image. gain: the fall of the objective with it, all channels together.
+    weights: (n + k, 3), of the n lights of the basis and of the k additions so far, itself the
+    last. without, with_it: (h, w, 3) linear, the picture solved before and with it.
     """
 
     candidate: int
@@ -55,12 +55,12 @@ def find_additions(
     surely: bool = True,
     too_near: npt.NDArray[np.bool_] | None = None,
 ) -> list[Addition]:
-    """At most `count` lights to add, each the one that helps most beside those before it.
+    """Find at most `count` lights to add, each the one that helps most beside those before it.
 
-    least: the gain a light has to be worth. surely: whether it has to stand out from noise,
-    with all doubt for the lights there are; if not, what only seems to help is named too, as
-    where to look closer. Once there is none, there are no more.
-    too_near: (m, m), pairs of candidates of which one at most is wanted.
+    least: the smallest gain. surely: whether a gain has to stand out from noise, with all doubt in
+    favour of the present lights; if not, candidates that only seem to help are returned, too, for
+    a closer search. The search ends at the first failure.
+    too_near: (m, m), pairs of candidates that exclude each other.
     """
     folds = [_Fold(candidates, k) for k in range(2)]
     whole = _Solver(candidates, candidates.pictures, candidates.noise)
@@ -71,7 +71,7 @@ def find_additions(
     while len(chosen) < count and left.any():
         estimates = np.where(left, whole.estimated_gains(chosen), -1)
         tried = [int(k) for k in np.argsort(-estimates)[:SOLVED] if left[k]]
-        # Held against the most that may be said for the lights without it.
+        # Compared with the best case for the lights without it.
         doubt = max(before - whole.objective(chosen), 0.0)
         gains = {k: before - _missed(folds, [*chosen, k]) for k in tried}
         order = sorted(tried, key=lambda k: -gains[k])
@@ -87,7 +87,7 @@ def find_additions(
         elif surely or chosen or gains[order[0]] <= 0:
             break
         else:
-            # Nothing stands out yet: look closer where most seems to be gained.
+            # Nothing stands out yet: search closer around the largest gain.
             best = order[0]
         chosen.append(best)
         before -= gains[best]
@@ -102,10 +102,10 @@ def find_additions(
 
 
 class _Solver:
-    """The problem of all lights and candidates; solved with some of these off.
+    """The problem of all lights and candidates, solved with some of these off.
 
-    Noise in its images makes lights come out too dim, and a candidate with less of it would make
-    up for that: so the power of the noise is taken out.
+    Noise in its images makes lights come out too dim, and a candidate with less noise would seem to
+    help: so the power of the noise is removed.
     """
 
     def __init__(self, candidates: Candidates, images: Floats, noise: Floats) -> None:
@@ -120,24 +120,24 @@ class _Solver:
         self.first = len(self.reduction.knobs) - candidates.count
 
     def weights(self, chosen: Iterable[int]) -> Doubles:
-        """(n + m, 3), the best with the candidates `chosen`; the others are 0."""
+        """Return the best weights, (n + m, 3), with the candidates `chosen`; the others are 0."""
         x = np.zeros(len(self.reduction.unknowns))
         for problem, here, values in self._solved(chosen):
             x[problem.unknowns[here]] = values
         return self.reduction.weights(x)
 
     def objective(self, chosen: Iterable[int]) -> float:
-        """Return the miss at these weights, by the images they were solved with."""
+        """Return the error at these weights, by the images they were solved with."""
         return float(self.equations.objective(self.weights(chosen)).sum())
 
     def estimated_gains(self, chosen: Iterable[int]) -> Doubles:
-        """(m,), what each candidate would gain if the same lights stayed at their limits."""
+        """Return the gain of each candidate, (m,), if the same lights stayed at their limits."""
         gains = np.zeros(len(self.reduction.unknowns))
         for problem, here, x in self._solved(chosen):
             inside = (x > problem.lower[here]) & (x < problem.upper[here])
             free = here[inside]
             gradient = problem.b - problem.M[:, here] @ x
-            # What is left of a column once the free unknowns have made up for it as they can.
+            # The part of a column that the free unknowns cannot replace.
             cross = problem.M[free]
             inverse = pseudo_inverse(problem.M[np.ix_(free, free)])
             power = np.diag(problem.M)
@@ -148,7 +148,8 @@ class _Solver:
         return np.array([gains[list(its)].sum() for its in places])
 
     def _solved(self, chosen: Iterable[int]) -> Iterator[tuple[ReducedProblem, Indices, Doubles]]:
-        """Each problem, which of its unknowns are not off, and their best values."""
+        """Yield each problem, the indices of its unknowns that are not off, and their best
+        values."""
         off = set(range(self.first, len(self.reduction.knobs)))
         off -= {self.first + k for k in chosen}
         unknowns = {i for knob in off for i in self.reduction.places[knob]}
@@ -161,7 +162,7 @@ class _Solver:
 
 
 class _Fold:
-    """One half of the samples to solve with, the other to measure by."""
+    """A half of the samples to solve with, and the other to measure by."""
 
     def __init__(self, candidates: Candidates, solve_half: int) -> None:
         self.candidates, self.measured = candidates, 1 - solve_half
@@ -175,20 +176,21 @@ class _Fold:
         self.known: dict[tuple[int, ...], Doubles] = {}
 
     def weights(self, chosen: Sequence[int]) -> Doubles:
+        """Return the weights with the candidates `chosen`, cached."""
         key = tuple(chosen)
         if key not in self.known:
             self.known[key] = self.solver.weights(chosen)
         return self.known[key]
 
     def missed(self, chosen: Sequence[int]) -> float:
-        """Σ D r² without what the noise of the measuring half adds, which is not missed."""
+        """Return Σ D r² less the noise of the measuring half, which is no error."""
         w, e = self.weights(chosen), self.equations
         value = e.target_norm2 - 2 * np.einsum("ci,ic->c", e.b, w)
         value += np.einsum("ic,cij,jc->c", w, e.M - self.noise, w)
         return float(value.sum())
 
     def missed_map(self, chosen: Sequence[int]) -> Doubles:
-        """The same for each pixel, (h, w) float64."""
+        """Return the same for each pixel, (h, w) float64."""
         c, w = self.candidates, self.weights(chosen)
         on = w.any(axis=1)
         missed = c.image - mix(self.pictures[on], w[on])
@@ -202,10 +204,10 @@ def _missed(folds: Sequence[_Fold], chosen: Sequence[int]) -> float:
 
 
 def _standard_error(folds: Sequence[_Fold], chosen: Sequence[int]) -> float:
-    """Of what is missed with `chosen`.
+    """Return the standard error of the loss with `chosen`.
 
-    That of the mean of two maps, pixel by pixel, is told by their difference: what one half of
-    the samples shows and the other does not is noise.
+    For the mean of two maps it follows from their difference, pixel by pixel: differences between
+    the halves of the samples are noise.
     """
     a, b = (fold.missed_map(chosen) for fold in folds)
     return float(np.sqrt(np.square(a - b).sum())) / 2

@@ -1,7 +1,7 @@
-"""A solved problem and the images of lights to try beside it, brought to one size.
+"""A solved problem and the images of candidate lights, at one size.
 
-Of all there are two halves of the samples, so that what is found on one of them can be held
-against the other (see additions.py).
+All images come in two halves of the samples, so that results of one can be tested on the other (see
+additions.py).
 """
 
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ from lightpaint.threads import one_thread
 
 @dataclass(frozen=True)
 class Candidates:
-    """A solved problem, and images of lights to try, all of one size.
+    """A solved problem, and images of candidate lights, all of one size.
 
     pictures, noise: (n + m, h, w, 3), the n lights of the basis and m candidates at unit emission,
     and half the differences of halves of their samples. halves: (n + m, 2), shares of the
-    samples in half A and B. image, (h, w, 3), and importance, (h, w, 1 or 3): what is solved
-    for; after reweighting, in the last linear problem. reduction: what may be done
-    with the n lights. pull: of `prefer current`, for these.
+    samples in half A and B. image, (h, w, 3), and importance, (h, w, 1 or 3): the goal; after
+    reweighting, that of the last linear problem. reduction: the unknowns of the n lights. pull: of
+    `prefer current`, for these.
     """
 
     pictures: Floats
@@ -42,9 +42,9 @@ class Candidates:
 
     @classmethod
     def of(cls, basis: Basis, solution: Solution, added: Basis) -> "Candidates":
-        """added: images of candidates, of the size of `basis`, or of blocks of its pixels.
+        """Make candidates. added: their images, of the size of `basis`, or of blocks of its pixels.
 
-        Lights in it that are fixed are no candidates. Raises SizeError for other sizes.
+        Fixed lights in it are no candidates. Raises SizeError for other sizes.
         """
         size = added.size
         factor = whole_factor(basis.size, size)
@@ -76,15 +76,15 @@ class Candidates:
 
     @property
     def lights(self) -> int:
-        """n, the lights of the basis."""
+        """The number n of lights of the basis."""
         return len(self.pictures) - self.count
 
     def picture(self, weights: Doubles) -> Floats:
-        """Σ w_i Φ_i, (h, w, 3). weights: (n + m, 3)."""
+        """Return Σ w_i Φ_i, (h, w, 3). weights: (n + m, 3)."""
         return mix(self.pictures, weights)
 
     def half(self, k: int) -> Floats:
-        """The images as half A (0) or B (1) of the samples has them."""
+        """Return the images of half A (0) or B (1) of the samples."""
         sign = 1 if k == 0 else -1
         scale = sign * 2 * self.halves[:, 1 - k]
         return np.asarray(self.pictures + self.noise * _column(scale), np.float32)
@@ -94,13 +94,13 @@ class Candidates:
         return np.asarray(self.noise * _column(2 * np.sqrt(self.halves[:, 1 - k])), np.float32)
 
     def equations(self, images: Floats) -> NormalEquations:
-        """Of these images, and of what is solved for."""
+        """Return the equations of these images with the goal."""
         with one_thread():
             return NormalEquations(*inner_products(images, self.image, self.importance))
 
 
 def _with_free_lights(reduction: Reduction, count: int) -> Reduction:
-    """`reduction` with that many lights more, of which nothing is asked."""
+    """Return `reduction` with that many lights more, without constraints."""
     n = len(reduction.fixed_weights)
     more = tuple(Knob.of_any_colour(k) for k in range(n, n + count))
     return Reduction(
@@ -122,14 +122,14 @@ def _pull(solution: Solution, count: int) -> NormalEquations | None:
 
 
 def _reduced(image: Floats, importance: Floats, factor: int) -> tuple[Floats, Floats]:
-    """Means of blocks, weighted with importance, and the importance of whole blocks."""
+    """Return means of blocks, weighted with importance, and the importance of whole blocks."""
     weight = block_mean(importance.astype(np.float64), factor)
     weighted = block_mean(image * importance.astype(np.float64), factor)
     return weighted / np.where(weight > 0, weight, 1), weight * factor**2
 
 
 def _shares(basis: Basis, count: int) -> Doubles:
-    """(count, 2), the part of the samples that half A and B have."""
+    """Return the shares of half A and B in the samples, (count, 2)."""
     a, b = basis.origin.halves
     return np.tile([a / (a + b), b / (a + b)], (count, 1))
 

@@ -1,9 +1,9 @@
 """Places where a light could stand and shine on what the camera sees.
 
-Light that reaches a visible point in a straight line comes from somewhere between that point
-and the next surface. So rays are cast from the camera, from what they hit into the half space
-before it, and places are taken along these: inside a room, out through its windows, behind the
-camera. Of many such places a few are kept that lie far apart.
+Light that reaches a visible point in a straight line comes from between that point and the next
+surface. So rays go from the camera to surfaces, and from there into the half space before them, and
+places are chosen along these: inside a room, out through its windows, behind the camera. Of many
+such places a few remain that are far apart.
 """
 
 from collections.abc import Iterable
@@ -16,26 +16,26 @@ from lightpaint.arrays import Floats, Position
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
-#: Points of the picture from which places are looked for, and rays from each.
+#: Points of the picture from which the search starts, and rays from each.
 POINTS, RAYS = 600, 24
 
-#: How far a ray goes that hits nothing, and beyond which points are too far off to count,
-#: over how far visible points spread.
+#: Length of a ray that hits nothing, and the distance at which points are too far to count,
+#: relative to the spread of visible points.
 REACH, FAR = 2.0, 12.0
 
-#: Distance from all surfaces, over how far visible points spread, and directions it is tried in.
+#: Distance from all surfaces, relative to the spread of visible points, and tested directions.
 CLEARANCE, AROUND = 0.03, 26
 
-#: Visible points that a place is held against, and the share of them that it has to see.
+#: Visible points that each place is tested with, and the share of them that it has to see.
 ASKED, LEAST_SEEN = 64, 0.05
 
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """Places that see something of what the camera sees.
+    """Places with a free view of visible points.
 
     places: (k, 3), units of the scene. spread: median distance of visible points from their
-    middle, which is what near and far is measured by.
+    middle, the unit of near and far.
     """
 
     places: Floats
@@ -43,7 +43,7 @@ class FreeSpace:
 
 
 def free_space(scene: Scene, loaded: Any, *, seed: int = 0) -> FreeSpace:
-    """Look for places in `loaded`, which is `scene` loaded. None if the camera hits nothing."""
+    """Search for places in `loaded`, the loaded `scene`. None if the camera hits nothing."""
     rng = np.random.default_rng(pass_seed(seed, Stream.CANDIDATES, 0))
     points, normals = _visible(scene, loaded, rng)
     if not len(points):
@@ -69,9 +69,9 @@ def free_space(scene: Scene, loaded: Any, *, seed: int = 0) -> FreeSpace:
 
 
 def far_apart(places: Floats, count: int, *, start: Floats | None = None) -> Floats:
-    """At most `count` of `places` (k, 3), each as far as can be from those before it.
+    """Choose at most `count` of `places` (k, 3), each as far as possible from those before it.
 
-    start: (m, 3), places that are taken already.
+    start: (m, 3), places chosen before.
     """
     if not len(places):
         return places
@@ -92,9 +92,10 @@ def far_apart(places: Floats, count: int, *, start: Floats | None = None) -> Flo
 
 
 def pixels_of(scene: Scene, loaded: Any, places: Floats) -> list[tuple[float, float] | None]:
-    """Where in the picture each of `places` is, from (0, 0) top left to (1, 1); None if not in it.
+    """Return the place of each of `places` in the picture, from (0, 0) top left to (1, 1); None
+    outside.
 
-    None too for cameras that cannot tell, as orthographic ones.
+    Also None for cameras that cannot tell, like orthographic ones.
     """
     import drjit as dr
     import mitsuba as mi
@@ -115,13 +116,13 @@ def pixels_of(scene: Scene, loaded: Any, places: Floats) -> list[tuple[float, fl
 
 
 def as_position(place: Iterable[Any]) -> Position:
-    """A row of `places`."""
+    """Return a row of `places` as a position."""
     x, y, z = (float(v) for v in place)
     return x, y, z
 
 
 def _visible(scene: Scene, loaded: Any, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Points that the camera sees, (k, 3), and their normals towards it, (k, 3)."""
+    """Return points that the camera sees, (k, 3), and their normals towards it, (k, 3)."""
     import drjit as dr
     import mitsuba as mi
 
@@ -140,7 +141,7 @@ def _visible(scene: Scene, loaded: Any, rng: np.random.Generator) -> tuple[Float
 
 
 def _distance(loaded: Any, origin: Floats, direction: Floats, normal: Floats) -> Floats:
-    """How far it is from surface points to the next surface; inf for nowhere. All (k, 3)."""
+    """Return the distance from surface points to the next surface; inf for none. All (k, 3)."""
     import drjit as dr
     import mitsuba as mi
 
@@ -152,7 +153,9 @@ def _distance(loaded: Any, origin: Floats, direction: Floats, normal: Floats) ->
 
 
 def _is_clear(loaded: Any, places: Floats, distance: float) -> Floats:
-    """(k,), whether nothing is nearer to a place than `distance`, in some directions around."""
+    """Return, (k,), whether nothing is nearer to a place than `distance`, in some directions
+    around.
+    """
     import mitsuba as mi
 
     clear = np.ones(len(places), dtype=bool)
@@ -168,11 +171,11 @@ def _is_clear(loaded: Any, places: Floats, distance: float) -> Floats:
 
 
 def _seen_share(loaded: Any, places: Floats, points: Floats) -> Floats:
-    """(k,), the share of `points` (m, 3) that each place sees."""
+    """Return the share of `points` (m, 3) that each place sees, (k,)."""
     import mitsuba as mi
 
     start = np.repeat(places, len(points), axis=0)
-    # Not quite to the surface, so that it is not in its own way.
+    # Not quite to the surface, so that it does not hide itself.
     way = 0.999 * (np.tile(points, (len(places), 1)) - start)
     ray = mi.Ray3f(mi.Point3f(start.T.astype(np.float32)), mi.Vector3f(way.T.astype(np.float32)))
     ray.maxt = 1.0

@@ -1,8 +1,9 @@
-"""Which light is missing? Point lights are tried all over the scene, and the best are named.
+"""The search for missing lights: point lights all over the scene are tested, and the best
+suggested.
 
-Candidates stand in free space from which they shine on what the camera sees. The images of all
-of them are rendered in one pass, like a basis, on a small film; what each would take away of the
-miss is then a matter of algebra (additions.py). Near the best a second pass looks closer.
+Candidates stand in free space and shine on visible surfaces. One pass renders the images of all of
+them, like a basis, on a small film; algebra then gives the gain of each (additions.py). Near the
+best ones further passes search closer.
 """
 
 from collections.abc import Sequence
@@ -29,27 +30,27 @@ from lightpaint.scene.lights.light import free_names
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
-#: Suggestions that are made where no number is given.
+#: The default number of suggestions.
 SUGGESTED = 3
 
-#: Positions that are tried: all over, near the best of these, nearer, and the best once more,
-#: with all samples for them. Fewest on a film that cannot be made small.
+#: Positions to try in each pass: all over, near the best of these, nearer, and the best once more,
+#: with all samples for them; and the least number, on a film that cannot be made small.
 TRIED, FEWEST = (96, 48, 24, 0), 8
 
-#: How many more than are asked for are looked at closer: the best of few is not near the best.
+#: Additional positions to search closer: the best of few is not near the best.
 BESIDE = 5
 
-#: Pixels that candidates are rendered on, where it can be so few; values of all their images;
-#: camera samples of a pass.
+#: Pixels of the candidates' film, if possible; most values of all their images; camera samples of a
+#: pass.
 PIXELS, VALUES, SAMPLES = 2**14, 2**24, 2**19
 
-#: What is missed of a painting, RMS, below which its lights can do it.
+#: RMS error below which the present lights make the painting.
 NOTHING_MISSED = 0.01
 
-#: Gains below this share of the miss are not worth a light.
+#: Smallest gain, as a share of the error, that is worth a light.
 SMALLEST_SHARE = 0.01
 
-#: Distance that two suggestions have at least, over the spread of what is seen.
+#: Least distance of two suggestions, relative to the spread of visible points.
 APART = 0.25
 
 
@@ -72,13 +73,13 @@ def suggest_lights(
     seed: int = 0,
     progress: Progress = silent,
 ) -> tuple[Suggestion, ...]:
-    """Point lights that would bring `solution` closest to its painting, the best first.
+    """Suggest point lights that would bring `solution` closest to its painting, the best first.
 
     Args:
-        scene: What `basis` was made of, on the same film or a larger one.
-        basis: What the solution, of that one view, was solved with.
-        solution: To be improved.
-        count: At most so many; none where no light would surely take a hundredth of the miss away.
+        scene: The scene of `basis`, on the same film or a larger one.
+        basis: The basis of the solution, of that one view.
+        solution: The solution to improve.
+        count: The most suggestions; none if no light surely removes a hundredth of the error.
         seed: Of the positions and their images.
         progress: Hears how far the work has come.
 
@@ -126,7 +127,7 @@ def suggest_lights(
 
 
 def _on_small_film(scene: Scene, basis: Basis) -> Scene:
-    """`scene` on a film whose pixels are blocks of those of `basis`, PIXELS or fewer."""
+    """Return `scene` on a film whose pixels are blocks of those of `basis`, PIXELS or fewer."""
     (height, width), (mine_h, mine_w) = scene.size, basis.size
     if whole_factor(scene.size, basis.size) is None:
         raise SceneError(
@@ -138,13 +139,13 @@ def _on_small_film(scene: Scene, basis: Basis) -> Scene:
 
 
 def _most(small: Scene, tried: int) -> int:
-    """How many of `tried` positions fit at once."""
+    """Return how many of `tried` positions fit into one pass."""
     height, width = small.size
     return min(tried, max(VALUES // (height * width * 3), FEWEST))
 
 
 def _places(space: FreeSpace, best: Floats, radius: float, count: int) -> Floats:
-    """The best so far, and `count` positions more within `radius` of these, far apart."""
+    """Return the best so far, and `count` positions more within `radius` of these, far apart."""
     if not len(best):
         return far_apart(space.places, count)
     near = [best]
@@ -155,7 +156,7 @@ def _places(space: FreeSpace, best: Floats, radius: float, count: int) -> Floats
 
 
 def _spacing(places: Floats) -> float:
-    """Median distance from one to the next."""
+    """Return the median distance from one to the next."""
     between = np.linalg.norm(places[:, None] - places[None], axis=2)
     np.fill_diagonal(between, np.inf)
     return float(np.median(between.min(axis=1)))
@@ -201,7 +202,7 @@ def _suggestions(
 
 
 def emitter_xml(name: str, position: Position, intensity: RGB) -> str:
-    """A point light as an element to be put directly into <scene>."""
+    """Return a point light as an element for <scene>."""
     x, y, z = (f"{v:g}" for v in position)
     lines = [
         tag("point", name="position", x=x, y=y, z=z),

@@ -1,4 +1,4 @@
-"""A light that would help, as data: where it stands, what it emits, what it takes of the miss."""
+"""A suggested light, as data: its place, its emission, and its gain."""
 
 from dataclasses import dataclass, field
 
@@ -6,7 +6,7 @@ from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.colour.photometry import Photometry, photometry, point_flux
 from lightpaint.keywords import keywords
 
-#: Of the intensity of a point light.
+#: The unit of a point light's intensity.
 UNIT = "W/sr"
 
 
@@ -16,13 +16,13 @@ class Suggestion:
     """A point light to add to the scene.
 
     Attributes:
-        name: That no light of the scene has.
+        name: A name that no light of the scene has.
         position: In units of the scene.
         emission: Intensity per channel, W/sr.
-        gain_share: Of what is missed (energy), what this light takes away beside those before it.
-        missed_share: What is left of it, with this light and those before it.
-        xml: The emitter, to be put into the scene's XML as it is.
-        seen_at: Where in the picture it is, from (0, 0) top left to (1, 1); None if not in it.
+        gain_share: The share of the error (energy) that this light removes, given those before it.
+        missed_share: The share that remains, with this light and those before it.
+        xml: The emitter for the scene's XML.
+        seen_at: Its place in the picture, from (0, 0) top left to (1, 1); None if outside.
         without: (h, w, 3) linear, the solved picture before this light, small.
         with_it: (h, w, 3), the same with it.
 
@@ -43,7 +43,7 @@ class Suggestion:
     with_it: Floats = field(repr=False, compare=False)
 
     def photometry(self, cd_per_unit: float | None = None) -> Photometry:
-        """Its colour, and how much light it is."""
+        """Return its colour, and its amount of light."""
         flux = point_flux()
         unit_flux = (flux, flux, flux)
         return photometry(self.emission, unit=UNIT, unit_flux=unit_flux, cd_per_unit=cd_per_unit)

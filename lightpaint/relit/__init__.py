@@ -1,1 +1,1 @@
-"""Does the scene really look like that? The relit XML, and an independent render of it."""
+"""The relit scene: its XML, and an independent render that verifies it."""

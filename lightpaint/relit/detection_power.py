@@ -1,7 +1,7 @@
-"""Power of a verification: how likely it was to see an error in each light.
+"""The power of a verification: the chance that it detects an error in each light.
 
-That prediction and render agree says little of a light whose part of the picture drowns in their
-noise. So it is computed how likely the render was to find it, had the light been a little off.
+Agreement of prediction and render means little for a light whose part of the picture drowns in
+their noise. So this module computes the chance that the render had detected a small error in it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,7 +24,7 @@ from lightpaint.relit.verification import (
     noise_of,
 )
 
-#: Relative error of a light that a render is asked to find.
+#: Relative error of a light that a render should detect.
 ERROR = 0.05
 
 NORMAL = NormalDist()
@@ -32,7 +32,7 @@ NORMAL = NormalDist()
 
 @dataclass(frozen=True)
 class LightShares:
-    """What each light that shines adds to a prediction, in sums over blocks.
+    """The parts of lights that shine in a prediction, in sums over blocks.
 
     names: of m lights. sums: (m, 3), over all pixels. blocks, noise: (m, rows, columns, 3), over
     blocks, of the picture and of its half difference.
@@ -69,7 +69,7 @@ class LightShares:
         return cls(tuple(names), np.array(sums), np.array(blocks), np.array(noise))
 
     def luminance(self) -> dict[str, float]:
-        """Each light's share of the light that all of them add to the picture."""
+        """Return the share of each light in the luminance of all these lights."""
         its = np.maximum(luminance(self.sums), 0) if self.names else np.zeros(0)
         return dict(zip(self.names, (its / max(its.sum(), 1e-300)).tolist(), strict=True))
 
@@ -98,7 +98,7 @@ def detection_power(
     """Return the probability, for each light, that a relative error in it exceeds `limit`.
 
     Both tests of a verification count: the sum of the picture, and the pattern of blocks. Of the
-    sums the channel counts that shows most, since one path carries the noise of all. With the error
+    sums, the most sensitive channel counts, since one path carries the noise of all. With the error
     d, a block's product of halves has the mean d² and, beside the variance 4 S² of noise alone,
     4 S d², where S is the variance of the block's difference. The light's own noise is taken out of
     d².

@@ -15,7 +15,7 @@ from lightpaint.scene.scene import Scene
 
 @dataclass
 class Changes:
-    """Children of one element to be replaced, or inserted where there are none yet."""
+    """Changes of an element's children: replacements, and insertions of new ones."""
 
     xml: XmlFile
     element: Element
@@ -33,7 +33,7 @@ class Changes:
             self.xml.replace(child, tag(kind, name=child.attributes["name"], value=value))
 
     def number(self, name: str, otherwise: float) -> float:
-        """The number that stands in the child called `name` now, or `otherwise`."""
+        """Return the present number of the child called `name`, or `otherwise`."""
         child = self._child_named(name)
         text = child.attributes.get("value", "") if child is not None else f"{otherwise}"
         try:
@@ -44,7 +44,7 @@ class Changes:
             ) from None
 
     def child(self, name: str) -> "Changes":
-        """Changes to the child called `name`, which must be an element of its own."""
+        """Return changes of the child called `name`, which must be an element of its own."""
         child = self._child_named(name)
         if child is None or child.tag == "ref":
             raise SceneError(
@@ -54,7 +54,7 @@ class Changes:
         return Changes(self.xml, child)
 
     def _child_named(self, name: str) -> Element | None:
-        """The child of that name, or None if there is certainly none."""
+        """Return the child of that name, or None if there is certainly none."""
         child = self.element.child_named(name)
         unknown = next((c for c in self.element.children if "$" in c.name), None)
         if child is None and unknown is not None:
@@ -71,7 +71,7 @@ class Changes:
         return f"<{self.element.tag}> {id_or_name!r}"
 
     def finish(self) -> None:
-        """Hand the insertions on; call once, last."""
+        """Hand on the insertions; call once, last."""
         if self._missing:
             self.xml.insert_first(self.element, self._missing)
 
@@ -108,7 +108,7 @@ def _scale_image(
     changes: Changes, scene: Scene, emitter: Emitter, parameter: str, rgb: RGB, stem: str
 ) -> dict[str, Floats]:
     """Scale the image of `emitter` by `rgb` and refer to the result."""
-    # The number keeps apart what a file name cannot: names differ in any character.
+    # The number separates emitters whose names give the same file name.
     safe = re.sub(r"[^\w-]+", "_", emitter.name)
     name = f"{stem}.{scene.emitters.index(emitter)}.{safe}.exr"
     holder = changes if emitter.plugin == "envmap" else changes.child(parameter)

@@ -1,4 +1,4 @@
-"""The forms in which an answer goes elsewhere, by one word each: what each needs, and its text."""
+"""The forms in which an answer goes to other programs: their requirements, and their texts."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from lightpaint.relit.xml_patch import emitters_of, scene_patch
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
-#: Name of the file in each form, of a scene and of light groups; None where there is no such thing.
+#: Name of the file in each form, for a scene and for light groups; None if there is none.
 FORMS: dict[str, tuple[str | None, str | None]] = {
     "csv": ("fixtures.csv", "fixtures.csv"),
     "json": ("fixtures.json", "fixtures.json"),
@@ -32,9 +32,9 @@ FORMS: dict[str, tuple[str | None, str | None]] = {
 
 @dataclass(frozen=True)
 class Source:
-    """The origin of a lighting: a scene, light groups, or none of them is known.
+    """The origin of a lighting: a scene, light groups, or neither.
 
-    stage: of USD, whose lights have the names of the scene's.
+    stage: of USD, with lights of the scene's names.
     """
 
     scene: Scene | None = None
@@ -43,7 +43,7 @@ class Source:
 
     @property
     def files(self) -> list[Path]:
-        """That it was read from."""
+        """The files that the source was read from."""
         files = [] if self.stage is None else [self.stage]
         if self.scene is not None:
             files += self.scene.read_files
@@ -51,9 +51,9 @@ class Source:
 
 
 def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
-    """The name of the file of each form, checked for what it needs.
+    """Return the name of the file of each form, after checking its requirements.
 
-    Raises LightpaintError for a form that there is none of, or that lacks something.
+    Raises LightpaintError for an unknown form, or one whose requirements are not met.
     """
     names = {}
     for form in forms:
@@ -79,13 +79,12 @@ def names_of_forms(forms: Iterable[str], source: Source) -> dict[str, str]:
 def writers_of(
     names: Mapping[str, str], lighting: Lighting, source: Source, folder: Path, listen: Listener
 ) -> tuple[dict[str, Callable[[], str]], str]:
-    """Return what makes the text of each file, by its name, and a remark; "" where there is none.
+    """Return a function for the text of each file, by its name, and a remark; "" without one.
 
-    names: of the files, by form, as of `names_of_forms`. folder: where they are to lie. listen:
-    hears what a form leaves out. Mitsuba gets the lighting itself, other programs what `_exported`
-    makes of it.
+    names: of the files, by form, from `names_of_forms`. folder: of the files. listen: hears what a
+    form leaves out. Mitsuba gets the lighting itself, other programs the result of `_exported`.
 
-    Raises LightpaintError where the lighting is of something else.
+    Raises LightpaintError if the lighting belongs to another source.
     """
     elsewhere, remark = lighting, ""
     if set(names) != {"mitsuba"}:
@@ -97,10 +96,10 @@ def writers_of(
 
 
 def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
-    """Return the lighting as other programs get it: what cannot be told keeps its own colour.
+    """Return the lighting for other programs, in which undetermined lights keep their own colour.
 
-    And what is to be said of that; "" where nothing is. Raises LightingError for a lighting of
-    another scene.
+    Also returns a remark on that; "" without one. Raises LightingError for a lighting of another
+    scene.
     """
     if source.scene is None:
         return lighting, ""
@@ -117,7 +116,7 @@ def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
 def _writer_of(
     form: str, lighting: Lighting, source: Source, folder: Path, listen: Listener
 ) -> Callable[[], str]:
-    """Return what makes the text of one form; arguments as of `writers_of`."""
+    """Return a function for the text of one form; for the arguments see `writers_of`."""
     if form in ("csv", "json"):
         return lambda: (fixtures_csv if form == "csv" else fixtures_json)(lighting)
     if source.light_groups is not None:
@@ -144,7 +143,7 @@ def _writer_of(
 def _of_groups(
     form: str, lighting: Lighting, groups: LightGroups, folder: Path, listen: Listener
 ) -> Callable[[], str]:
-    """Return the same, of light groups."""
+    """Return the same for light groups."""
     lighting.weights_for(groups.basis)
     if form == "blender":
         return lambda: blender_script(groups, lighting)

@@ -1,4 +1,4 @@
-"""Writing a lighting back into the user's own scene XML.
+"""Writes a lighting into the user's own scene XML.
 
 The original text is edited, not written anew, so that comments, includes and defaults
 survive and a diff shows the lights and nothing else.
@@ -25,7 +25,7 @@ from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names
 
-#: A parameter in Mitsuba's list of those that nothing uses.
+#: A parameter in Mitsuba's list of unused ones.
 UNUSED = re.compile(r"- \$(\w+)=")
 
 
@@ -44,13 +44,13 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     keeps are not touched. In the scene returned every emitter is a light.
 
     Args:
-        scene: What the lighting is for.
-        lighting: Of all its emitters.
+        scene: The scene of the lighting.
+        lighting: A setting for all its emitters.
         path: XML to write.
 
     Raises:
         LightingError: If the two name different emitters.
-        SceneError: Where the XML cannot express the answer.
+        SceneError: If the XML cannot express the answer.
         OutputError: If `path` cannot be written.
 
     Examples:
@@ -70,7 +70,7 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
     taken = {emitter.name: emitter.emission for emitter in relit.emitters}
     for emitter, wanted in settings_of(scene, lighting.emission):
         if emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
-            continue  # as authored means something else there
+            continue  # a factor of 1 means as authored there
         if not np.array_equal(
             np.asarray(wanted, np.float32), np.asarray(taken[emitter.name], np.float32)
         ):
@@ -79,9 +79,9 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
 
 
 def _loaded(path: Path, scene: Scene) -> Scene:
-    """Load what was written of `scene`, with those of its parameters that something asks for.
+    """Load a written scene with those of the parameters that it still uses.
 
-    What lights alone asked for nothing does now, and Mitsuba refuses a value that is not used.
+    Parameters that only lights used have no use now, and Mitsuba refuses a value without use.
     """
     left = dict(scene.parameters)
     while True:
@@ -95,10 +95,10 @@ def _loaded(path: Path, scene: Scene) -> Scene:
 
 
 def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
-    """Make the relit XML at `path` right for `home`, where it is to be moved, with all beside it.
+    """Make the relit XML at `path` right for its later place `home`, with all beside it.
 
-    Only relative paths change, and only where the two do not have the same place among folders.
-    Returns whether they do.
+    Only relative paths change, and only if the two have different places among folders. Returns
+    whether anything changed.
     """
 
     def ways(to: Path) -> list[str]:
@@ -114,11 +114,11 @@ def settle(scene: Scene, lighting: Lighting, path: Path, home: Path) -> bool:
 
 
 def check_relightable(scene: Scene, path: Path) -> list[Path]:
-    """Raise what `relight` would raise for some lighting, before a render is paid for.
+    """Raise the errors that `relight` would raise for some lighting, before a costly render.
 
-    Returns the files that it would write at most.
+    Returns all files that it might write.
 
-    The probe is a colour that no light has, so that every light needs all it may need.
+    The probe is a colour that no light has, so that every light takes its most demanding change.
     """
     probe: dict[str, RGB] = {
         light.name: (0.5, 0.5, 0.5) if light.is_scalar else (0.5, 0.25, 0.125)
@@ -129,7 +129,7 @@ def check_relightable(scene: Scene, path: Path) -> list[Path]:
 
 
 def scene_of(scene: Scene, lighting: Lighting) -> Scene:
-    """`scene` with its emitters tied as `lighting` ties them.
+    """Return `scene` with its emitters tied as `lighting` ties them.
 
     Raises LightingError unless it names exactly the emitters of `scene`, and gives each light
     in the unit that the scene has it in.
@@ -164,7 +164,7 @@ def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emi
 class _Edits:
     """The changes in one file: the settings of the emitters in it, by byte offset.
 
-    integrators: what is put in the place of elements, by byte offset; at None, what is added.
+    integrators: the replacements of elements, by byte offset; at None, an addition.
     """
 
     original: Path
@@ -175,9 +175,9 @@ class _Edits:
 def relit_files(
     scene: Scene, emission: Mapping[str, RGB], path: Path
 ) -> dict[Path, bytes | Floats]:
-    """Content of the relit XML at `path`, and of the includes and images it needs beside it.
+    """Return the content of the relit XML at `path`, and of its includes and images.
 
-    Raises OutputError if one of them would take the place of a file of the scene itself.
+    Raises OutputError if one of them would replace a file of the scene itself.
     """
     root = scene.files[0]
     edits = {root.resolve(): _Edits(root)}
@@ -217,7 +217,7 @@ def relit_files(
 
 
 def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
-    """Have the integrator that the scene was loaded with written in the place of its own."""
+    """Add edits that replace the scene's own integrator by the one that it was loaded with."""
     if scene.instead is None:
         return
     text = scene.instead.xml
@@ -237,9 +237,9 @@ def _included_twice(file: Path, one: Emitter, other: Emitter) -> SceneError:
 
 
 def _sampling_weight(emitter: Emitter, rgb: RGB, sampled: bool) -> float | None:
-    """The sampling weight to write, or None to leave it as it is.
+    """Return the sampling weight to write, or None to leave it as it is.
 
-    sampled: whether any other emitter is: Mitsuba refuses a scene in which none may be.
+    sampled: whether any emitter is sampled: Mitsuba refuses a scene in which none may be.
     """
     if any(rgb) and not (emitter.by_chance and sampled):
         return 1.0 if emitter.sampling_weight == 0 else None
@@ -247,7 +247,7 @@ def _sampling_weight(emitter: Emitter, rgb: RGB, sampled: bool) -> float | None:
 
 
 def _place_of_include(file: Path, root: Path) -> Path:
-    """Where the edited copy must lie, relative to relit.xml, to be found first."""
+    """Return the path of an edited copy, relative to relit.xml, at which Mitsuba finds it first."""
     try:
         return file.resolve().relative_to(root.resolve().parent)
     except ValueError:
@@ -258,9 +258,9 @@ def _place_of_include(file: Path, root: Path) -> Path:
 
 
 def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, dict[str, Floats]]:
-    """The edited XML, to be written into `folder`, and the images it refers to, by name.
+    """Return the edited XML for `folder`, and the images that it refers to, by name.
 
-    stem: what the names of the images begin with.
+    stem: the beginning of image names.
     """
     xml = XmlFile(edit.original)
     if xml.root.tag == "scene":

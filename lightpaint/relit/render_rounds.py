@@ -1,4 +1,4 @@
-"""Rendering the scene as solved, to improve the answer by what that shows."""
+"""Renders of the solved scene that improve the answer."""
 
 import tempfile
 from collections.abc import Sequence
@@ -24,7 +24,8 @@ def refine_by_rendering(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Solution:
-    """`rounds` times: render the scene under the solution's lighting and take a Newton step.
+    """Repeat `rounds` times: render the scene under the solution's lighting and take a
+    Newton step.
 
     views: scene and basis of each view; the solution is of all of them. spp: samples per pixel
     of each render, on the film of the basis; as many as the basis has by default. Every round
@@ -50,7 +51,7 @@ def _mixed(
     label: str,
     progress: Progress,
 ) -> Estimate:
-    """One view of the scene as solved, of the size of its basis."""
+    """Render one view of the solved scene, of the size of its basis."""
     height, width = basis.size
     with tempfile.TemporaryDirectory(prefix="lightpaint-") as folder:
         relit = relight(scene, solution.lighting, Path(folder) / "relit.xml")

@@ -1,20 +1,20 @@
-"""How much of a render a verification is: by default as many samples as its basis has, at most."""
+"""The budget of a verification: by default at most as many samples as its basis has."""
 
 from dataclasses import dataclass
 
 from lightpaint.images.pixel_blocks import Size, whole_factor
 from lightpaint.scene.scene import Scene
 
-#: Samples per pixel of a verification, at least: with fewer, a smaller film serves as well.
+#: Least samples per pixel of a verification: with fewer, a smaller film serves as well.
 FEWEST = 4
 
 
 @dataclass(frozen=True)
 class VerificationBudget:
-    """A verification that is to be rendered.
+    """The size and the samples of a verification.
 
-    scene: relit, on the film that it is rendered on. spp: samples per pixel. share: of the samples
-    that the basis has.
+    scene: relit, on the film of the render. spp: samples per pixel. share: of the samples of the
+    basis.
     """
 
     scene: Scene
@@ -30,16 +30,16 @@ def verification_budget(
     most_spp: int | None = None,
     asked_spp: int | None = None,
 ) -> VerificationBudget:
-    """Return the verification of `relit` that takes no longer than its basis, or the one asked for.
+    """Return a verification of `relit` that takes no longer than its basis, or the requested one.
 
-    The samples of the basis are spread over the whole film, or over the largest one of whole blocks
-    that has FEWEST in each pixel; what is compared are means over blocks of the basis, so neither
-    sees more. A sample costs no more in an ordinary render than in a basis. Two halves of a film
-    that no blocks fit into take two samples in each of its pixels at least, whatever the basis has.
+    The samples of the basis go to the whole film, or to the largest one of whole blocks with FEWEST
+    in each pixel; the comparison is of means over blocks of the basis, so that both are equal. A
+    sample costs no more in an ordinary render than in a basis. A film that no blocks fit into takes
+    at least two samples in each pixel, for two halves, whatever the basis has.
 
-    basis_size: (height, width); basis_spp: samples per pixel. most_spp: samples per
-    pixel, at most, where no number is asked for. asked_spp: samples per pixel of the whole film,
-    whatever they cost.
+    basis_size: (height, width); basis_spp: samples per pixel. most_spp: the most
+    samples per pixel, without asked_spp. asked_spp: samples per pixel of the whole film, whatever
+    they cost.
     """
     samples = basis_spp * basis_size[0] * basis_size[1]
     whole = relit.size[0] * relit.size[1]
@@ -50,7 +50,7 @@ def verification_budget(
         if factor % part:
             continue
         scene = relit if part == 1 else relit.reduced(f"1/{part}")
-        # A block that is no pixel of Mitsuba's film costs a sample in each of its pixels.
+        # A block that is not a pixel of Mitsuba's film costs a sample in each of its pixels.
         saves = scene.film.block == relit.film.block
         if part < factor and not (saves and whole_factor(scene.size, basis_size) == factor // part):
             continue
@@ -58,7 +58,7 @@ def verification_budget(
         spp = samples // pixels
         if spp >= FEWEST or part == factor:
             spp = max(2, spp if most_spp is None else min(spp, most_spp))
-            # As many in each pixel of a block, for either half.
+            # The same number in each pixel of a block, for either half.
             spp = max(spp, 2 * scene.film.block_pixels)
             return VerificationBudget(scene, spp, spp * pixels / samples)
     raise AssertionError("the last factor is always taken")

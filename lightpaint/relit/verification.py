@@ -1,4 +1,4 @@
-"""Prediction against an independent render, judged by the noise of both.
+"""The comparison of a prediction with an independent render, relative to the noise of both.
 
 The predicted image Σ w_i Φ_i and the render of the relit scene estimate the same picture
 from different samples. They differ by noise; if they differ by more, something is wrong,
@@ -19,39 +19,39 @@ from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.screen import Shown
 
-#: Side of the blocks of pixels over which differences are averaged before they are judged.
+#: Side of the blocks of pixels over which differences are averaged before the tests.
 BLOCK = 8
 #: Standard errors at which a difference counts as real: far enough out that sound renders
 #: pass thousands of times in a row.
 LIMIT = 5.0
 
-#: Power below which an error would rather not have been seen.
+#: Power below which an error would probably not have been detected.
 LOW_POWER = 0.5
 
-#: Relative round-off of float32 sums, below which a difference is no news.
+#: Relative round-off of float32 sums, below which a difference means nothing.
 PRECISION = 1e-5
 
 
 @keywords()
 @dataclass(frozen=True)
 class Verification(Shown):
-    """How far prediction and verification are apart.
+    """The difference between prediction and verification.
 
     Attributes:
-        verified: The independent render. Where pixels of the prediction are blocks of its own, all
-            else is about its block means, at the size (h, w) of the prediction.
+        verified: The independent render. If pixels of the prediction are blocks of its own, all
+            else refers to its block means, at the size (h, w) of the prediction.
         z: (h, w, 3), difference per pixel in standard errors, the noise pooled over neighbours.
         z_rms: Root mean square of the differences of 8x8 blocks in their own standard errors. About
             1 if there is only noise; a little more where the noise is rare bright samples.
         z_mean: (3,), difference of the whole image's sum, in standard errors.
-        z_pattern: How alike the differences of the two halves are, block by block, in standard
-            errors (see `_pattern`): noise is not alike, an error in some place is.
+        z_pattern: The correlation of the differences of the two halves, block by block, in standard
+            errors (see `_pattern`): noise has none, a local error has.
         rmse: Of the pixels, in radiance.
-        noise_rmse: What noise alone would give.
+        noise_rmse: The same for noise alone.
         delta_e_mean: CIEDE2000 at an exposure metered on the render, mean.
         delta_e_95: The same, 95th percentile.
-        power: By light that shines, the probability that this render would have disagreed, had the
-            light been 5 % off (detection_power.py); None where nobody asked what each light does.
+        power: For each light that shines, the probability that this render would have disagreed
+            with an error of 5 % in it (detection_power.py); None if not computed.
         limit: Standard errors at which a difference counts as real; farther out where the render
             was looked at several times before its end, so that sound renders pass as often.
         spp: Samples per pixel that were rendered; None where that is not known.
@@ -86,26 +86,27 @@ class Verification(Shown):
 
     @property
     def difference(self) -> float:
-        """The most telling difference in standard errors, to be held against `limit`."""
+        """The largest of the differences in standard errors, for comparison with LIMIT."""
         return max(*map(abs, self.z_mean), self.z_pattern)
 
     @property
     def agrees(self) -> bool:
-        """Whether the difference can be noise alone."""
+        """True if the difference can be noise alone."""
         return self.difference <= self.limit
 
     @property
     def unseen(self) -> tuple[str, ...]:
-        """Lights in which an error of 5 % would rather not have been seen, the least seen first."""
+        """Lights in which an error of 5 % would probably not have been detected, the least
+        first."""
         power = self.power or {}
         return tuple(sorted((x for x in power if power[x] < LOW_POWER), key=power.__getitem__))
 
 
 def compare(predicted: Estimate, verified: Estimate) -> Verification:
-    """Judge the difference of two independent estimates of one picture.
+    """Test the difference of two independent estimates of one picture.
 
-    verified: of the size of `predicted`, or with a block of pixels for each of its. Raises
-    SizeError else.
+    verified: of the size of `predicted`, or with a block of pixels for each pixel of it. Raises
+    SizeError otherwise.
     """
     factor = whole_factor(verified.size, predicted.size)
     if factor is None:
@@ -144,25 +145,25 @@ def noise_of(predicted: Estimate, verified: Estimate) -> tuple[Doubles, Doubles]
     """Return the variance of the difference and the brightness of both, (h, w, 3) each."""
     squares = np.square(predicted.half_difference, dtype=np.float64)
     squares += np.square(verified.half_difference, dtype=np.float64)
-    # Round-off is noise too; it keeps 0/0 out where nothing was ever lit.
+    # Round-off is noise, too; it avoids 0/0 where no light falls.
     magnitude = np.abs(predicted.image).astype(np.float64) + np.abs(verified.image)
     squares += np.square(PRECISION * magnitude) + np.finfo(np.float32).tiny
     return squares, magnitude
 
 
 def brightness_weights(magnitude: Floats) -> Doubles:
-    """Return by how much each block counts in the pattern, (rows, columns): bright ones less."""
+    """Return the weight of each block in the pattern, (rows, columns): bright ones count less."""
     brightness = block_sums(magnitude.sum(axis=-1, dtype=np.float64))
     typical = brightness.mean()
     return np.square(typical / (brightness + typical)) if typical > 0 else np.ones_like(brightness)
 
 
 def _pattern(predicted: Estimate, verified: Estimate, squares: Floats, magnitude: Floats) -> float:
-    """Σ_blocks d_A d_B over its standard error, d_A and d_B the differences of the halves.
+    """Return Σ_blocks d_A d_B over its standard error, d_A and d_B the differences of the halves.
 
-    The halves A and B of both images are independent, so noise of any distribution makes
-    the sum 0 on average, and whatever is truly different adds its square. Blocks count
-    relative to their brightness. squares: variance per pixel; magnitude: brightness.
+    The halves A and B of both images are independent, so noise of any distribution makes the sum 0
+    on average, and a true difference adds its square. Blocks count relative to their brightness.
+    squares: variance per pixel; magnitude: brightness.
     """
     difference = predicted.image.astype(np.float64) - verified.image
     half = predicted.half_difference.astype(np.float64) - verified.half_difference
@@ -174,7 +175,8 @@ def _pattern(predicted: Estimate, verified: Estimate, squares: Floats, magnitude
 
 
 def block_sums(image: Floats) -> Floats:
-    """Sums over whole blocks of BLOCK x BLOCK pixels; the ragged border joins the last ones."""
+    """Return sums over whole blocks of BLOCK x BLOCK pixels; the ragged border joins the last
+    ones."""
     rows = np.arange(0, max(image.shape[0] - BLOCK + 1, 1), BLOCK)
     columns = np.arange(0, max(image.shape[1] - BLOCK + 1, 1), BLOCK)
     return np.add.reduceat(np.add.reduceat(image, rows, axis=0), columns, axis=1)

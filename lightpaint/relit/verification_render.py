@@ -1,4 +1,4 @@
-"""The independent render of the relit scene, held against the prediction."""
+"""The independent render of the relit scene, compared with the prediction."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def verify(
 
     Args:
         predicted: Of the size of `relit`, or on a reduced film of it.
-        relit: What `relight` returns.
+        relit: The result of `relight`.
         spp: Samples per pixel of `relit` (the scene's own number by default).
         seed: Any number >= 0.
         stream: Random numbers to draw; a repeated verification takes others than the first.

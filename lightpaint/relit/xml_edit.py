@@ -1,4 +1,4 @@
-"""Changing a few elements of an XML file and nothing else.
+"""Edits of a few elements of an XML file that leave the rest as it is.
 
 Positions are byte offsets into the UTF-8 form of the text (see scene/checks/tokens.py); the file's
 own encoding comes back when it is written.
@@ -15,7 +15,7 @@ from lightpaint.scene.checks.tokens import attributes, decoded, encoding_of, lin
 
 @dataclass
 class Element:
-    """An element of the file: where its tags are and what stands directly in it.
+    """An element of the file: the places of its tags, and its children.
 
     name: of the property that it is, in snake_case also where an old scene writes camelCase;
     start: of its `<`; inner: just behind its start tag; end: just behind the whole element.
@@ -31,16 +31,16 @@ class Element:
 
     @property
     def is_empty_tag(self) -> bool:
-        """Written as `<tag/>`."""
+        """True if it is written as `<tag/>`."""
         return self.end == self.inner
 
     def child_named(self, name: str) -> "Element | None":
-        """The child of that name, in snake_case."""
+        """Return the child of that name, in snake_case."""
         return next((c for c in self.children if c.name == name), None)
 
 
 class XmlFile:
-    """The text of an XML file, and the edits to be made in it.
+    """The text of an XML file, and the edits to make in it.
 
     Raises SceneError if it is not there any more, or if a tag cannot be read, lacks its end or is
     closed by another's.
@@ -66,7 +66,7 @@ class XmlFile:
         self._edits: list[tuple[int, int, bytes]] = []
 
     def element_at(self, offset: int) -> Element:
-        """The element whose `<` stands at `offset`."""
+        """Return the element whose `<` is at `offset`."""
         try:
             return self._elements[offset]
         except KeyError:
@@ -75,7 +75,7 @@ class XmlFile:
             ) from None
 
     def place_of(self, element: Element) -> str:
-        """File and line, for error messages."""
+        """Return file and line, for error messages."""
         return f"{self._path}, line {line_of(self.text, element.start)}"
 
     def replace(self, element: Element, text: str) -> None:
@@ -102,19 +102,19 @@ class XmlFile:
         self._edits.append((element.inner, element.inner, body.encode()))
 
     def edited(self) -> bytes:
-        """The whole file with all edits made, in its own encoding."""
+        """Return the whole file with all edits made, in its own encoding."""
         text = self.text
-        # From the back, and what is replaced before what is inserted in front of it.
+        # From the back; replacements before insertions in front of them.
         for start, end, new in sorted(self._edits, key=lambda e: e[:2], reverse=True):
             text = text[:start] + new + text[end:]
         if self._encoding == "utf-8":
             return text
-        # What the encoding lacks is written as a character reference, which XML allows.
+        # Characters that the encoding lacks become character references, which XML allows.
         return text.decode("utf-8").encode(self._encoding, "xmlcharrefreplace")
 
 
 def tag(element: str, /, **attributes: str) -> str:
-    """An empty element, its attributes escaped.
+    """Return an empty element, with its attributes escaped.
 
     Raises SceneError if one holds a `$`, which cannot be escaped.
     """
@@ -132,7 +132,8 @@ def tag(element: str, /, **attributes: str) -> str:
 
 
 def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
-    """(root, all elements by offset). What comes behind the root is not looked at.
+    """Return (root, all elements by offset). Text behind the root is ignored. What comes behind the
+    root is not looked at.
 
     Raises ValueError, with the line, if the tags do not match.
     """
@@ -172,13 +173,13 @@ def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
 
 
 def _is_old(version: str) -> bool:
-    """Whether Mitsuba turns camelCase names into snake_case in a file of that version."""
+    """Return whether Mitsuba turns camelCase names into snake_case in a file of that version."""
     major = re.match(r"\s*(\d+)", version)
     return major is not None and int(major[1]) < 2
 
 
 def _snake_case(name: str) -> str:
-    """The rule of Mitsuba: only capitals right behind a small letter begin a word."""
+    """Return a name by Mitsuba's rule: only capitals right behind a small letter begin a word."""
     return re.sub(r"([a-z])([A-Z]+)", lambda m: f"{m[1]}_{m[2].lower()}", name)
 
 

@@ -1,4 +1,4 @@
-"""A lighting as a patch of the scene's own XML, for `patch` and for who reads what changes."""
+"""A lighting as a patch of the scene's own XML, for `patch` and for people who read the changes."""
 
 import difflib
 import os
@@ -14,16 +14,16 @@ from lightpaint.scene.lights.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene
 
-#: A folder that is not there, and stands for wherever the relit scene might be.
+#: A folder that does not exist, and stands for any place of the relit scene.
 ELSEWHERE = ".lightpaint-patch"
 
 
 def scene_patch(scene: Scene, lighting: Lighting) -> str:
-    """A unified diff of the scene's files, from its folder, in which only the lights change.
+    """Return a unified diff of the scene's files, from its folder, in which only the lights change.
 
     `patch -p1 < relit.patch` in the folder of the scene applies it.
 
-    Raises SceneError where images are scaled, which no patch of text can hold; LightingError if the
+    Raises SceneError for scaled images, which no patch of text can contain; LightingError if the
     two name different emitters.
     """
     scene = scene_of(scene, lighting)
@@ -41,7 +41,7 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
             old = (root.parent / name).read_text(encoding="utf-8")
         except OSError as error:
             raise OutputError(f"cannot read {name}: {error.strerror or error}") from error
-        # Where it stays, it finds its meshes as before.
+        # A file that stays in its folder finds its meshes as before.
         origin = os.path.relpath((root.parent / name).parent, file.parent)
         gone = r"\r?\n[ \t]*" + re.escape(tag("path", value=Path(origin).as_posix()))
         new = re.sub(gone, "", content.decode("utf-8"), count=1)
@@ -50,9 +50,9 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
 
 
 def emitters_of(scene: Scene, lighting: Lighting) -> list[tuple[str, str, RGB]]:
-    """Name, Mitsuba's parameter and emission of every emitter that is adjusted.
+    """Return name, Mitsuba's parameter and emission of every adjusted emitter.
 
-    The parameter is "" where the emission is a multiple of what the scene has, as of a sky.
+    The parameter is "" if the emission is a multiple of the scene's, as for a sky.
     """
     tied = scene_of(scene, lighting)
     return [
@@ -67,7 +67,7 @@ def _quantity(emitter: Emitter) -> str:
 
 
 def _lines(text: str) -> list[str]:
-    """Lines with their ends, the last one as the others."""
+    """Return lines with their ends, the last one like the others."""
     lines = text.splitlines(keepends=True)
     if lines and not lines[-1].endswith("\n"):
         lines[-1] += "\n"

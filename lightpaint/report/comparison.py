@@ -35,7 +35,7 @@ SURROUND, TEXT, FAINT = (38, 38, 38), (230, 230, 230), (165, 165, 165)
 
 @dataclass(frozen=True)
 class Tile:
-    """One of the pictures, (h, w, 3) in display values, with the texts below it.
+    """A picture of the comparison, (h, w, 3) in display values, with the texts below it.
 
     limit: end of its false-colour scale, drawn as a bar, if it has one.
     """

@@ -1,1 +1,1 @@
-"""What does the artist want, and where does it matter? A painted EXR becomes a `Target`."""
+"""The room of targets: a painted EXR becomes a `Target`, an image with importance."""

@@ -1,7 +1,7 @@
-"""Whether a picture was painted over a look that is known, and through which view it shows it.
+"""The view through which a picture was painted over a known look, if it was.
 
-A picture that another program made of its light says nothing of the view. But most of a painting
-is not painted: there it is the look itself, through one view, to the rounding of its file.
+A picture that another program made of its light does not tell the view. But most of a painting is
+unpainted: there it is the look itself, through one view, up to the rounding of its file.
 """
 
 from collections.abc import Iterator
@@ -16,14 +16,14 @@ from lightpaint.colour.display.view_transform import TransformChoice, ViewTransf
 from lightpaint.images.picture import Picture
 from lightpaint.target.painted_pixels import LOSSY, ROUNDING, compressed_like, lossy_difference
 
-#: Share of what can tell that has to be the look itself.
+#: Share of the telling pixels that have to be the look itself.
 MOST = 0.5
 
-#: Display values of what can tell: between black and white, where many pictures are alike; and
-#: how much of a picture that has to be.
+#: Display values of telling pixels: between black and white, where many pictures are alike; and the
+#: least share of such pixels in a picture.
 TELLING, ENOUGH = (0.04, 0.96), 0.01
 
-#: Stops that are one exposure, but for the rounding of a file.
+#: Stops within which exposures are equal up to the rounding of a file.
 BIN = 0.04
 
 
@@ -32,9 +32,9 @@ def view_of_look(
 ) -> ViewTransform | None:
     """Return the view through which most of `picture` is `look`; None if most of it is not.
 
-    path: the file of the picture. look: (h, w, 3) linear. asked: what somebody said of the view,
-    which holds; the rest is sought, the exposure too. A file that holds light was seen through
-    none, and is compared as sRGB shows it.
+    path: the file of the picture. look: (h, w, 3) linear. asked: the part of
+    the view that is given; the rest is searched, the exposure, too. A file that holds light has no
+    view, and is compared in sRGB.
     """
     if picture.size != look.shape[:2]:
         return None
@@ -48,19 +48,19 @@ def view_of_look(
 
 
 def _plausible(display: Floats, look: Floats, asked: TransformChoice) -> Iterator[ViewTransform]:
-    """Views, each at the exposure that brings the look to most of what is displayed."""
+    """Yield views, each at the exposure that maps the look to most of the display values."""
     for name in [asked.name] if asked.name is not None else [n for n in BUILT_IN if n != "linear"]:
         view = TransformChoice(name, asked.stops or 0.0).over(None)
         yield view
         if asked.stops is None:
             stops = _stops_between(view, display, look)
-            # Somebody chose a round number.
+            # People choose round numbers.
             for digits in (1, 2, 4):
                 yield ViewTransform(view.name, round(stops, digits))
 
 
 def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
-    """Return the exposure at which that view shows most of `look` as displayed, about."""
+    """Return the approximate exposure at which that view shows most of `look` as displayed."""
     light, there = luminance(view.decode(display)), luminance(look)
     low, high = TELLING
     known = (display > low).all(axis=-1) & (display < high).all(axis=-1)
@@ -68,7 +68,7 @@ def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
     if not known.any():
         return 0.0
     stops = np.log2(light[known] / there[known])
-    # What was not painted has one exposure, which is the commonest, and paint has many.
+    # Unpainted pixels share the most common exposure; paint has many.
     counts = np.bincount(np.floor((stops - stops.min()) / BIN).astype(np.intp))
     around = np.convolve(counts, [1, 1, 1], "same")
     commonest = stops.min() + BIN * (np.argmax(around) + 0.5)
@@ -76,7 +76,7 @@ def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
 
 
 def _agreement(path: Path, picture: Picture, display: Floats, shown: Floats) -> tuple[float, float]:
-    """Return the share of what can tell that is the same, and how near it is, to be greatest.
+    """Return the share of telling pixels that are the same, and their closeness; larger is better.
 
     display, shown: (h, w, 3), display values of the picture and of the look.
     """
@@ -91,5 +91,5 @@ def _agreement(path: Path, picture: Picture, display: Floats, shown: Floats) -> 
     is_same = off[tells] <= tolerance
     if not is_same.any():
         return 0.0, 0.0
-    # In fiftieths, and tenths of a code: of equals the first is meant.
+    # In fiftieths, and tenths of a code: of equals the first one wins.
     return round(50 * float(is_same.mean())) / 50, -round(2550 * float(off[tells][is_same].mean()))

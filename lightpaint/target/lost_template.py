@@ -1,7 +1,7 @@
-"""Diagnosis of a template of which next to nothing is left: repainted, or converted and moved?
+"""A diagnosis of a painting with hardly any trace of its template: repainted, converted or moved.
 
-Another view or profile makes each colour of the template one other colour, by a smooth function,
-wherever that colour is. Paint does not: it puts different colours on one wall.
+Another view or profile maps each colour of the template to one other colour, by a smooth function.
+Paint does not: it puts different colours on one wall.
 """
 
 from collections.abc import Iterator
@@ -10,16 +10,16 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 
-#: Of the painting's own contrast, what a smooth function of the template's colours may miss of it.
-#: Views and profiles were seen to leave 0.04 at most, and paintings 0.2 at least.
+#: Largest error of a smooth function of the template's colours, relative to the painting's
+#: contrast. Measured: views and profiles leave at most 0.04, paintings at least 0.2.
 SMOOTH = 0.1
 
-#: Pixels that are looked at, evenly spread, and how near to white a display value is cut off.
+#: Sampled pixels, evenly spread, and the display value from which a channel counts as clipped.
 PIXELS, WHITE = 20_000, 0.998
 
 
 def what_became_of(mine: Floats, its: Floats) -> str:
-    """In a clause: what was done to all of the template; empty if it was painted.
+    """Return a clause on what happened to the whole template; empty if it was painted.
 
     mine, its: (h, w, 3), display values of painting and template.
     """
@@ -38,7 +38,7 @@ def what_became_of(mine: Floats, its: Floats) -> str:
 
 
 def _is_function(mine: Floats, its: Floats) -> bool:
-    """Whether `mine` is a smooth function of the colours `its`, but for what is cut off."""
+    """Return whether `mine` is a smooth function of the colours `its`, except where clipped."""
     mine, its = (x.reshape(-1, 3).astype(np.float64) for x in (mine, its))
     known = np.flatnonzero((mine < WHITE).all(axis=-1) & (its < WHITE).all(axis=-1))
     known = known[:: max(1, known.size // PIXELS)]
@@ -65,7 +65,7 @@ def _turned(its: Floats) -> Iterator[tuple[str, Floats]]:
 
 
 def _moved(mine: Floats, its: Floats) -> tuple[int, int]:
-    """By how many pixels (down, right), where phases of the two correlate most."""
+    """Return the shift in pixels (down, right) at which phases of the two correlate most."""
     size = mine.shape[:2]
     one, other = (np.fft.rfft2(x.mean(axis=-1) - x.mean()) for x in (mine, its))
     cross = one * np.conj(other)
@@ -76,7 +76,7 @@ def _moved(mine: Floats, its: Floats) -> tuple[int, int]:
 
 
 def _overlap(mine: Floats, its: Floats, down: int, right: int) -> tuple[Floats, Floats]:
-    """Return the parts that both pictures share if one is moved over the other so."""
+    """Return the parts that both pictures share with one shifted over the other."""
     height, width = mine.shape[0] - abs(down), mine.shape[1] - abs(right)
     top, left = max(down, 0), max(right, 0)
     here = mine[top : top + height, left : left + width]

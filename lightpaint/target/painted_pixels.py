@@ -1,12 +1,12 @@
-"""The painted pixels: where a picture differs from the template it was painted on.
+"""The painted pixels: those in which a picture differs from its template.
 
-A file that comes back from a paint program was rounded to its format, and maybe compressed; all
-that differs by more is paint. Faint paint counts for less, so that a soft brush leaves a soft
-importance.
+A file from a paint program was rounded to its format, and maybe compressed; pixels that differ by
+more are paint. Faint paint counts less, so that a soft brush leaves a soft importance.
 
-What rounding may do is the same for all formats, that of 8 bits. A file does not tell what its
-pixels went through: GIMP writes half floats into a float EXR, and 16-bit PNGs from 8-bit layers;
-profiles are taken off and put on again. And so a painting counts the same in every format.
+The tolerance for rounding is that of 8 bits for all formats. A file does not tell the history of
+its
+pixels: GIMP writes half floats into a float EXR, and 16-bit PNGs from 8-bit layers; profiles are
+converted back and forth. So a painting counts the same in every format.
 """
 
 import io
@@ -26,23 +26,24 @@ from lightpaint.target.template import Template
 #: Difference at which paint counts fully, of the display's range.
 FULL = 0.04
 
-#: Display values by which 8 bits of two programs differ: half a code each, some cut off instead of
-#: rounding, some dither.
+#: Difference in display values between 8 bits of two programs: half a code each; some truncate
+#: instead of rounding, some dither.
 ROUNDING = 1.6 / 255
 
-#: Display values by which a change of light, relative to it, counts where displays show white:
-#: about the slope of display curves there.
+#: Weight of a relative change of light above display white, in display values: about the slope of
+#: display curves there.
 BEYOND_WHITE = 0.44
 
-#: Pixels on either side over which what compressors do differently to single ones averages out,
-#: and what is left of it then; and over how few paint still shows where it is.
+#: Radius in pixels that averages out the differences between compressors, the tolerance after that,
+#: and the radius at which paint is still localised.
 LOSSY_RADIUS, LOSSY, SHARP_RADIUS = 4, 2.5 / 255, 1
 
 
 def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArray[np.float32]:
-    """(h, w) in [0, 1]: 0 where `picture` is `template` but for rounding, 1 where it surely is not.
+    """Return, (h, w) in [0, 1], 0 where `picture` is `template` up to rounding, 1 where it surely
+    is not.
 
-    path: the file of the picture, which says how it was compressed. What that does not store was
+    path: the file of the picture, which tells its compression. Pixels that it does not store were
     not painted. Raises SizeError if the two differ in size.
     """
     if picture.size != template.size:
@@ -61,9 +62,11 @@ def painted_where(path: Path, picture: Picture, template: Template) -> npt.NDArr
 
 
 def _difference(path: Path, picture: Picture, template: Template) -> tuple[Floats, float]:
-    """(h, w), in display values, largest of the channels; and what the file alone makes."""
+    """Return the largest difference of the channels, (h, w), in display values, and the file's own
+    tolerance.
+    """
     if picture.codes is None:
-        # It may have been painted on an EXR, or on the PNG, without what is brighter than white.
+        # Its template may be an EXR, or the PNG, which ends at white.
         looks = [*template.looks, template.transform.decode(template.shown)]
         found = [_difference_of_light(picture, look, template) for look in looks]
         return _closest(found, ROUNDING), ROUNDING
@@ -73,14 +76,16 @@ def _difference(path: Path, picture: Picture, template: Template) -> tuple[Float
 
 
 def _closest(differences: Sequence[Floats], tolerance: float) -> Floats:
-    """Of several looks that it may have been painted on, the one that shows in most pixels."""
+    """Return, of several looks that may be its template, the difference with the most unpainted
+    pixels.
+    """
     return max(differences, key=lambda one: float((one <= tolerance).mean()))
 
 
 def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:
-    """As the painting's own display shows it."""
+    """Return the difference as the painting's own display shows it."""
     transform = picture.transform
-    assert transform is not None  # That of a file of integers is known.
+    assert transform is not None  # A file of integers always has one.
     mine, its = transform.encode(picture.image), transform.encode(look)
     if picture.lossy:
         return lossy_difference(mine, compressed_like(path, its))
@@ -88,7 +93,7 @@ def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:
 
 
 def _difference_of_light(picture: Picture, look: Floats, template: Template) -> Floats:
-    """As a display shows it; and relative, of what is brighter than that."""
+    """Return the difference as a display shows it; beyond white, the relative one."""
     transform = template.transform
     shown = np.abs(transform.encode(picture.image) - transform.encode(look))
     size = np.maximum(np.maximum(np.abs(look), np.abs(picture.image)), transform.white)
@@ -97,7 +102,8 @@ def _difference_of_light(picture: Picture, look: Floats, template: Template) -> 
 
 
 def lossy_difference(mine: Floats, its: Floats) -> Floats:
-    """(h, w), by how much display values (h, w, 3) differ beyond what compressing them does."""
+    """Return the difference of display values (h, w, 3) beyond the effect of compression, (h,
+    w)."""
     rough = np.asarray(mine - its, np.float64)
     near, wide = (
         largest(np.abs(box_mean(rough, radius))) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
@@ -106,7 +112,7 @@ def lossy_difference(mine: Floats, its: Floats) -> Floats:
 
 
 def compressed_like(path: Path, display: Floats) -> Floats:
-    """`display` after the compression that the JPEG at `path` has gone through."""
+    """Return `display` after the compression of the JPEG at `path`."""
     from PIL import Image, JpegImagePlugin
 
     eight = Image.fromarray(to_8_bit(display))
@@ -124,12 +130,12 @@ def compressed_like(path: Path, display: Floats) -> Floats:
 
 
 def _without_pinholes(share: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Single pixels that paint happened to leave as they were are part of what is around them."""
+    """Return the share without holes of single pixels that paint happened to leave as they were."""
     return -_largest_around(-_largest_around(share))
 
 
 def _largest_around(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """Maximum over the pixel and its eight neighbours."""
+    """Return the maximum over each pixel and its eight neighbours."""
     height, width = values.shape
     padded = np.pad(values, 1, mode="edge")
     return np.asarray(

@@ -1,7 +1,7 @@
-"""Our own file of a painting: its light, its importance, and how it was painted.
+"""Our own file of a painting: its light, its importance, and its way of painting.
 
-An EXR says nothing of a display, and of what is not painted only that it does not count. A
-painting that was made here says both, so that it is answered as it was when it was painted.
+An EXR does not tell the display, and marks unpainted pixels only by importance. A painting from
+this program tells both, so that its answer is the same as while it was painted.
 """
 
 import json
@@ -27,7 +27,7 @@ FORMAT: Literal["lightpaint-painting 1"] = "lightpaint-painting 1"
 
 @dataclass(frozen=True)
 class Painted:
-    """How a target was painted, as of `Target`. view, stops: the transform; "" for none."""
+    """The way a target was painted, see `Target`. view, stops: the transform; "" for none."""
 
     format: Literal["lightpaint-painting 1"] = FORMAT
     over_look: bool = False
@@ -37,12 +37,12 @@ class Painted:
 
     @property
     def transform(self) -> ViewTransform | None:
-        """The transform it was seen through."""
+        """The view transform of the painting."""
         return ViewTransform(self.view, self.stops) if self.view else None
 
 
 def write_painting(path: Path, target: Target) -> None:
-    """Write a target as an EXR, from which `read_target` reads the same, to the last bit."""
+    """Write a target as an EXR, from which `read_target` restores it to the last bit."""
     seen = target.transform
     name, stops = ("", 0.0) if seen is None else (seen.name, seen.stops)
     painted = Painted(FORMAT, target.over_look, target.through_view, name, stops)
@@ -53,7 +53,8 @@ def write_painting(path: Path, target: Target) -> None:
 
 
 def painted_of(attributes: Mapping[str, str], path: Path) -> Painted | None:
-    """How the EXR at `path` was painted; None if it says nothing. Raises TargetError."""
+    """Return the way the EXR at `path` was painted; None if it does not tell. Raises
+    TargetError."""
     if KEY not in attributes:
         return None
     try:

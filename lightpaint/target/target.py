@@ -1,4 +1,4 @@
-"""A painting as the solve sees it: linear pixels and how much each of them counts."""
+"""A painting for the solve: linear pixels with the weight of each."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from lightpaint.images.resampling import resampled
 from lightpaint.keywords import keywords
 from lightpaint.screen import Shown
 
-#: By how much more than half one of two shares prevails, beyond the rounding of float32.
+#: Excess over a half from which one of two shares prevails, beyond the rounding of float32.
 TIE = 1e-5
 
 #: Negative luminance that resampling leaves beside bright edges, as a share of the brightest.
@@ -29,24 +29,25 @@ class Target(Shown):
     """The painted image Ψ and its importance D.
 
     Attributes:
-        name: What messages and results call it.
+        name: The name in messages and results.
         image: (h, w, 3) float32, linear Rec.709, finite.
         importance: (h, w) float32 >= 0, the weight of each pixel's squared residual.
-        everything: Whether nobody said what was painted, so that every pixel counts 1.
+        everything: Whether nothing tells what was painted, so that every pixel counts 1.
         not_finite: Number of pixels with NaN or Inf, which have no importance.
-        at_least: (h, w, 3) bool, where the painting was at the top of what its file can say, so
-            that this or anything brighter was meant; None if it can say everything.
-        notes: What a person should know of how it was read, a sentence each.
-        content: Of the scene that it was painted on, where a template says.
-        sensor: Id of the sensor it was painted through, where a template says.
-        transform: What a display showed it through when it was painted; None if nobody knows.
+        at_least: (h, w, 3) bool, where the painting was at the largest value of its file, which
+            means this or anything brighter; None if its file has no such value.
+        notes: Remarks for people on how it was read, a sentence each.
+        content: The identity of the scene that it was painted on, if a template tells.
+        sensor: Id of the sensor it was painted through, if a template tells.
+        transform: The view transform of the display while it was painted; None if unknown.
         through_view: Whether its values are those of a display, and not light.
-        over_look: Whether it was painted over the current look, which what it leaves is to keep.
-        reads_emitters: Whether paint over emitters in view is still to be read: as paint for what
-            they light, or for their glow, where that was painted over the current look.
-        files: That it was read from: the painting first, then mask and template.
-        full_size_share: `painted_share` of the painting as it was read; None where nothing was
-            taken out of it or averaged since.
+        over_look: Whether it was painted over the current look, which unpainted pixels keep.
+        reads_emitters: Whether paint over emitters in view has still to be interpreted: as paint
+        for
+            what they light, or for their glow, if painted over the current look.
+        files: The files that it was read from: the painting first, then mask and template.
+        full_size_share: `painted_share` of the painting as it was read; None if it has not been
+            cropped or averaged since.
 
     Examples:
         >>> image = np.full((16, 16, 3), 0.5)
@@ -107,14 +108,14 @@ class Target(Shown):
     def of(
         cls, image: npt.ArrayLike, importance: npt.ArrayLike | None = None, *, name: str = "target"
     ) -> "Target":
-        """A target from arrays, which are copied as float32.
+        """Make a target of arrays, which are copied as float32.
 
         image: (h, w, 3) floats, linear Rec.709, finite. Single components may be negative, as those
         of colours that Rec.709 lacks; where it counts luminance may not, beyond a thousandth of
         the brightest. importance: (h, w) >= 0, or a mask of bools; without one every pixel counts
-        1. name: what messages and results call it.
+        1. name: the name in messages and results.
 
-        Raises TargetError or SizeError for what is none.
+        Raises TargetError or SizeError for invalid arrays.
         """
         given = np.asarray(image)
         if given.ndim != 3 or given.shape[-1] != 3 or not given.size:
@@ -157,20 +158,22 @@ class Target(Shown):
 
     @property
     def painted_share(self) -> float:
-        """The share of its pixels in which anything was painted, however faintly, 0 to 1.
+        """The share of its pixels with any paint, however faint, 0 to 1.
 
-        Of the painting as it was read: a mean over pixels of which one was painted is painted too,
-        so that a smaller picture would seem to hold more of it.
+        It is that of the painting as it was read: a mean over pixels is painted if one of them is,
+        so that a smaller picture would have a larger share.
         """
         return share_of(self.importance) if self.full_size_share is None else self.full_size_share
 
     @property
     def spoken_share(self) -> str:
-        """`63.7 %`: `painted_share`, in the words that every place has for it."""
+        """`painted_share` in words, like `63.7 %`, the same in all places."""
         return spoken_share(self.painted_share)
 
     def resized(self, size: tuple[int, int]) -> "Target":
-        """Resampled to `size` (height, width), in linear light, weighted by importance."""
+        """Return the target resampled to `size` (height, width), in linear light, weighted by
+        importance.
+        """
         if size == self.size:
             return self
         weighted = np.dstack([self.image * self.importance[..., None], self.importance])
@@ -185,7 +188,7 @@ class Target(Shown):
         )
 
     def cropped(self, height: int, width: int) -> "Target":
-        """Its pixels from the top left corner on."""
+        """Return the pixels from the top left corner on."""
         part = (slice(height), slice(width))
         return replace(
             self,
@@ -196,10 +199,10 @@ class Target(Shown):
         )
 
     def reduced(self, factor: int) -> "Target":
-        """One pixel for each block of factor x factor: their mean, weighted by importance.
+        """Return a pixel for each block of factor x factor: their mean, weighted by importance.
 
-        The importance of a block is the mean of its pixels'. For images that are constant in
-        each block, the squared residual is then the same as before but for a constant.
+        The importance of a block is the mean of its pixels'. For images that are constant
+        in each block, the squared residual is then the same as before up to a constant.
         """
         if factor == 1:
             return self
@@ -215,7 +218,8 @@ class Target(Shown):
         )
 
     def without(self, holes: npt.NDArray[np.bool_]) -> "Target":
-        """This target where the pixels `holes`, (h, w), count nothing: the basis has none there."""
+        """Return the target with importance 0 at the pixels `holes`, (h, w), which the basis
+        lacks."""
         lost = holes & (self.importance > 0)
         if not lost.any():
             return self
@@ -226,12 +230,12 @@ class Target(Shown):
         )
 
     def _at_least(self, mean: Callable[[Floats], Floats]) -> npt.NDArray[np.bool_] | None:
-        """`at_least` of another size, whose pixels are the `mean` of these.
+        """Return `at_least` of another size, whose pixels are the `mean` of these.
 
-        What is brighter than such a mean is as good where most of it means at least, or where it
-        has a part of a patch that does. There the excess lies in the patch: a lamp outshines all
-        that is around it. Single pixels are texture, and what is brighter than the mean exceeds
-        the pixels between them, which say exactly what they mean.
+        Brighter than such a mean is as good if most of its pixels mean "at least", or if it has a
+        part of a patch that does. There the excess lies in the patch: a lamp outshines its
+        surroundings.
+        Single pixels are texture: brighter than their mean exceeds the exact pixels between them.
         """
         if self.at_least is None:
             return None
@@ -242,10 +246,10 @@ class Target(Shown):
         return np.asarray(prevails | (mean(patch.astype(np.float32)) > 0))
 
     def fitted_to(self, size: tuple[int, int], *, resize: bool) -> "Target":
-        """This target at `size` (height, width) of the basis.
+        """Return the target at `size` (height, width) of the basis.
 
-        One that has as many square blocks of pixels is reduced: so is one that was painted at full
-        size, for a basis on a reduced film. Raises SizeError if it has another size and may not be
+        A target with a square block of pixels for each pixel is reduced, like one painted at full
+        size for a basis on a reduced film. Raises SizeError if it has another size and may not be
         resampled.
         """
         if factor := whole_factor(self.size, size):
@@ -265,7 +269,7 @@ class Target(Shown):
 
 
 def _check_is_light(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> None:
-    """Raise TargetError where there would have to be less than no light."""
+    """Raise TargetError for negative luminance."""
     bright = np.where(counts & np.isfinite(image).all(axis=-1), luminance(image), 0)
     least = float(bright.min())
     if least < -NEGATIVE * float(np.abs(bright).max()):
@@ -277,23 +281,23 @@ def _check_is_light(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> 
 
 
 def share_of(importance: Floats) -> float:
-    """The share of the pixels (h, w) in which anything was painted, 0 to 1."""
+    """Return the share of the pixels (h, w) with any paint, 0 to 1."""
     return float((importance > 0).mean())
 
 
 def spoken_share(share: float) -> str:
-    """`63.7 %`: a share of the pixels, to three digits."""
+    """Return a share of the pixels to three digits, like `63.7 %`."""
     return f"{100 * share:.3g} %"
 
 
 def _patches(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """`mask` (h, w, n) without what is less than three pixels wide: its opening by 3 x 3."""
+    """Return `mask` (h, w, n) without parts less than three pixels wide: its opening by 3 x 3."""
     core = ~_around(~mask)
     return _around(core) & mask
 
 
 def _around(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Whether the pixel or one of its eight neighbours is set."""
+    """Return whether each pixel or one of its eight neighbours is set."""
     for axis in (0, 1):
         lines = np.moveaxis(mask, axis, 0)
         grown = lines.copy()

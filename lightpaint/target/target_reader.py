@@ -1,4 +1,4 @@
-"""From files that people paint to targets: what was meant, and where."""
+"""Readers that make targets of painted files: the image, and the pixels that count."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,23 +28,23 @@ from lightpaint.target.template import (
     template_files,
 )
 
-#: What a brush puts down: how the picture is to look, or the light that is to fall there.
+#: The meaning of paint: the look of the picture, or the light that falls there.
 Paint = Literal["look", "light"]
 
-#: Share of the picture beyond which it is asked whether that is paint or a conversion.
+#: Share of the picture from which the difference may be a conversion instead of paint.
 NEARLY_ALL = 0.97
 
-#: Times the light of the brightest parts of the template that no lamp is meant to give, and the
-#: share of the paint that may ask for that without a word.
+#: Ratio to the light of the template's brightest parts that is implausible for lamps, and the share
+#: of the paint that may need that without a remark.
 BEYOND, FEW = 10.0, 0.01
 
 
 @dataclass(frozen=True)
 class _Reading:
-    """What is known on the way.
+    """The state of reading a target.
 
-    template, folder: what it was painted on, if that is known. transform: what it was seen through.
-    look: what messages call a template that has no folder.
+    template, folder: of the painting, if known. transform: the view of the painting. look: the name
+    of a template without folder in messages.
     """
 
     path: Path
@@ -57,7 +57,7 @@ class _Reading:
 
     @property
     def painted_on(self) -> str:
-        """How messages call the template: by the file in it that the painting is like."""
+        """The name of the template in messages: the file in it that the painting resembles."""
         if self.look:
             return self.look
         name = LIGHT if self.picture.codes is None else SHOWN
@@ -77,24 +77,25 @@ def read_target(
 ) -> Target:
     """Read a painting: an EXR in linear light, or a PNG, TIFF, JPEG or layered file.
 
-    What counts is, in this order: `mask`; an EXR's W channel; alpha; where the picture differs from
-    the template it was painted on; without any of them, every pixel alike. Where alpha is 0 no
-    colour was painted, and a mask does not make one.
+    Importance comes from the first of these: `mask`; an EXR's W channel; alpha; the difference from
+    the template it was painted on; without any of them, every pixel counts the same. Pixels of
+    alpha 0 have no colour, which a mask does not change.
 
     Args:
         path: The painting.
-        mask: Picture of what counts, black for nothing.
-        layer: Which layer, part or view of an EXR.
-        transform: What 8 and 16 bits were encoded by. What it leaves open is what `template` says,
-            else the file, else a template that was found for it, else sRGB.
-        template: Folder that `lightpaint template` wrote.
-        find: Whether one is looked for beside the painting if none is given.
+        mask: Picture of the importance, black for pixels that do not count.
+        layer: The layer, part or view of an EXR.
+        transform: The encoding of 8 and 16 bits. Open parts come from `template`, else from the
+        file,
+            else from a template that is found for it, else from sRGB.
+        template: Folder of `lightpaint template`.
+        find: Whether to look for a template beside the painting if none is given.
         paint: `light` takes colours for the light that falls on a surface, and multiplies them by
             its albedo: 1 makes white look like 1 (Schoeneman et al. 1993, section 3).
 
     Raises:
         ImageError: For files that cannot be read.
-        TargetError: For what cannot be solved for.
+        TargetError: For a painting that cannot be solved for.
         SizeError: If target and mask or template differ in size.
 
     Examples:
@@ -129,7 +130,9 @@ def read_over_look(
 
 
 def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint = "look") -> Target:
-    """Find what was painted, and where. Arguments as of `read_target`."""
+    """Find the painted pixels and make a target. For the arguments see `read_target`. Arguments as
+    of `read_target`.
+    """
     picture, made = reading.picture, reading.template
     importance, notes = _importance(reading, mask)
     # Pixels that the file does not store were not painted, whatever a mask says.
@@ -152,7 +155,7 @@ def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint =
         sensor="" if made is None else made.sensor,
         transform=reading.transform,
         through_view=picture.transform is not None or (own is not None and own.through_view),
-        # A layer that was saved alone lay over something; what a mask leaves out does not count.
+        # A layer that was saved alone lay over something. Pixels outside a mask do not count.
         over_look=made is not None
         or (own is not None and own.over_look)
         or (picture.transform is not None and picture.alpha is not None and mask is None),
@@ -173,12 +176,14 @@ def _opened(
     *,
     find: bool,
 ) -> _Reading:
-    """The picture, and the template it was painted on. Arguments as of `read_target`."""
+    """Open the picture, and the template it was painted on. For the arguments see `read_target`.
+    Arguments as of `read_target`.
+    """
     asked, made = TransformChoice.of(transform), None
     notes: tuple[str, ...] = ()
     folder = None if template is None else Path(template)
     if folder is not None:
-        # Whoever names a file in it means the folder.
+        # A file in it stands for the folder.
         folder = folder.parent if folder.is_file() else folder
         made = read_template(folder)
         asked = TransformChoice.of(asked.over(made.transform))
@@ -193,7 +198,7 @@ def _opened(
                 f"{made.size[1]}x{made.size[0]}: give the template it was painted on"
             )
         notes = (f"not compared with {folder / SHOWN}, which has another size",)
-        # It was painted on something else, and so was not shown through its transform either.
+        # The painting has another template, and so another transform.
         made, otherwise = None, None
         picture = read_picture(path, layer=layer, transform=asked)
     own = painted_of(picture.attributes, path)
@@ -204,7 +209,9 @@ def _opened(
 
 
 def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | None, list[str]]:
-    """(h, w), what counts; None if nobody says. And what is to be said of it."""
+    """Return the importance (h, w), None if nothing tells it, and remarks. And what is to be said
+    of it.
+    """
     path, picture, template = reading.path, reading.picture, reading.template
     if mask is not None:
         importance = read_mask(mask)
@@ -220,7 +227,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
         return picture.weight, []
     is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
     if template is None and picture.alpha is None and picture.transform is not None:
-        # Numbers of a display, and nobody said what they mean: a template would know.
+        # Display values without a known meaning, which a template would tell.
         seen = f"{picture.transform.name} at {picture.transform.stops:+g} stops"
         return None, [f"no template is known: all of it counts, as seen through {seen}"]
     if template is None or not is_opaque:
@@ -242,7 +249,7 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
 
 
 def _of_all(picture: Picture, template: Template) -> str:
-    """Say what was done to a template of which little is left, but for painting over it."""
+    """Return a clause on what happened to a template of which little remains, other than paint."""
     transform = picture.transform or template.transform
     mine, its = (transform.encode(x) for x in (picture.image, template.image))
     if picture.lossy:  # which leaves the means of a few pixels as they are
@@ -251,14 +258,14 @@ def _of_all(picture: Picture, template: Template) -> str:
 
 
 def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]:
-    """The look of surfaces under the light that was painted: image and importance."""
+    """Return the look of surfaces under the painted light: image and importance."""
     if reading.template is None or reading.template.albedo is None:
         raise TargetError(
             f"to read {reading.path} as light its template is needed, which knows what surfaces "
             "reflect: give the folder that lightpaint template wrote as template=..."
         )
     albedo = reading.template.albedo
-    # Metals, glass and what is not there reflect no diffuse light: nothing can be said of it.
+    # Metals, glass and the background reflect no diffuse light, which leaves their light open.
     blind = (largest(albedo) <= 0) & (counted > 0)
     seen = np.where(blind, 0, counted)
     if not seen.any():
@@ -269,7 +276,7 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
 
 
 def _beyond(reading: _Reading, counted: Floats) -> list[str]:
-    """Says so where paint asks a surface for a colour that it hardly reflects."""
+    """Return a remark if paint needs a colour that a surface hardly reflects."""
     template = reading.template
     if template is None or template.albedo is None:
         return []
@@ -281,7 +288,7 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     light = np.maximum(reading.picture.image, 0) / albedo
     there = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
     bright = float(np.percentile(there[there_is], 95))
-    # What is nearly black anyway needs little, however it is divided.
+    # Nearly black pixels need little light, whatever the ratio.
     asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.transform.white)
     share = float((asks.any(axis=-1) & painted).sum() / painted.sum())
     if share <= FEW:

@@ -1,4 +1,4 @@
-"""Something to paint on: the current look, what helps to select in it, and what it was made of."""
+"""A template to paint on: the current look, pictures that help with selections, and its origin."""
 
 import json
 import os
@@ -22,7 +22,7 @@ from lightpaint.storage.staging import is_below, staged
 
 FORMAT: Literal["lightpaint-template 1"] = "lightpaint-template 1"
 
-#: The files of a template: what says how it was made, what is painted on, what helps.
+#: The files of a template: its origin, the pictures to paint on, and those that help.
 ABOUT, LIGHT, SHOWN, ALBEDO = "template.json", "template.exr", "template.png", "albedo.exr"
 CLEAN, NORMALS, DEPTH, MATTES, LIGHTS = (
     "clean.exr",
@@ -32,7 +32,7 @@ CLEAN, NORMALS, DEPTH, MATTES, LIGHTS = (
     "lights",
 )
 
-#: Those that are not pictures of single things.
+#: The files that are not pictures of single objects or lights.
 PLAIN = (LIGHT, SHOWN, CLEAN, ALBEDO, NORMALS, DEPTH, ABOUT)
 
 #: Longest template.json that is read, in bytes.
@@ -41,13 +41,13 @@ MAX_ABOUT = 2**20
 
 @dataclass(frozen=True)
 class Template:
-    """The look that is painted over.
+    """The look to paint over.
 
-    image: (h, w, 3) linear Rec.709, as it was rendered. transform: how template.png shows it.
-    scene: name of the file, content: its hash (see `Scene.content`), sensor: what it is seen
-    through. albedo: (h, w, 3) in [0, 1], what surfaces reflect diffusely; None if not rendered.
-    clean: (h, w, 3), `image` without its grain, which template.png shows; None if that shows
-    `image` itself.
+    image: (h, w, 3) linear Rec.709, as it was rendered. transform: of template.png. scene:
+    name of the file, content: its hash (see `Scene.content`), sensor: its id. albedo: (h, w, 3) in
+    [0, 1], what surfaces reflect diffusely; None if not rendered.
+    clean: (h, w, 3), `image` without its grain, as template.png shows it; None if it shows `image`
+    itself.
     """
 
     image: Floats
@@ -65,12 +65,12 @@ class Template:
 
     @property
     def looks(self) -> list[Floats]:
-        """The pictures that may have been painted on, linear, that of template.png first."""
+        """The pictures that a painting may have begun with, linear, that of template.png first."""
         return [self.image] if self.clean is None else [self.clean, self.image]
 
     @property
     def shown(self) -> Floats:
-        """The values in [0, 1] that template.png holds, rounded to its 16 bits."""
+        """The values of template.png, in [0, 1], rounded to its 16 bits."""
         return np.round(self.transform.encode(self.looks[0]) * 65535) / 65535
 
 
@@ -105,11 +105,11 @@ def write_template(
     lights: Mapping[str, Floats],
     texts: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[Path]:
-    """Write a template into `folder`, in place of an earlier one, wholly or not at all.
+    """Write a template into `folder`, in place of an earlier one, completely or not at all.
 
     Returns its files. normals: (h, w, 3), depth: (h, w); mattes: by name of object, (h, w) in
-    [0, 1]; what is not known is not written. lights: by name, (h', w', 3) linear, what each does
-    alone. texts: what pictures say of themselves, under SHOWN and LIGHTS.
+    [0, 1]; None is not written. lights: by name, (h', w', 3) linear, each light alone. texts: for
+    the headers of pictures, under SHOWN and LIGHTS.
     """
     said, mattes = texts or {}, mattes or {}
     matte_files = [f"{MATTES}/{name}.png" for name in file_names(mattes)]
@@ -147,7 +147,7 @@ def write_template(
 
 
 def _thumbnail(look: Floats, transform: str, texts: Mapping[str, str] | None) -> bytes:
-    """A linear picture as PNG, whatever its brightness."""
+    """Return a linear picture as PNG, whatever its brightness."""
     bright = max(float(np.percentile(look.max(axis=-1), 99)), 1e-12)
     shown = ViewTransform(transform, float(np.clip(-np.log2(bright), -60, 60)))
     return png_bytes(to_8_bit(shown.encode(look)), texts)
@@ -162,7 +162,7 @@ def _about(template: Template, files: Iterable[str]) -> str:
 
 
 def earlier_files(folder: Path) -> list[Path]:
-    """Those of a template that stands in `folder`; none if it is somebody else's."""
+    """Return the files of a template in `folder`; none if the folder is something else."""
     if not (folder / ABOUT).is_file():
         return []
     try:
@@ -176,16 +176,16 @@ def earlier_files(folder: Path) -> list[Path]:
 
 
 def files_in_the_way(folder: Path) -> list[Path]:
-    """List the files that a new template in `folder` would replace, whosever they are."""
+    """List the files that a new template in `folder` would replace, whatever they are."""
     plain = [folder / name for name in PLAIN]
-    # What things and lights are called is not known yet.
+    # The names of objects and lights are not known yet.
     pictures = [*(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
     there = [*earlier_files(folder), *plain, *pictures]
     return list(dict.fromkeys(file for file in there if os.path.lexists(file)))
 
 
 def template_files(folder: Path) -> list[Path]:
-    """Return the files that are read of the template in `folder`."""
+    """Return the files of the template in `folder` that are read."""
     return [folder / name for name in (ABOUT, LIGHT, CLEAN, ALBEDO)]
 
 
@@ -197,9 +197,9 @@ def write_look(
     clean: Floats | None = None,
     texts: Mapping[str, str] | None = None,
 ) -> Path:
-    """Only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG.
+    """Write only the look: a linear EXR, and beside it a 16-bit PNG. Returns the path of the PNG.
 
-    clean: what the PNG shows instead of `image`; texts: what it says of that.
+    clean: for the PNG instead of `image`; texts: for its header.
     """
     write_rgb(path, image)
     picture = path.with_suffix(".png")
@@ -209,7 +209,7 @@ def write_look(
 
 
 def read_template(folder: Path) -> Template:
-    """Read what `write_template` wrote. Raises TargetError for anything else."""
+    """Read a template of `write_template`. Raises TargetError for anything else."""
     try:
         about = _read_about(folder)
         transform = ViewTransform(about.view.name, about.view.stops)
@@ -219,7 +219,7 @@ def read_template(folder: Path) -> Template:
             for name in (ALBEDO, CLEAN)
         )
     except (OSError, ValueError, MemoryError, LightpaintError) as error:
-        # Its files are named as they are called in it.
+        # Errors name its files relative to the folder.
         said = (str(error) or type(error).__name__).replace(f"{folder}{os.sep}", "")
         raise TargetError(
             f"{folder} is no template: {one_line(said)}; make one with lightpaint template"
@@ -228,7 +228,7 @@ def read_template(folder: Path) -> Template:
 
 
 def _read_about(folder: Path) -> _About:
-    """Raises TargetError where there is none, ValueError for what is none."""
+    """Read template.json. Raises TargetError if it is missing, ValueError if it is damaged."""
     text = read_text(folder / ABOUT, "file", TargetError, limit=MAX_ABOUT)
     return read_record(_About, strict_json(text), others=True)
 
@@ -244,16 +244,16 @@ def _read_picture(path: Path, size: tuple[int, int]) -> Floats:
 
 
 def find_template(painting: Path) -> Path | None:
-    """The folder of the template that `painting` was most likely painted on.
+    """Return the folder of the template that `painting` was most likely painted on.
 
-    Its own folder, `template/` in it, or `template/` where the command is given.
+    That is its own folder, `template/` in it, or `template/` in the current folder.
     """
     places = (painting.parent, painting.parent / "template", Path("template"))
     return next((place for place in places if (place / ABOUT).is_file()), None)
 
 
 def file_names(names: Iterable[str]) -> list[str]:
-    """A name for a file for each name, on any system, no two the same even without case."""
+    """Return a file name for each name, valid on any system, unique even without case."""
     made: list[str] = []
     taken: set[str] = set()
     for name in names:
@@ -267,5 +267,5 @@ def file_names(names: Iterable[str]) -> list[str]:
 
 
 def texts_of(transform: ViewTransform) -> dict[str, str]:
-    """Read the transform that a PNG says it is shown through."""
+    """Return the text of a PNG that tells its transform."""
     return {TRANSFORM_KEY: f"{transform.name} {transform.stops!r}"}

@@ -1,4 +1,4 @@
-"""The starter manifest of `lightpaint batch --init`."""
+"""The starter manifest of a new batch."""
 
 import json
 import os

@@ -56,7 +56,7 @@ class Analysis:
 
 @keywords()
 def analyse(solution: Solution) -> tuple[Analysis, ...]:
-    """Return analyse the answer to each view.
+    """Analyse the answer to each view.
 
     Args:
         solution: Of one view or of several.

@@ -187,7 +187,7 @@ class Films:
         pull: NormalEquations | None,
         project: Callable[[Doubles], Doubles],
     ) -> Doubles:
-        """Return improve weights (n, 3) by one round of reweighting; the loss is that of the best
+        """Improve weights (n, 3) by one round of reweighting; the loss is that of the best
         start, or less.
 
         The round is one of `reweighting.rounds`, but in float32, and with a step that is halved a

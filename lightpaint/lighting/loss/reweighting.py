@@ -220,7 +220,7 @@ def _line_search(
     whole: float,
     fall: float,
 ) -> tuple[float, float]:
-    """Return halve a step until the loss falls enough; return its share, and the loss there.
+    """Halve a step until the loss falls enough; return its share, and the loss there.
 
     The share is 0 if the loss never falls. whole: the loss after the whole step.
     """

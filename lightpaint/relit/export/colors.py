@@ -1,4 +1,4 @@
-"""Colours that the painting does not tell: in exports such a light keeps its own."""
+"""Own colours for exported lights whose colour the painting does not determine."""
 
 from collections.abc import Mapping
 
@@ -9,19 +9,19 @@ from lightpaint.colour.color import luminance
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 
-#: Width of a 95 % interval, beside the brightest channel, from which on a light is hardly known.
+#: Width of a 95 % interval, relative to the brightest channel, from which a light is hardly known.
 WIDE = 1.0
 
 
 def with_own_colors(
     lighting: Lighting, present: Mapping[str, RGB]
 ) -> tuple[Lighting, tuple[str, ...]]:
-    """Return the lighting as other programs should get it, and the names of lights that differ.
+    """Return the lighting for other programs, and the names of lights that differ from the answer.
 
-    Of a light that is hardly seen the solve finds some colour or other, often a pure one. Where an
-    interval is wider than the light is bright, and the colour that the light has in the scene lies
-    within the intervals of all channels at some brightness, it keeps that colour: at the brightness
-    that was found, or the nearest at which it fits. Colours that somebody asked for stay.
+    The solve gives a hardly visible light an arbitrary colour, often a pure one. If an interval is
+    wider than the light is bright, and the light's colour in the scene lies within the intervals of
+    all channels at some brightness, it keeps that colour, at its solved brightness or the nearest
+    one that fits. Colours with a constraint stay.
 
     present: emission in the scene, by name, in the same units.
     """
@@ -35,7 +35,7 @@ def with_own_colors(
 
 
 def _own(light: LightSetting, present: RGB) -> RGB | None:
-    """Return the emission in the light's own colour; None where the painting tells another."""
+    """Return the emission in the light's own colour; None if the painting determines another."""
     own, found = np.array(present, np.float64), np.array(light.emission, np.float64)
     ends = light.interval
     if light.is_fixed or light.constraint or ends is None or not own.any() or not found.any():
@@ -47,7 +47,7 @@ def _own(light: LightSetting, present: RGB) -> RGB | None:
         found * own.max(), own * found.max(), rtol=0, atol=1e-6 * own.max() * found.max()
     ):
         return None  # it has its own colour already
-    # How often the present emission fits between the ends, channel by channel.
+    # The range of factors for the present emission that fit all channels.
     least, most = 0.0, np.inf
     for (low, high), its in zip(known, own, strict=True):
         if its == 0:

@@ -1,4 +1,4 @@
-"""The answer, in the forms that other programs take: table, Blender, Nuke, image."""
+"""The answer of light groups for other programs: table, Blender, Nuke, image."""
 
 import csv
 import io
@@ -22,7 +22,7 @@ from lightpaint.relit.export.nuke import LAYERS, copied_part, needs_copy, nuke_s
 #: Everything that `write_exports` may write.
 EXPORTS = ("lights.csv", "set_lights.py", "relit.nk", LAYERS, "relit.exr")
 
-#: Renderers whose answer a Blender script may take; a pattern may be of Blender as well.
+#: Renderers whose groups a Blender script may set; a pattern may be of Blender as well.
 BLENDER = ("Blender", "pattern")
 
 #: Where a spreadsheet may take text for a formula: at the beginning of a cell, which in some
@@ -43,7 +43,7 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
 
     Args:
         folder: Receives the files.
-        groups: What was solved from.
+        groups: The light groups of the solve.
         lighting: The answer.
 
     Returns:
@@ -75,9 +75,10 @@ def write_exports(folder: str | Path, groups: LightGroups, lighting: Lighting) -
 
 
 def lights_table(groups: LightGroups, lighting: Lighting) -> str:
-    """CSV: name, layer, multipliers, and what they do to the luminance of a white light.
+    """Return a CSV of names, layers and multipliers, with their effect on a white light's
+    luminance.
 
-    Stops are `off` at 0, and `unknown` of lights that reach nothing painted.
+    Stops are `off` at 0, and `unknown` for lights that reach nothing painted.
     """
     headings = ("light", "layer", "red", "green", "blue", "luminance", "stops", "kept", "unreached")
     rows = [_row(*headings)]
@@ -93,7 +94,7 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
         stops = "unknown" if light.name in unreached else stops
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]
         kept = "yes" if light.is_fixed else "no"
-        # Channels of which nothing told: their multiplier is what it was.
+        # Undetermined channels, whose multiplier stays as it was.
         untold = "".join(c for c, told in zip("RGB", light.reached, strict=True) if not told)
         names = map(plain_cell, (light.name, layers.get(light.name, "")))
         rows.append(_row(*names, *numbers, stops, kept, untold))
@@ -101,22 +102,22 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
 
 
 def plain_cell(text: str) -> str:
-    """`text` for a cell of a table, with a `'` in front of all that may be taken for a formula.
+    """Return `text` for a cell of a table, with a `'` before all that may look like a formula.
 
-    It is put in front of a `'` there as well, so that one less in each place is the text again.
+    A `'` in such a place gets another one, so that removing one in each place restores the text.
     """
     return _FORMULA.sub(r"\1'", text)
 
 
 def _row(*cells: str) -> str:
-    # Told that lines end in both, it quotes cells that hold either.
+    # With both as line end, the writer quotes cells that contain either.
     row = io.StringIO()
     csv.writer(row, lineterminator="\r\n").writerow(cells)
     return row.getvalue().removesuffix("\r\n") + "\n"
 
 
 def blender_script(groups: LightGroups, lighting: Lighting) -> str:
-    """Python for Blender that multiplies what is in each light group."""
+    """Return Python for Blender that multiplies the lights in each light group."""
     rows = [f"    {light.name!r}: {_tuple(light)},\n" for light in _free(lighting)]
     template = resources.files("lightpaint.relit.export").joinpath("set_lights.py.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
@@ -128,7 +129,9 @@ def blender_script(groups: LightGroups, lighting: Lighting) -> str:
 
 
 def relit_part(groups: LightGroups, lighting: Lighting) -> ExrPart:
-    """Σ multiplier × layer, with the rest and the alpha of the beauty, as precise as the file."""
+    """Return Σ multiplier × layer, with the rest and the alpha of the beauty, as precise as the
+    file.
+    """
     image = groups.basis.mix(lighting.weights_for(groups.basis))
     channels = rgb_channels(image)
     if groups.beauty is not None and groups.beauty.alpha is not None:
@@ -150,5 +153,5 @@ def _tuple(light: LightSetting) -> str:
 
 
 def _in_docstring(text: str) -> str:
-    """A name from elsewhere that cannot end the string it stands in."""
+    """Return a foreign name that cannot end the string around it."""
     return repr(text).replace('"', "'").replace("\\", "/")

@@ -1,8 +1,9 @@
 """A lighting as a list of fixtures: colour, kelvin, lumen, and DMX for each channel.
 
-Neutral of any program, and of any display: emissions are linear Rec.709 in the scene's own unit.
-DMX is what a fixture of linear response is sent, 0 to 255: its colour with the brightest channel at
-full, and a dimmer. At full is the brightest channel of all fixtures of that unit.
+The list is independent of programs and displays: emissions are linear Rec.709 in the scene's own
+unit. DMX values, 0 to 255, are for fixtures of linear response: the colour with its brightest
+channel at full, and a dimmer. The brightest channel of all fixtures of a unit has the dimmer at
+full.
 """
 
 import csv
@@ -36,11 +37,11 @@ class Dmx:
 
 @dataclass(frozen=True)
 class Fixture:
-    """A light as it is set.
+    """A light with its setting.
 
-    red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: where the
-    lighting has a scale. kelvin, duv, hex: None where it has no such colour. dmx: None of what is
-    kept as it is. emitters: of the scene, that it consists of.
+    red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: None
+    unless the lighting has a scale. kelvin, duv, hex: None without such a colour. dmx: None for
+    kept lights. emitters: its emitters in the scene.
     """
 
     name: str
@@ -60,7 +61,7 @@ class Fixture:
 
 
 def fixtures_of(lighting: Lighting) -> list[Fixture]:
-    """Every light of `lighting`, in its order."""
+    """Return a fixture for every light of `lighting`, in its order."""
     full: dict[str, float] = {}
     for light in lighting.lights:
         if not light.is_fixed:
@@ -88,7 +89,7 @@ def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float])
 
 
 def dmx_of(emission: RGB, full: float) -> Dmx:
-    """Codes of an emission. full: of the brightest channel at 255."""
+    """Return the codes of an emission. full: of the brightest channel at 255."""
     brightest = max(emission)
     if brightest <= 0 or full <= 0:
         return Dmx(0, 0, 0, 0)
@@ -103,7 +104,7 @@ COLUMNS = (
 
 
 def fixtures_csv(lighting: Lighting) -> str:
-    """A line for each fixture; cells are empty where there is no such number."""
+    """Return a line for each fixture; cells without a number are empty."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)
@@ -116,7 +117,7 @@ def fixtures_csv(lighting: Lighting) -> str:
 
 
 def fixtures_json(lighting: Lighting) -> str:
-    """The same as an object of JSON."""
+    """Return the fixtures as an object of JSON."""
     told: dict[str, Any] = {
         "format": FORMAT,
         "lightpaint": __version__,

@@ -1,10 +1,10 @@
 """A Nuke script that multiplies the layers of the rendered file and adds them up.
 
 A `.nk` file is Tcl: each node takes its inputs from a stack, the top one first, and leaves itself
-there. Names that come from elsewhere are quoted for that parser. Some knobs are then evaluated
-once more: names of files and labels replace Tcl in brackets, and names of files also the number of
-the frame and the view. How those could be quoted is written nowhere, so nothing that they would
-replace is put into them.
+there. Foreign names are quoted for that parser. Nuke evaluates some knobs once more: in names of
+files and labels it replaces Tcl in brackets, and in names of files also the frame number and the
+view. No documentation tells how to quote those, so the script contains nothing that they would
+replace.
 """
 
 import re
@@ -23,10 +23,11 @@ from lightpaint.files import one_line
 from lightpaint.images.formats.exr import ExrPart, rgb_channels
 from lightpaint.lighting.answer.lighting import Lighting
 
-#: What needs a backslash in a quoted word of Tcl that itself stands in braces.
+#: Characters that need a backslash in a quoted word of Tcl within braces.
 SPECIAL = re.compile(r'[\\"\[\]${}]')
 
-#: What Nuke evaluates in the name of a file: Tcl, numbers of frames, views; what cannot be written.
+#: Characters that Nuke evaluates in the name of a file, for Tcl, frame numbers and views, or that
+#: no script can contain.
 EVALUATED = re.compile(r"[\[\]$\\%#\x00-\x1f\x7f\ud800-\udfff]")
 
 #: The layers under names that Nuke tells apart, beside the script.
@@ -35,16 +36,16 @@ LAYERS = "relit_layers.exr"
 
 @dataclass(frozen=True)
 class _Source:
-    """Where Nuke finds a picture: which of the files, and what it calls the layer."""
+    """The place of a picture for Nuke: the file, and Nuke's name of the layer."""
 
     file: Path
     layer: str
 
 
 def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
-    """The text of relit.nk: Σ multiplier × layer, and the rest as it is.
+    """Return the text of relit.nk: Σ multiplier × layer, and the rest as it is.
 
-    folder: where it is to stand, beside what `copied_part` makes of layers that Nuke would mix up.
+    folder: its folder, beside the copy by `copied_part` of layers that Nuke would mix up.
     """
     lights, beauty = _sources(groups, folder)
     sources = [*lights, *([beauty] if beauty is not None else [])]
@@ -81,7 +82,7 @@ def nuke_script(groups: LightGroups, lighting: Lighting, folder: Path) -> str:
 
 
 def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
-    """Says so where relit.nk in `folder` cannot name a file that it reads."""
+    """Return a remark if relit.nk in `folder` cannot name a file that it reads."""
     lights, beauty = _sources(groups, folder)
     files = dict.fromkeys(x.file for x in [*lights, *([beauty] if beauty is not None else [])])
     if not (bad := [file for file in files if _is_evaluated(file)]):
@@ -96,14 +97,14 @@ def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
 
 
 def needs_copy(groups: LightGroups) -> bool:
-    """Whether Nuke would read two layers of a file as one, or not as red, green and blue."""
+    """Return whether Nuke would read two layers of a file as one, or not as red, green and blue."""
     layers = [*dict.fromkeys((x.file, x.part, x.channels) for x in _read(groups))]
     called = {(x.file, nuke_layer(x)) for x in _read(groups)}
     return len(called) < len(layers) or any(x.channels[0].count(".") > 2 for x in _read(groups))
 
 
 def copied_part(groups: LightGroups) -> ExrPart:
-    """The layers in linear Rec.709 float32, under names that Nuke tells apart."""
+    """Return the layers in linear Rec.709 float32, under names that Nuke can tell apart."""
     channels: dict[str, Floats] = {}
     *names, beauty = _copied_names(groups)
     for name, image in zip(names, groups.basis.planes, strict=False):
@@ -142,7 +143,7 @@ def _copied_names(groups: LightGroups) -> list[str]:
 
 
 def _sources(groups: LightGroups, folder: Path) -> tuple[list[_Source], _Source | None]:
-    """Of each light and of the beauty."""
+    """Return the sources of each light and of the beauty."""
     if needs_copy(groups):
         file = Path(folder) / LAYERS
         *lights, beauty = (_Source(file, name) for name in _copied_names(groups))
@@ -153,7 +154,7 @@ def _sources(groups: LightGroups, folder: Path) -> tuple[list[_Source], _Source 
 
 
 def _file_knobs(file: Path) -> dict[str, str]:
-    """The file, or where Nuke would make something else of its name, a request to choose it."""
+    """Return the knobs of a file, or a request to choose it if Nuke would change its name."""
     if not _is_evaluated(file):
         return {"file": quoted(_path(file))}
     return {"file": '""', "label": quoted(f"choose by hand: {_plain(file.name)}")}
@@ -168,7 +169,7 @@ def _path(file: Path) -> str:
 
 
 def quoted(text: str) -> str:
-    """One word of Tcl, whatever it holds."""
+    """Return any text as one word of Tcl."""
     escaped = SPECIAL.sub(lambda found: f"\\{found[0]}", text)
     return '"' + escaped.replace("\r", "").replace("\n", "\\n") + '"'
 
@@ -178,7 +179,7 @@ def _read(groups: LightGroups) -> list[RenderLayer]:
 
 
 def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]]) -> list[str]:
-    """Each light, as `shuffled` leaves it, multiplied and added to what is there."""
+    """Return nodes that multiply each light, as `shuffled` leaves it, and add it to the others."""
     lines: list[str] = []
     settings, labels = {light.name: light for light in lighting.lights}, list[str]()
     for k, (light, nodes) in enumerate(zip(groups.basis.lights, shuffled, strict=False)):
@@ -197,7 +198,7 @@ def _sum(groups: LightGroups, lighting: Lighting, shuffled: Sequence[list[str]])
 
 
 def _rest(lights: Sequence[_Source], beauty: _Source | None, files: Sequence[Path]) -> list[str]:
-    """The beauty less all groups."""
+    """Return nodes of the beauty less all groups."""
     lines = _shuffle(beauty, files, "Beauty")
     for k, light in enumerate(lights):
         lines += _shuffle(light, files, f"Without_{k}")
@@ -230,5 +231,5 @@ def _note(groups: LightGroups) -> str:
 
 
 def _plain(text: str) -> str:
-    """Without what Nuke would evaluate in a label."""
+    """Return a text without characters that Nuke would evaluate in a label."""
     return re.sub(r"[^\w .,+()-]", "_", text)

@@ -1,4 +1,4 @@
-"""Python for Blender that sets the lights of a scene by their names, as they were solved."""
+"""A Python script for Blender that sets the lights of a scene by their names."""
 
 from collections.abc import Iterable
 from importlib import resources
@@ -6,7 +6,7 @@ from string import Template
 
 from lightpaint.arrays import RGB
 
-#: What of Mitsuba's emission stands for what in Blender.
+#: Blender's quantity for each parameter of Mitsuba's emitters.
 KINDS = {
     "radiance": "radiance",
     "intensity": "intensity",
@@ -15,9 +15,10 @@ KINDS = {
 
 
 def scene_script(target: str, source: str, emitters: Iterable[tuple[str, str, RGB]]) -> str:
-    """The script. emitters: name, Mitsuba's parameter and emission of each that is adjusted.
+    """Return the script. emitters: name, Mitsuba's parameter and emission of each adjusted one.
+    emitters: name, Mitsuba's parameter and emission of each that is adjusted.
 
-    Those whose emission is no plain colour, like a scaled sky, are left to who runs it.
+    Emitters without a plain colour, like a scaled sky, are left to the user.
     """
     rows, left = [], []
     for name, parameter, emission in emitters:
@@ -36,5 +37,5 @@ def scene_script(target: str, source: str, emitters: Iterable[tuple[str, str, RG
 
 
 def _in_docstring(text: str) -> str:
-    """A name from elsewhere that cannot end the string it stands in."""
+    """Return a foreign name that cannot end the string around it."""
     return repr(text).replace('"', "'").replace("\\", "/")

@@ -1,9 +1,9 @@
 """A lighting as a layer of USD that overrides lights of a stage, and nothing else.
 
-What UsdLux calls intensity is radiance, of lights that normalize it the flux of all their surface.
-So that neither radius nor size of a prim matter, panels and skies are written unnormalized, at
-their radiance, and suns and points normalized: a sun at its irradiance, a sphere, whose surface is
-four times what is seen of it from afar, at four times its intensity.
+UsdLux's intensity is radiance; for lights that normalize it, the flux of their whole surface. So
+that neither radius nor size of a prim matter, panels and skies are written unnormalized, at their
+radiance, and suns and points normalized: a sun at its irradiance, a sphere, whose surface is four
+times its visible disk, at four times its intensity.
 """
 
 import os
@@ -16,26 +16,26 @@ from lightpaint.arrays import RGB
 from lightpaint.errors import OutputError
 from lightpaint.files import one_line
 
-#: Of Mitsuba's parameters, whether the light is normalized.
+#: Whether the light is normalized, by Mitsuba's parameter.
 NORMALIZED = {"radiance": False, "irradiance": True, "intensity": True}
 
-#: What a prim's surface is of what is seen of it along its axis, or from the side.
+#: Ratio of a prim's surface to its visible area along its axis, or from the side.
 SURFACE = {"SphereLight": 4.0, "CylinderLight": 3.141592653589793}
 
-#: Where lights are taken to be where there is no stage to look for them.
+#: The assumed place of lights without a stage.
 SCOPE = "/lights"
 
 
 @dataclass(frozen=True)
 class Overrides:
-    """The layer as text; the names of lights that are not in it; and of what is in the stage."""
+    """The layer as text, and the names of lights that are not in it."""
 
     text: str
     left: tuple[str, ...]
 
 
 def check_usd() -> None:
-    """Raise OutputError where the library is not installed."""
+    """Raise OutputError if the library is not installed."""
     try:
         import pxr.UsdLux  # noqa: F401
     except ImportError:
@@ -47,17 +47,17 @@ def check_usd() -> None:
 def usd_overrides(
     emitters: Iterable[tuple[str, str, RGB]], stage: Path | None, folder: Path, *, about: str = ""
 ) -> Overrides:
-    """The layer.
+    """Return the layer.
 
     Args:
-        emitters: Name, Mitsuba's parameter and emission of each that is adjusted; "" where it is a
-            multiple of what there is, and by what is left to who opens the layer.
-        stage: Any USD file, whose lights go by these names: the layer lies over it. Without one
-            they are taken to be prims below /lights.
-        folder: Where the layer is to lie.
-        about: Of what it is, for its comment.
+        emitters: Name, Mitsuba's parameter and emission of each adjusted one; "" for a multiple of
+            the present emission, which is left to the user.
+        stage: Any USD file with lights of these names: the layer lies over it. Without one they
+            are prims below /lights.
+        folder: The folder of the layer.
+        about: A description for its comment.
 
-    Raises OutputError where the library is not installed, or cannot read the stage.
+    Raises OutputError if the library is not installed, or cannot read the stage.
     """
     check_usd()
     from pxr import Sdf, Tf, Usd
@@ -86,7 +86,7 @@ def usd_overrides(
 
 
 def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
-    """Set all of a light that its brightness and colour depend on."""
+    """Set all properties of a light that its brightness and colour depend on."""
     from pxr import Gf, UsdLux
 
     brightest = max(emission)
@@ -101,7 +101,7 @@ def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
 
 
 def _lights_of(stage: Path) -> Mapping[str, dict[str, str]]:
-    """By name, the path and the type of each light of a stage."""
+    """Return the path and the type of each light of a stage, by name."""
     from pxr import Tf, Usd, UsdLux
 
     if not stage.is_file():
@@ -121,7 +121,7 @@ def _lights_of(stage: Path) -> Mapping[str, dict[str, str]]:
 
 
 def _like(layer: Any, stage: Path) -> None:
-    """Say of the layer what its stage says: axes, units and the prim to begin with."""
+    """Copy axes, units and the default prim of the stage to the layer."""
     from pxr import Sdf
 
     root = Sdf.Layer.FindOrOpen(str(stage))

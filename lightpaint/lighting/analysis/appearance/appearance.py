@@ -197,8 +197,7 @@ class Seen:
 def what_is_seen(
     solution: Solution, predicted: Estimate | None = None, *, diagnosis: Diagnosis | None = None
 ) -> Seen:
-    """Measure the visible difference of `solution` from its painting, its worst place and its
-    reasons.
+    """Measure the visible difference of `solution` from its painting, with place and reasons.
 
     Args:
         solution: Of one view or, without a place, of several.

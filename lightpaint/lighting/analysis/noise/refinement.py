@@ -31,9 +31,9 @@ from lightpaint.lighting.solve import solve_again
 
 @keywords()
 def refine(solution: Solution, mixed: Estimate) -> Solution:
-    """Return improve a solution by one step from w: minimise (w' − w)ᵀM(w' − w) − 2 gᵀ(w' − w) over
-    w' >= 0.
+    """Improve a solution by one step from its weights w.
 
+    It minimises (w' − w)ᵀM(w' − w) − 2 gᵀ(w' − w) over w' >= 0, with
     g = t ⟨Φ, Ψ − V⟩ + (1 − t)(b − M w), of the render of the mix and of the solved equations.
 
     Args:

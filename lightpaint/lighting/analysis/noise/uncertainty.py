@@ -55,8 +55,7 @@ SHARE_STEPS = 8
 @keywords()
 @dataclass(frozen=True)
 class Uncertainty:
-    """The effect of noise on a solve. All values are estimates, good to a third or so. All are
-    estimates themselves, good to a third or so.
+    """The effect of noise on a solve. All values are estimates, good to a third or so.
 
     A channel in which a light reaches nothing that counts is undetermined: NaN.
 
