@@ -34,13 +34,11 @@ _SKIPPED = rb"<!--(?s:.*?)-->|<\?(?s:.*?)\?>"  # XML declarations look like inst
 _DECLARATION = rb"<!(?:%b|[^\"'>])*+>" % _QUOTED
 _MARKUP = re.compile(
     rb"%b|<!\[CDATA\[(?s:.*?)\]\]>"
-    rb"|(?P<type><!DOCTYPE(?>%b|%b|%b|[^<>\"'])*+>)"
+    rb"|<!DOCTYPE(?>%b|%b|%b|[^<>\"'])*+>"
     rb"|</(?P<end>%b)\s*+>"
     rb"|<(?P<tag>%b)(?P<attributes>(?>(?:\s++%b\s*+=\s*+%b)*))\s*+(?P<empty>/?)>"
     % (_SKIPPED, _QUOTED, _SKIPPED, _DECLARATION, _NAME, _NAME, _NAME, _QUOTED)
 )
-_DECLARED = re.compile(rb"<!ENTITY\s+(%b)" % _NAME)
-_USED = re.compile(rb"&(%b);" % _NAME)
 _ATTRIBUTE = re.compile(rb"(%b)\s*+=\s*+(%b)" % (_NAME, _QUOTED))
 _REFERENCE = re.compile(r"&(?:#x0*([0-9a-fA-F]{1,8})|#0*([0-9]{1,8})|(lt|gt|amp|quot|apos));")
 _ENTITIES = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
@@ -58,7 +56,7 @@ def markup(text: bytes) -> Iterator[re.Match[bytes]]:
     """Everything in angle brackets, in order; a `<` that opens nothing raises ValueError.
 
     text: in UTF-8, or nearly. Groups: `tag` with `attributes` and `empty`, its `/`, where an
-    element begins; `end`, the name, where one ends; `type`, all of a document type.
+    element begins; `end`, the name, where one ends.
     """
     at = text.find(b"<")
     while at >= 0:
@@ -77,13 +75,6 @@ def attributes(tag: re.Match[bytes]) -> dict[str, str]:
         value = re.sub(r"\r\n|[\r\n\t]", " ", decoded(quoted[1:-1]))
         given.setdefault(decoded(key), _REFERENCE.sub(_character, value))
     return given
-
-
-def entity_used(text: bytes, document_type: re.Match[bytes]) -> str | None:
-    """An entity of the document type that is used behind it, the first by name, if one is."""
-    declared = set(_DECLARED.findall(document_type["type"]))
-    used = declared and declared.intersection(_USED.findall(text, document_type.end()))
-    return decoded(min(used)) if used else None
 
 
 def line_of(text: bytes, offset: int) -> int:

@@ -5,10 +5,8 @@ overflows, includes and parameters that multiply without end, pipes that never a
 same text is gone through with bounds, and each of these is a SceneError of one line.
 """
 
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,7 @@ import numpy as np
 
 from lightpaint.errors import SceneError
 from lightpaint.files import file_length, one_line, read_bytes
-from lightpaint.scene.checks.tokens import attributes, encoding_of, entity_used, line_of, markup
+from lightpaint.scene.checks.tokens import attributes, encoding_of, line_of, markup
 
 #: Bytes of XML in all, a file that is included twice counting twice.
 MAX_XML = 2**26
@@ -25,9 +23,8 @@ MAX_OBJECTS = 100_000
 #: Files that are included, and how deep elements, or references, may be nested.
 MAX_INCLUDES = 10_000
 MAX_NESTING = 100
-#: Elements of any kind; parameters, and how often one may be looked for in a value.
+#: Elements of any kind, and how often a parameter may be looked for in a value.
 MAX_ELEMENTS = 1_000_000
-MAX_PARAMETERS = 1000
 MAX_LOOKED_UP = 10_000_000
 #: Longest value of an attribute once its parameters are put in.
 MAX_VALUE = 2**16
@@ -114,15 +111,11 @@ class _Walk:
         self.bytes = self.elements = self.objects = self.includes = self.looked_up = 0
         # Files may be included thousands of times: each is looked up and read once.
         self.contents: dict[Path, bytes] = {}
-        self.true_path = cache(os.path.realpath)
 
     def file(self, path: Path, resolver: Any, depth: int, chain: tuple[Path, ...]) -> None:
         """depth: of the element that includes it; chain: the files that include each other."""
         import mitsuba as mi
 
-        if self.true_path(path) in map(self.true_path, chain):
-            which = "itself" if path == chain[-1] else f"{path}, which includes it in turn"
-            raise SceneError(f"{chain[-1]} includes {which}: this has no end")
         chain = (*chain, path)
         try:
             data = self._read(path)
@@ -187,8 +180,6 @@ class _Walk:
         }
         if tag == b"default" and given.get("name"):
             self.parameters.setdefault(f"${given['name']}", given.get("value", ""))
-            if len(self.parameters) > MAX_PARAMETERS:
-                raise ValueError(f"there are more than {MAX_PARAMETERS} parameters")
         elif tag == b"path" and given.get("value"):
             resolver.prepend(_resolved(resolver, given["value"]))
         elif tag in (b"include", b"spectrum") and given.get("filename"):
@@ -221,13 +212,7 @@ class _Walk:
 def _markup(path: Path, data: bytes) -> Iterator[re.Match[bytes]]:
     """The tokens of a file. Raises SceneError for what no parser reads."""
     try:
-        for found in markup(data):
-            if found["type"] is not None and (name := entity_used(data, found)):
-                raise SceneError(
-                    f"{path} uses the entity &{one_line(name)}; of its document type, which "
-                    "Mitsuba does not read: write out what it stands for"
-                )
-            yield found
+        yield from markup(data)
     except ValueError as error:
         raise SceneError(f"{path}, {error}") from None
 

@@ -14,7 +14,6 @@ from lightpaint.errors import SceneError
 from lightpaint.scene.checks.tokens import (
     attributes,
     encoding_of,
-    entity_used,
     line_of,
     markup,
 )
@@ -73,11 +72,12 @@ def test_what_is_broken_is_given_up_at_once(start: str) -> None:
     assert time.perf_counter() - began < 1
 
 
-def test_entities_of_a_document_type() -> None:
-    text = b'<!DOCTYPE a [<!ENTITY e "x"><!ENTITY d "y">]><a b="&e;&d;"/>'
-    assert entity_used(text, next(markup(text))) == "d"
-    text = b'<!DOCTYPE a [<!ENTITY e "&e;">]><a b="&amp;e;"/>'
-    assert entity_used(text, next(markup(text))) is None
+def test_a_document_type_is_passed_over_with_its_entities() -> None:
+    text = '<!DOCTYPE a [<!ENTITY e "<x/>"><!-- ]> --><!ENTITY d \'>\'>]><a b="&e;&d;"/>'
+    assert _tags(text) == [("a", {"b": "&e;&d;"})]
+
+
+def test_lines_are_counted_from_one() -> None:
     assert line_of(b"a\nb\r\nc", 5) == 3
 
 
