@@ -11,10 +11,10 @@ from lightpaint.batch.gallery.solve_gallery import entry_of, write_solve_gallery
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import FILES, check_gallery, is_reserved
 from lightpaint.batch.work.derived_looks import (
+    publish_shifted,
     shifted_folders,
     variation_folder,
     variation_jobs,
-    write_shifted,
 )
 from lightpaint.batch.work.work import is_disk_full
 from lightpaint.cli.output import terminal
@@ -48,7 +48,7 @@ class Several:
         """Make the variations of an answer that are made of it."""
         self._enter(job)
         for word, place in self.made.get(job.folder, {}).items():
-            write_shifted(job, word, place, lighting, bases)
+            publish_shifted(job, word, place, lighting, bases)
             self.entries.append(entry_of(job, place.folder, word))
             files = [file for file in place.files if file.is_file()]
             about = {"variation": word, "of": str(job.folder)}

@@ -37,7 +37,7 @@ def derived_folder(
     return ResultFolder(folder, tuple(files), reads, answers, force=force)
 
 
-def write_derived(
+def publish_derived(
     results: ResultFolder,
     lighting: Lighting,
     bases: Sequence[Basis],
@@ -106,7 +106,7 @@ def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
     }
 
 
-def write_shifted(
+def publish_shifted(
     job: Job, word: str, results: ResultFolder, lighting: Lighting, bases: Sequence[Basis]
 ) -> None:
     """Write a variation of the answer of `job`. bases: of its views."""
@@ -118,7 +118,7 @@ def write_shifted(
         "groups": job.groups,
         "spp": job.settings.spp,
     }
-    write_derived(results, shifted_lighting, bases, views=_views(job), **options)
+    publish_derived(results, shifted_lighting, bases, views=_views(job), **options)
 
 
 def _views(job: Job) -> list[str]:

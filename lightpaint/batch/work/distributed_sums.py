@@ -10,7 +10,7 @@ from lightpaint.batch.work.basis_parts import obtain_lesson
 from lightpaint.batch.work.engine import Engine
 from lightpaint.batch.work.render_cost import render_seconds
 from lightpaint.batch.work.spool import Spool
-from lightpaint.batch.work.sums_answer import write_solved_lights
+from lightpaint.batch.work.sums_answer import publish_solved_lights
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import attempt, job_fields
 from lightpaint.batch.work.work_items import ItemResult, PaintingOfSums, SceneFilm, SumsOfRows
@@ -105,7 +105,9 @@ def _solve_and_write(job: Job, sums: Sums) -> None:
     assert scene is not None
     asked = samples(job.settings.quality, spp=job.settings.spp, time_s=None)
     half = -(-(scene.spp if asked is None else asked) // 2)
-    write_solved_lights(job, basis_lights(scene), sums, scene_identity=scene.identity, spp=2 * half)
+    publish_solved_lights(
+        job, basis_lights(scene), sums, scene_identity=scene.identity, spp=2 * half
+    )
 
 
 def _file_of(job: Job) -> Painting:

@@ -51,16 +51,16 @@ def answer_by_sums(job: Job, basis: Basis) -> None:
     if not basis.knows_noise:
         # Only pixels tell what rounding alone has made (see lighting/round_off.py).
         problem = Problem.of(basis, view.target, constraints=job.asked, fit=job.fit)
-        write_lighting_only(job, solution_of(problem).lighting)
+        publish_lighting_only(job, solution_of(problem).lighting)
         return
     sums = sum_rows(basis, view.target, slice(None), job.fit)
     origin = basis.origin
-    write_solved_lights(
+    publish_solved_lights(
         job, basis.lights, sums, scene_identity=origin.scene_identity, spp=origin.spp
     )
 
 
-def write_solved_lights(
+def publish_solved_lights(
     job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int
 ) -> None:
     """Solve, and write the lighting. Other parameters are those of `summed_problem`."""
@@ -73,10 +73,10 @@ def write_solved_lights(
         scene_identity=scene_identity,
         spp=spp,
     )
-    write_lighting_only(job, solve_linear(problem, problem.start).lighting)
+    publish_lighting_only(job, solve_linear(problem, problem.start).lighting)
 
 
-def write_lighting_only(job: Job, lighting: Lighting) -> None:
+def publish_lighting_only(job: Job, lighting: Lighting) -> None:
     """Write the lighting, and the scene that has it."""
     [view] = job.views
     lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)

@@ -13,7 +13,7 @@ from lightpaint.basis.render.parts import lesson
 from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
-from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, write_derived
+from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, publish_derived
 from lightpaint.batch.work.sums_answer import answer_by_sums, sums_of_rows
 from lightpaint.batch.work.task import EXPORT, Task
 from lightpaint.batch.work.work_items import (
@@ -151,7 +151,7 @@ def _derive_answer(
     results = derived_folder(
         fields["folder"], scene, task.lightings, **options, force=settings.force
     )
-    write_derived(results, lighting, bases, **options, scene=scene, spp=settings.spp)
+    publish_derived(results, lighting, bases, **options, scene=scene, spp=settings.spp)
 
 
 def derive_lighting(
