@@ -1,3 +1,1 @@
-"""Report pages, pictures, tables and sentences about a result; this room solves nothing. It solves
-nothing.
-"""
+"""Report pages, pictures, tables and sentences about a result; this room solves nothing."""

@@ -15,7 +15,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import exposure_of
-from lightpaint.report.sentences import spoken_percent
+from lightpaint.report.phrases import spoken_percent
 from lightpaint.screen import visible
 
 #: The most lights shown; the others, with the smallest shares, are counted.

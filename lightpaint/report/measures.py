@@ -1,14 +1,14 @@
-"""Measures of a result: shares of energy, and errors as root mean squares."""
+"""Measures of a result: shares of energy, errors as root mean squares, and errors of lights."""
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.page.html import SHOWN, SPARE
 
 
 def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
@@ -20,21 +20,6 @@ def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
     energy = (basis.totals * lighting.weights_for(basis)) @ LUMINANCE
     total = energy.sum()
     return np.asarray(energy / total if total > 0 else np.zeros_like(energy))
-
-
-def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
-    """Return the larger of the present and the solved share of each light, (n,)."""
-    present = energy_shares(basis, Lighting.present(basis))
-    return np.maximum(energy_shares(basis, lighting), present)
-
-
-def most_visible_lights(basis: Basis, lighting: Lighting) -> Indices:
-    """Return places of the lights to show of many, those with the largest shares; all of few."""
-    count = len(basis.lights)
-    if count <= SHOWN + SPARE:
-        return np.arange(count)
-    shares = largest_shares(basis, lighting)
-    return np.sort(np.argsort(-shares, kind="stable")[:SHOWN])
 
 
 def relative_residual(solution: Solution) -> float:
@@ -91,3 +76,50 @@ def count_at_least_pixels(solution: Solution, predicted: Floats) -> tuple[int, i
     its, brighter = (loss.exceeds(x) & counts for x in (np.inf, predicted))
     pixels = int(its.any(axis=-1).sum())
     return (pixels, int(brighter.any(axis=-1).sum())) if pixels else None
+
+
+def brightness(uncertainty: Uncertainty) -> tuple[Doubles, Doubles, Doubles]:
+    """Return the luminance of each light as solved, and the ends of its 95 % interval, (n,) each.
+
+    Only known channels count.
+    """
+    # One path carries all channels, so that their errors go together.
+    known = np.isfinite(uncertainty.scatter)
+    ends = (uncertainty.weights, *uncertainty.interval)
+    solved, low, high = (np.where(known, end, 0) @ LUMINANCE for end in ends)
+    return solved, low, high
+
+
+def relative_errors(uncertainty: Uncertainty) -> Doubles:
+    """Return the half width of each light's 95 % interval over its luminance, (n,).
+
+    It is not finite if the light is off and may be on; 0 without error.
+    """
+    solved, low, high = brightness(uncertainty)
+    side = np.maximum(solved - low, high - solved)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(side > 0, side / solved, 0.0)
+
+
+def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> int | None:
+    """Return the light whose error changes the picture most, if it is determined; None if none
+    is."""
+    errors = relative_errors(uncertainty)
+    effect = np.where(np.isfinite(errors) & ~uncertainty.untold, errors, 0) * energy_shares(
+        basis, solution.lighting
+    )
+    return int(np.argmax(effect)) if effect.any() else None
+
+
+def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
+    """Return samples per pixel that halve the error of light k.
+
+    Scatter falls with the root of the samples, bias with their number.
+    """
+    scatter, bias = (np.nansum(np.square(x[k])) for x in (uncertainty.scatter, uncertainty.bias))
+    # scatter / m + bias / m² = (scatter + bias) / 4
+    total = scatter + bias
+    times = 2 * (scatter + np.sqrt(scatter**2 + total * bias)) / total if total > 0 else 1.0
+    exact = times * basis.origin.spp
+    power = 2 ** int(np.floor(np.log2(exact)) - 2)
+    return int(np.ceil(exact / power) * power) if power >= 1 else int(np.ceil(exact))

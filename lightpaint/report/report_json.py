@@ -33,21 +33,19 @@ from lightpaint.report.answer_pictures import (
 )
 from lightpaint.report.influences import fit_options
 from lightpaint.report.measures import (
+    brightness,
     count_at_least_pixels,
     energy_shares,
     error_in_codes,
+    halving_spp,
     linear_residual,
+    most_uncertain,
     noise_residual,
+    relative_errors,
     relative_residual,
 )
 from lightpaint.report.page.diagnosis_section import maps_limit
-from lightpaint.report.sentences import (
-    UNTOLD_HERE,
-    brightness,
-    halving_spp,
-    most_uncertain,
-    relative_errors,
-)
+from lightpaint.report.uncertainty_sentences import UNTOLD_HERE
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
 

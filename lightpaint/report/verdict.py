@@ -10,7 +10,7 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
-from lightpaint.report.sentences import (
+from lightpaint.report.phrases import (
     spoken_difference,
     spoken_elsewhere,
     spoken_percent,

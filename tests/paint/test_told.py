@@ -21,7 +21,7 @@ from lightpaint.paint.session.answer_messages import (
     unpainted_text,
     why_not_closer,
 )
-from lightpaint.report.sentences import spoken_cause
+from lightpaint.report.diagnosis_sentences import spoken_cause
 from lightpaint.report.verdict import headline
 
 OFF, HOLD = Reason("off", ("annex_window",), 0.57), Reason("hold", (), 0.5)

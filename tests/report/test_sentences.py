@@ -14,18 +14,11 @@ from lightpaint.lighting.analysis.diagnosis import Place, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.solve import solve
+from lightpaint.report.diagnosis_sentences import error_sentences, spoken_bound, spoken_hold
+from lightpaint.report.measures import halving_spp
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
-from lightpaint.report.sentences import (
-    error_sentences,
-    halving_spp,
-    spoken_bound,
-    spoken_difference,
-    spoken_hold,
-    spoken_lights,
-    spoken_percent,
-    spoken_place,
-    uncertainty_sentence,
-)
+from lightpaint.report.phrases import spoken_difference, spoken_lights, spoken_percent, spoken_place
+from lightpaint.report.uncertainty_sentences import uncertainty_sentence
 from lightpaint.target.target import Target
 
 SIZE = (12, 12)

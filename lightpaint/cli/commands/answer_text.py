@@ -19,16 +19,14 @@ from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.pipeline.results import Look
 from lightpaint.pipeline.settings import Settings
 from lightpaint.report.answer_pictures import spoken_view
+from lightpaint.report.diagnosis_sentences import bound_sentences, error_sentences, spoken_cause
 from lightpaint.report.influences import fit_sentence
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.color_section import closer_choice
-from lightpaint.report.sentences import (
-    bound_sentences,
-    error_sentences,
+from lightpaint.report.phrases import spoken_percent
+from lightpaint.report.uncertainty_sentences import (
     partly_reached,
-    spoken_cause,
     spoken_errors,
-    spoken_percent,
     uncertainty_sentence,
     unreached_channels,
     untold_lights,

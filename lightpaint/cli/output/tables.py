@@ -8,9 +8,7 @@ from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.page.suggestion_section import spoken_position, spoken_suggestions
-from lightpaint.report.sentences import (
-    spoken_percent,
-)
+from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.verdict import agreement
 from lightpaint.scene.lights.emission import MULTIPLE
 from lightpaint.scene.lights.emitters import Emitter

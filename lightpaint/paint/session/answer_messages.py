@@ -16,17 +16,15 @@ from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import error_shares
 from lightpaint.paint.protocol import Advice, Closeness, Findings, LightAnswer, LightInfo
-from lightpaint.report.sentences import (
-    NO_ERROR,
-    bound_sentences,
-    hold_clause,
+from lightpaint.report.diagnosis_sentences import NO_ERROR, bound_sentences, hold_clause
+from lightpaint.report.phrases import (
     spoken_amount,
     spoken_changed,
-    spoken_errors,
     spoken_part,
     spoken_percent,
     spoken_place,
 )
+from lightpaint.report.uncertainty_sentences import spoken_errors
 from lightpaint.report.verdict import headline, spoken_missing, spoken_reason
 
 #: Distance from Planck's locus up to which a colour is called white, and part of the present light

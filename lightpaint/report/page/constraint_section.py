@@ -12,7 +12,7 @@ from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.measures import relative_residual
 from lightpaint.report.page.figures import PagePicture, figure
 from lightpaint.report.page.html import SHOWN, SPARE, row, share_cell, table
-from lightpaint.report.sentences import spoken_percent
+from lightpaint.report.phrases import spoken_percent
 
 #: Least width in pixels of reduced pictures; a whole factor gives up to twice as much.
 MIN_WIDTH = 320

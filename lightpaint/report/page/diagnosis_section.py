@@ -20,18 +20,12 @@ from lightpaint.report.answer_pictures import (
     round_up,
     unpainted_look,
 )
-from lightpaint.report.measures import energy_shares
+from lightpaint.report.diagnosis_sentences import error_sentences, spoken_hold
+from lightpaint.report.measures import brightness, energy_shares, relative_errors
 from lightpaint.report.page.figures import PagePicture, figure, signed_scale
 from lightpaint.report.page.html import breakable_name, fold, name_list, row, share_cell, table
-from lightpaint.report.sentences import (
-    brightness,
-    error_sentences,
-    relative_errors,
-    spoken_errors,
-    spoken_hold,
-    spoken_percent,
-    uncertainty_sentence,
-)
+from lightpaint.report.phrases import spoken_percent
+from lightpaint.report.uncertainty_sentences import spoken_errors, uncertainty_sentence
 
 #: Headings of the table of uncertainty, and rows of both tables that are not folded.
 ERROR_HEADS, SHOWN_ROWS = ("light", "solved", "95 % between", "of it", "of the picture"), 6

@@ -22,7 +22,7 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.page.html import facts, name_list, row
-from lightpaint.report.sentences import partly_reached
+from lightpaint.report.uncertainty_sentences import partly_reached
 from lightpaint.screen import some_of
 from lightpaint.target.target import Target
 from lightpaint.version import __version__

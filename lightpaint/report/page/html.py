@@ -1,6 +1,4 @@
-"""Pieces of HTML for several parts of the report. Callers escape what goes in. What goes in is
-escaped before.
-"""
+"""Pieces of HTML for several parts of the report; callers escape what goes in."""
 
 import re
 from collections.abc import Iterable, Sequence

@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from lightpaint.arrays import RGB
+from lightpaint.arrays import RGB, Doubles, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
@@ -20,14 +20,14 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.basis_memo import make_once
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
-from lightpaint.report.measures import energy_shares, largest_shares, most_visible_lights
+from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
 from lightpaint.report.page.html import SHOWN, SPARE, breakable_name, fold, share_cell
-from lightpaint.report.sentences import (
+from lightpaint.report.phrases import spoken_percent
+from lightpaint.report.uncertainty_sentences import (
     UNTOLD,
     UNTOLD_HERE,
     spoken_errors,
-    spoken_percent,
     unreached_channels,
 )
 from lightpaint.threads import side_by_side
@@ -209,3 +209,18 @@ def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
         return "off"
     told = zip(emission, reached, strict=True)
     return " <br>".join(f"{v:.4g}" if tells else f"({v:.4g})" for v, tells in told)
+
+
+def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
+    """Return the larger of the present and the solved share of each light, (n,)."""
+    present = energy_shares(basis, Lighting.present(basis))
+    return np.maximum(energy_shares(basis, lighting), present)
+
+
+def most_visible_lights(basis: Basis, lighting: Lighting) -> Indices:
+    """Return places of the lights to show of many, those with the largest shares; all of few."""
+    count = len(basis.lights)
+    if count <= SHOWN + SPARE:
+        return np.arange(count)
+    shares = largest_shares(basis, lighting)
+    return np.sort(np.argsort(-shares, kind="stable")[:SHOWN])

@@ -28,8 +28,8 @@ from lightpaint.lighting.answer.light_setting import ALL_REACHED
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
 from lightpaint.report.basis_memo import cached_clean_planes, make_once
-from lightpaint.report.measures import most_visible_lights
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
+from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import side_by_side
 from lightpaint.viewer.bundle import bundled, styles
 

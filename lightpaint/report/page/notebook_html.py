@@ -31,7 +31,7 @@ from lightpaint.report.answer_pictures import coverage, report_transform, unpain
 from lightpaint.report.comparison import SURROUND, TEXT, shorten_to_width
 from lightpaint.report.page.figures import THUMBNAIL_WIDTH, data_uri, thumbnail
 from lightpaint.report.page.lights_table import change, hex_color
-from lightpaint.report.sentences import UNTOLD_HERE
+from lightpaint.report.uncertainty_sentences import UNTOLD_HERE
 from lightpaint.report.verdict import agreement, verdict
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target

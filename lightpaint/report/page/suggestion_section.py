@@ -11,7 +11,7 @@ from lightpaint.images.denoiser import denoised
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import facts
-from lightpaint.report.sentences import spoken_percent
+from lightpaint.report.phrases import spoken_percent
 
 #: Ring around the place of a light in the picture, dark on bright and bright on dark.
 RING = (

@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.grain import grain
 from lightpaint.lighting.solve import solve
-from lightpaint.report.sentences import error_sentences
+from lightpaint.report.diagnosis_sentences import error_sentences
 from lightpaint.target.target import Target
 
 SIZE = (90, 120)

@@ -10,7 +10,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_erro
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.lights_table import lights_table
 from lightpaint.report.page.notebook_html import html_of
-from lightpaint.report.sentences import (
+from lightpaint.report.uncertainty_sentences import (
     UNTOLD_HERE,
     spoken_errors,
     uncertainty_sentence,

@@ -1,0 +1,173 @@
+"""Sentences on why the answer does not look like the painting."""
+
+from collections.abc import Sequence
+
+from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
+from lightpaint.lighting.analysis.diagnosis import Diagnosis, error_shares
+from lightpaint.lighting.answer.active_bound import Bound
+from lightpaint.report.phrases import (
+    CHANNELS,
+    spoken_changed,
+    spoken_lights,
+    spoken_percent,
+    spoken_place,
+)
+
+#: The sentence for an answer without error.
+NO_ERROR = "The lights can make what is painted."
+
+#: Share of the error, or of a light, that is too small to mention.
+MIN_SHARE = 0.05
+
+#: The same for a light that is switched off, which is easily switched on.
+MIN_SWITCHED_OFF_SHARE = 0.01
+
+
+def error_sentences(
+    diagnosis: Diagnosis, seen: Seen | None = None, *, holds: Sequence[str] | None = None
+) -> list[str]:
+    """Return at most four sentences on why it does not look like the painting, the main one first.
+
+    seen: the result of `what_is_seen`, whose reasons go before single bounds. holds: instead of the
+    sentences of `bound_sentences`.
+    """
+    d = diagnosis
+    if not (parts := error_shares(d)):
+        return [NO_ERROR]
+    # What is kept has a bound of its own below.
+    which = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
+    words = {
+        "unreachable": f"is out of reach of any mix of {which}{hold_clause(seen)}",
+        "forbidden": "would need other limits of the lights or light below zero"
+        if d.is_constrained
+        else "would need light below zero",
+        "compromise": "is given up for the other views",
+        "noise": "is noise of the basis",
+        "painting_noise": painting_noise_clause(d),
+    }
+    shares = [f"{spoken_percent(share)} {words[part]}" for part, share in parts.items()]
+    sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
+    is_told = seen is not None and seen.place is not None  # by the headline
+    if d.place is not None and not is_told and d.share(d.unreachable) >= MIN_SHARE:
+        sentences.append(spoken_place(d.place))
+    return [*sentences, *(bound_sentences(d, seen) if holds is None else holds)]
+
+
+def hold_clause(seen: Seen | None) -> str:
+    """Return ` while the rest is held` if that keeps the lights from the paint, else ""."""
+    is_held = seen is not None and any(reason.kind == "hold" for reason in seen.reasons)
+    return " while the rest is held" if is_held else ""
+
+
+def bound_sentences(diagnosis: Diagnosis, seen: Seen | None = None) -> list[str]:
+    """Return at most two sentences on what holds the lights, the most important first.
+
+    seen: the result of `what_is_seen`; its reasons come with their shares, and single bounds only
+    if there are none.
+    """
+    if seen is not None and seen.reasons:
+        told = [spoken_cause(reason) for reason in seen.reasons]
+        return [sentence for sentence in told if sentence][:2]
+    d = diagnosis
+    most = [bound for bound in d.bounds[:1] if d.gain_share(bound) >= MIN_SHARE]
+    to_switch_on = [
+        bound
+        for bound in d.bounds
+        if bound.is_switched_off and d.gain_share(bound) >= MIN_SWITCHED_OFF_SHARE
+    ]
+    its = dict.fromkeys([*most, *to_switch_on[:1]])
+    return [spoken_bound(bound, d.gain_share(bound)) for bound in its]
+
+
+#: Clauses on constraints and their release: for one light, and for several.
+RELEASE_CLAUSES = {
+    "off": ("switched off, as asked; switching it on", "switched off, as asked; switching them on"),
+    "lock": ("locked; adjusting it", "locked; adjusting them"),
+    "limits": ("at a limit; letting go of that", "at their limits; letting go of these"),
+    "colour": ("held to a colour; any other", "held to colours; any others"),
+    "tie": (
+        "on a dimmer with others; adjusting it by itself",
+        "on one dimmer; adjusting each by itself",
+    ),
+}
+
+#: The same for all lights together.
+JOINT_RELEASE_CLAUSES = {
+    "colors": 'Lamps keep their colours; colors="free"',
+    "sparse": "The number of lights is limited; allowing more",
+    "prefer_current": "Lights are pulled towards their present setting; leaving them free",
+}
+
+
+def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
+    """Say what keeps the lights from the paint, and the gain of releasing it; "" for views.
+
+    weaker: the words before the strength of a weaker hold.
+    """
+    gained = f"would take away {spoken_percent(reason.share)} of the miss"
+    if reason.is_joint:
+        gained += ", if the other conditions were lifted too"
+    if reason.kind in RELEASE_CLAUSES:
+        is_one = len(reason.names) == 1
+        lights = spoken_lights(reason.names, start=True) + (" is" if is_one else " are")
+        return f"{lights} {RELEASE_CLAUSES[reason.kind][not is_one]} {gained}."
+    if reason.kind in JOINT_RELEASE_CLAUSES:
+        return f"{JOINT_RELEASE_CLAUSES[reason.kind]} {gained}."
+    if reason.kind == "views":
+        return ""
+    held = "Unpainted parts are held near their present look;"
+    if (loosening := reason.loosening) is None:
+        return f"{held} letting it go {gained}."
+    share, rest = spoken_percent(loosening.share), loosening.elsewhere
+    cost = "" if rest is None else f", and change {spoken_changed(rest)}"
+    return f"{held} {weaker} {loosening.hold:g} would take away {share} of the miss{cost}."
+
+
+def painting_noise_clause(diagnosis: Diagnosis) -> str:
+    """Return a clause on noise of the painting, or of the lights' images if that is unknown."""
+    if diagnosis.noise > 0:
+        return "is noise of the painting, as renders have"
+    return "is noise of the painting or of the lights' images"
+
+
+def spoken_bound(bound: Bound, share: float) -> str:
+    """Return a sentence on a bound that holds a light, with its share of the error."""
+    is_one = len(bound.lights) == 1
+    lights = spoken_lights(bound.lights, start=True) + (" is" if is_one else " are")
+    if bound.kind == "zero":
+        return (
+            f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "
+            f"the other lights leave it ({spoken_percent(share)} of the miss)."
+        )
+    it = "it" if is_one else "them"
+    if bound.tint:
+        return (
+            f"{spoken_lights(bound.lights, start=True)} would have to be {bound.tint} than its "
+            f"whites ({bound.held_by}): any colour would take away {spoken_percent(share)} of the "
+            "miss."
+        )
+    held = {
+        "kept": f"kept as it is; adjusting {it} too",
+        "lock": f"locked; adjusting {it}",
+        "off": f"switched off, as asked; switching {it} on",
+        "left out": f"left out, since their number is limited; switching {it} on too",
+        "tie": "on one dimmer; adjusting each by itself",
+        "limits": f"at a limit ({bound.held_by}); letting go of that",
+        "colour": f"held to a colour ({bound.held_by}); any other",
+    }[bound.kind]
+    return f"{lights} {held} would take away {spoken_percent(share)} of the miss."
+
+
+def spoken_hold(bound: Bound) -> str:
+    """Return the bound in few words; for a light at zero, with the channels that feel it."""
+    if bound.kind == "kept":
+        return "kept as it is"
+    if bound.kind != "zero":
+        tint = f"; would have to be {bound.tint}" if bound.tint else ""
+        return f"{bound.held_by}{tint}"
+    if len(bound.multiplier) != 3:
+        return "off"
+    felt = zip(CHANNELS, bound.multiplier, strict=True)
+    held = [n for n, m in felt if m > 0.01 * max(bound.multiplier)]
+    return "off" if len(held) == 3 else f"off in {' and '.join(held)}"

@@ -1,0 +1,118 @@
+"""Phrases of sentences: lights, colours, shares and parts of the picture in words."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from lightpaint.colour.color import luminance
+from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
+from lightpaint.lighting.analysis.diagnosis import Place
+from lightpaint.screen import some_names, some_of
+
+CHANNELS = ("red", "green", "blue")
+
+#: Characters of names in a sentence.
+MAX_NAME_CHARACTERS = 120
+
+#: Difference of painting and light, in chromaticity, that counts as another colour.
+COLOR_SHIFT = 0.06
+
+
+def spoken_changed(rest: UnpaintedChange) -> str:
+    """Say which unpainted part changes most, and by how much: `the annex by ΔE 12`."""
+    return f"{spoken_part(rest)} by ΔE {spoken_amount(rest.worst)}"
+
+
+def spoken_elsewhere(rest: UnpaintedChange | None) -> str:
+    """Say `Unpainted parts change too, most of all the annex, by ΔE 12.`; "" for None."""
+    return f"Unpainted parts change too, most of all {_spoken_most(rest)}." if rest else ""
+
+
+def _spoken_most(rest: UnpaintedChange) -> str:
+    its = spoken_part(rest) if rest.object else spoken_ninth(rest.region)
+    return f"{its}, by ΔE {spoken_amount(rest.worst)}"
+
+
+def spoken_part(rest: UnpaintedChange) -> str:
+    """Name the part that changes most: `the annex`, or a region of the picture."""
+    if not rest.object:
+        return f"what is {spoken_ninth(rest.region)}"
+    return f"the {some_names([rest.object.replace('_', ' ').strip()])}"
+
+
+def spoken_amount(delta_e: float) -> str:
+    """Return a ΔE in words: `0.4`, `12`."""
+    return f"{delta_e:.0f}" if delta_e >= 9.5 else f"{delta_e:.1f}"
+
+
+def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
+    """Return `light key`, `lights key, fill`, or `light_3` alone if the name says what it is.
+
+    start: of a sentence. Of very many, the first are named, with the number of others.
+    """
+    listed = some_of([name or "without a name" for name in names], room=MAX_NAME_CHARACTERS)
+    if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
+        return listed
+    word = "light" if len(names) == 1 else "lights"
+    return f"{word.capitalize() if start else word} {listed}"
+
+
+def spoken_region(place: Place) -> str:
+    """Return the region of the picture: `in the middle`, `top left`."""
+    return spoken_ninth(place.region)
+
+
+def spoken_ninth(region: tuple[int, int]) -> str:
+    """Return the region of a row and a column, 0 to 2 each."""
+    rows, columns = ("top", "middle", "bottom"), ("left", "middle", "right")
+    row, column = rows[region[0]], columns[region[1]]
+    if row == column == "middle":
+        return "in the middle"
+    if row == "middle":
+        return f"on the {column}"
+    return f"at the {row}" if column == "middle" else f"at the {row} {column}"
+
+
+def spoken_where(place: Place) -> str:
+    """Return `on the statue`, or the region of the picture."""
+    if not place.object:
+        return spoken_region(place)
+    return f"on the {some_names([place.object.replace('_', ' ').strip()])}"
+
+
+def spoken_place(place: Place) -> str:
+    """Return a sentence on where light is missing, and what it lacks."""
+    where = f"{spoken_region(place)} ({spoken_percent(place.share)})"
+    change = spoken_difference(place.painted, place.reached)
+    return (
+        f"Most of that out of reach is {where}: painted {change} than any mix of the lights "
+        "makes it."
+    )
+
+
+def spoken_difference(
+    painted: tuple[float, float, float], reached: tuple[float, float, float]
+) -> str:
+    """Return how a painted colour differs from the one that lights reach: `brighter and bluer`."""
+    a, b = np.array(painted), np.maximum(np.array(reached), 0)
+    bright_a, bright_b = float(luminance(a)), float(luminance(b))
+    words = []
+    if bright_a > 1.2 * bright_b:
+        words.append("brighter")
+    elif 1.2 * bright_a < bright_b:
+        words.append("darker")
+    if a.sum() > 0 and b.sum() > 0:
+        shift = a / a.sum() - b / b.sum()
+        most = int(np.argmax(np.abs(shift)))
+        if abs(shift[most]) > COLOR_SHIFT:
+            more, less = ("redder", "greener", "bluer"), ("cooler", "pinker", "yellower")
+            words.append(more[most] if shift[most] > 0 else less[most])
+    if not words:
+        words = ["a little brighter" if bright_a > bright_b else "a little darker"]
+    return " and ".join(words)
+
+
+def spoken_percent(share: float) -> str:
+    """Return `0.4 %`, `7 %`, `62 %`."""
+    return f"{100 * share:.1f} %" if 0 < share < 0.0095 else f"{100 * share:.0f} %"

@@ -1,0 +1,98 @@
+"""Sentences on how sure the answer is, and on the samples that would make it surer."""
+
+from lightpaint.basis.basis import Basis
+from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
+from lightpaint.lighting.answer.light_setting import LightSetting
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.solution import Solution
+from lightpaint.report.measures import (
+    brightness,
+    energy_shares,
+    halving_spp,
+    most_uncertain,
+    relative_errors,
+)
+from lightpaint.report.phrases import CHANNELS, spoken_lights, spoken_percent
+from lightpaint.screen import some_of
+
+#: Texts for a light without a meaningful error: in a table, and in a sentence.
+UNTOLD = "cannot be told"
+
+UNTOLD_HERE = f"{UNTOLD} at these samples"
+
+
+def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
+    """Return `± 4 %` for each light; empty for unknown errors.
+
+    At a limit it has one side, `0 … +4 %`; a light that is off has `0 … 0.9`, in its unit; a light
+    with little but stray pixels in the samples has `cannot be told`.
+    """
+    if uncertainty is None:
+        return [""] * count
+    told = zip(*brightness(uncertainty), uncertainty.untold, strict=True)
+    return [UNTOLD if untold else _spoken_error(*ends) for *ends, untold in told]
+
+
+def untold_lights(lighting: Lighting) -> str:
+    """Return a sentence on the lights that samples do not determine; "" if there are none."""
+    names = [light.name for light in lighting.lights if light.untold]
+    if not names:
+        return ""
+    it = "it" if len(names) == 1 else "them"
+    return (
+        f"{spoken_lights(names, start=True)} {UNTOLD_HERE}: the samples show little but stray "
+        f"bright pixels "
+        f"of {it}. Render more samples, or keep {it}."
+    )
+
+
+def _spoken_error(solved: float, low: float, high: float) -> str:
+    if low >= high:
+        return ""
+    if solved == 0:
+        return f"0 … {high:.2g}"
+    below, above = (spoken_percent(float(side / solved)) for side in (solved - low, high - solved))
+    if below == above:
+        return f"± {below}"
+    return f"{f'−{below}' if low < solved else '0'} … {f'+{above}' if high > solved else '0'}"
+
+
+def partly_reached(lighting: Lighting) -> list[str]:
+    """Return a clause for the lights some of whose channels reach nothing painted."""
+    by_channels: dict[str, list[str]] = {}
+    for light in lighting.lights:
+        if light.is_partly_reached:
+            by_channels.setdefault(unreached_channels(light), []).append(light.name)
+    return [
+        f"no painted pixel shows the {channels} of {some_of(names, room=200)}: kept as it is"
+        for channels, names in by_channels.items()
+    ]
+
+
+def unreached_channels(light: LightSetting) -> str:
+    """Return `green and blue`: the channels of a light that reach nothing that counts."""
+    return " and ".join(c for c, told in zip(CHANNELS, light.reached, strict=True) if not told)
+
+
+def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
+    """Return a sentence on the light whose error changes the picture most, and on the samples to
+    halve it.
+    """
+    k = most_uncertain(basis, solution, uncertainty)
+    untold = untold_lights(solution.lighting)
+    if k is None and untold:
+        return untold
+    if k is None:
+        has_noise = any(x.any() for x in basis.noise)
+        why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
+        return f"More samples would change no light: {why}."
+    shares = energy_shares(basis, solution.lighting)
+    errors = relative_errors(uncertainty)
+    name = solution.lighting.lights[k].name
+    light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
+    change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
+    said = (
+        f"More samples would change {light}, by {change} (95 %); "
+        f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."
+    )
+    return f"{untold} {said}" if untold else said
