@@ -17,6 +17,7 @@ from lightpaint.arrays import Position
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line, unnamed
 from lightpaint.scene.checks.assets import check_assets
+from lightpaint.scene.checks.required import check_required
 from lightpaint.scene.checks.xml import check_nodes, check_xml
 from lightpaint.scene.film import Film
 from lightpaint.scene.integrator import (
@@ -60,6 +61,7 @@ class ParsedScene:
             # Mitsuba takes properties that were looked at for used, and reports the others.
             check_nodes(path, mi.parser.ParserState(self.state))
             mi.parser.transform_all(self.config, self.state)
+            check_required(path, mi.parser.ParserState(self.state))
             has_exr = check_assets(path, mi.parser.ParserState(self.state), self.resolver)
             # Thrown in one of several threads, what its OpenEXR reader makes of a damaged table of
             # offsets now and then ends the process.

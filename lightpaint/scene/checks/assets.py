@@ -110,5 +110,8 @@ def _check_volume(path: Path, length: int) -> None:
         head = file.read(24)
     if len(head) == 24 and head.startswith(b"VOL\x03"):
         kind, width, height, depth, channels = struct.unpack("<5i", head[4:])
+        if kind == 1 and min(width, height, depth, channels) < 1:
+            size = f"{width}x{height}x{depth} points of {channels} numbers"
+            raise SceneError(f"{path} is damaged: it says it has {size}")
         if kind == 1 and 4 * channels * width * height * depth > length:
             raise SceneError(f"{path} is damaged: it is shorter than it says")

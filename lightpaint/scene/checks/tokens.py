@@ -9,6 +9,8 @@ import codecs
 import re
 import sys
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 from lightpaint.files import one_line
 
@@ -93,3 +95,14 @@ def _character(reference: re.Match[str]) -> str:
         return _ENTITIES[entity]
     code = int(hexadecimal, 16) if hexadecimal else int(decimal)
     return chr(code) if code <= sys.maxunicode else reference[0]
+
+
+def place_of_node(state: Any, node: Any) -> str:
+    """Return where a node of a parsed scene stands, in words; "" for one that stands in no file."""
+    try:
+        file = Path(str(state.files[node.file_index]))
+        line = line_of(file.read_bytes(), int(node.offset))
+    except (IndexError, OSError, OverflowError, TypeError):
+        return ""
+    lead = f"{file.name}, " if node.file_index else ""
+    return f"{lead}line {line}: "

@@ -17,7 +17,7 @@ from typing import Any
 
 from lightpaint.errors import BackendError
 from lightpaint.files import one_line
-from lightpaint.scene.checks.tokens import line_of
+from lightpaint.scene.checks.tokens import place_of_node
 
 #: Names the folder of plugins that a user adds to Mitsuba's own.
 VARIABLE = "LIGHTPAINT_PLUGINS"
@@ -77,7 +77,7 @@ def check_plugins(state: Any, resolver: Any) -> None:
         if name in known:
             continue
         kind = str(node.type).rpartition(".")[2].lower()
-        lead = f"{_place(state, node)}Mitsuba has no {kind} plugin {one_line(repr(name))}"
+        lead = f"{place_of_node(state, node)}Mitsuba has no {kind} plugin {one_line(repr(name))}"
         if name in IN_PYTHON:
             if file := _in_the_way(name, resolver):
                 raise UnknownPluginError(
@@ -109,17 +109,6 @@ def _in_the_way(name: str, resolver: Any) -> Path | None:
     folders = [Path(), *(Path(str(resolver[k])) for k in range(len(resolver)))]
     files = (folder / "plugins" / f"{name}{end}" for folder in folders for end in ENDINGS)
     return next(filter(Path.exists, files), None)
-
-
-def _place(state: Any, node: Any) -> str:
-    """Where a node stands, in words; "" for one that stands in no file."""
-    try:
-        file = Path(str(state.files[node.file_index]))
-        line = line_of(file.read_bytes(), int(node.offset))
-    except (IndexError, OSError, OverflowError, TypeError):
-        return ""
-    lead = f"{file.name}, " if node.file_index else ""
-    return f"{lead}line {line}: "
 
 
 def _files(folder: Path) -> list[Path]:

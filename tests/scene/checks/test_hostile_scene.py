@@ -3,6 +3,7 @@
 All are loaded in a process of their own, which may take 2 GB.
 """
 
+import math
 import os
 import struct
 import subprocess
@@ -177,6 +178,42 @@ def test_hostile_files_of_a_scene(tmp_path: Path) -> None:
     results = outcomes("scene", {}, cases, tmp_path)
     assert wrong(results) == []
     assert sum(said == "refused" for _, said in results) > 100
+
+
+def _grid(*size: int, channels: int = 1) -> bytes:
+    numbers = max(0, math.prod(size) * channels)
+    head = struct.pack("<5i6f", 1, *size, channels, 0, 0, 0, 1, 1, 1)
+    return b"VOL\x03" + head + struct.pack(f"<{numbers}f", *(0.5,) * numbers)
+
+
+def _wall(inside: str) -> str:
+    return _with(f'<shape type="cube"><bsdf type="diffuse">{inside}</bsdf></shape>')
+
+
+def test_plugins_that_lack_what_mitsuba_takes_for_granted(tmp_path: Path) -> None:
+    """Each of these ended the process by a signal."""
+    texture = '<texture type="{}" name="reflectance">{}</texture>'
+    volume = '<volume type="gridvolume" name="volume"><string name="filename" value="{}"/></volume>'
+    made = {
+        "volume": _wall(texture.format("volume", "")),
+        "bitmap": _wall(texture.format("bitmap", "")),
+        "misspelt": _wall(texture.format("bitmap", '<string name="file" value="a.png"/>')),
+        "inner": _wall(
+            texture.format("checkerboard", '<texture type="bitmap" name="color0"/>'),
+        ),
+        "lamp": _with('<emitter type="spot"><texture type="bitmap" name="texture"/></emitter>'),
+        "blend": _with('<shape type="cube"><bsdf type="blendbsdf"/></shape>'),
+    }
+    for k, size in enumerate([(0, 2, 2), (2, 2, 0), (-2, -2, 2), (-2, 2, 2)]):
+        (tmp_path / f"{k}.vol").write_bytes(_grid(*size))
+        made[f"grid_{k}"] = _wall(texture.format("volume", volume.format(f"{k}.vol")))
+    cases = [Case(f"{name}.xml", name, text.encode()) for name, text in made.items()]
+    assert wrong(outcomes("scene", {}, cases, tmp_path), ("refused",)) == []
+    with pytest.raises(SceneError, match=r"line \d+: the texture 'bitmap', which has file, needs"):
+        load_scene(tmp_path / "misspelt.xml")
+    (tmp_path / "good.vol").write_bytes(_grid(2, 2, 2))
+    (tmp_path / "good.xml").write_text(_wall(texture.format("volume", volume.format("good.vol"))))
+    assert [light.name for light in load_scene(tmp_path / "good.xml").lights] == ["bulb"]
 
 
 def test_what_nobody_need_be_warned_of_is_read_as_mitsuba_reads_it(tmp_path: Path) -> None:

@@ -1,0 +1,33 @@
+"""What plugins need in a scene, and Mitsuba's own use without looking: without it the process dies.
+
+Found by loading and rendering each of its plugins with nothing in it; the others refuse that.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from lightpaint.errors import SceneError
+from lightpaint.files import one_line
+from lightpaint.scene.checks.tokens import place_of_node
+
+#: By plugin: parameters of which it needs one, and how that is written.
+REQUIRED = {
+    "bitmap": (("filename", "bitmap", "data"), '<string name="filename" value="..."/>'),
+    "blendbsdf": (("weight",), '<float name="weight" value="..."/>'),
+    "volume": (("volume",), '<volume name="volume" type="..."/>'),
+}
+
+
+def check_required(path: Path, state: Any) -> None:
+    """Raise SceneError for a plugin of a parsed scene that lacks what Mitsuba takes for granted."""
+    for node in state.nodes:
+        plugin = str(node.props.plugin_name())
+        names, form = REQUIRED.get(plugin, ((), ""))
+        if names and not any(name in node.props for name in names):
+            kind = str(node.type).rpartition(".")[2].lower()
+            given = [name for name in node.props if not name.startswith("_")]
+            has = f", which has {one_line(', '.join(given))}," if given else ""
+            place = place_of_node(state, node)
+            raise SceneError(
+                f"{path}: {place}the {kind} {plugin!r}{has} needs {names[0]!r}: write {form} in it"
+            )
