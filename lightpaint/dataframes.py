@@ -1,4 +1,4 @@
-"""Tables of pandas and labelled arrays of xarray, of which neither is needed for anything else."""
+"""pandas tables and labelled xarray arrays; nothing else here needs either library."""
 
 import math
 from importlib import import_module
@@ -11,23 +11,23 @@ CHANNELS = ("red", "green", "blue")
 
 
 def pandas() -> Any:
-    """Return the module. Raises LightpaintError where it is not installed."""
+    """Return the pandas module. Raises LightpaintError if it is not installed."""
     return _module("pandas")
 
 
 def xarray() -> Any:
-    """Return the module. Raises LightpaintError where it is not installed."""
+    """Return the xarray module. Raises LightpaintError if it is not installed."""
     return _module("xarray")
 
 
 def by_channel(name: str, values: Any) -> dict[str, Any]:
-    """Return a column for each channel: `{"red": ...}`, or `{"error_red": ...}` of a name."""
+    """Return a column for each channel: `{"red": ...}`, or `{"error_red": ...}` for a name."""
     lead = f"{name}_" if name else ""
     return {f"{lead}{channel}": values[k] for k, channel in enumerate(CHANNELS)}
 
 
 def number(value: float | None) -> float:
-    """Return NaN for None, by which a column of numbers stays one."""
+    """Return a float, NaN for None, so that a column of numbers stays one."""
     return math.nan if value is None else float(value)
 
 
@@ -36,5 +36,6 @@ def _module(name: str) -> Any:
         return import_module(name)
     except ImportError as error:
         raise LightpaintError(
-            f"this needs {name}, which is not installed: pip install 'lightpaint[tables]' ({error})"
+            f"this needs {name}, which cannot be imported ({error}): pip install "
+            "'lightpaint[tables]'"
         ) from None

@@ -4,18 +4,16 @@
     ├── BackendError     Mitsuba or LLVM cannot run here
     ├── SceneError       the scene XML, a sensor, a light
     ├── ImageError       an image file that cannot be read as what it should be
-    │   └── ViewError    … or a view transform, to decode it by, that there is none of
-    ├── KeywordError     an argument that a function does not have; a TypeError as well
-    ├── ColorError       a colour that means nothing: hexadecimal digits, a temperature
-    ├── BasisError       a basis file, or one that does not fit what it is used with
-    ├── TargetError      a painting or mask that cannot be solved for
-    │   └── SizeError    … because its size differs from the basis
-    ├── ConstraintError  what is asked of a light, and cannot be understood or had
-    ├── PaintError       what a page says to the painter, and cannot be understood or done
-    ├── BatchError       a manifest of looks; it may have several mistakes, a line each
-    ├── LightingError    a lighting.json, or weights that are none
-    │   └── UnknownLightError … or a name that none of its lights has; a KeyError as well
-    └── OutputError      a place that cannot be written
+    │   └── ViewError    … or an unknown view transform to decode it with ├── KeywordError     an
+    argument name that a function does not have; also a TypeError ├── ColorError       an invalid
+    colour: hexadecimal digits, a temperature ├── BasisError a basis file that is damaged, or does
+    not fit the scene or target ├── TargetError      a painting or mask that cannot be solved for │
+    └── SizeError    … because its size differs from the basis ├── ConstraintError  a constraint on
+    a light that is invalid or impossible ├── PaintError a message of a page that the painter cannot
+    understand or obey ├── BatchError       a manifest of looks; it may list several mistakes, one
+    per line ├── LightingError    a lighting.json, or weights that are invalid │   └──
+    UnknownLightError … or a name that none of its lights has; also a KeyError └── OutputError a
+    file or folder that cannot be written
 
 Each message is one line: what came, what was expected, and what to do. The command
 line prints it and exits with 2.
@@ -23,7 +21,7 @@ line prints it and exits with 2.
 
 
 class LightpaintError(Exception):
-    """Base of all errors that a user of lightpaint can cause and mend.
+    """Base class of all errors that a user of lightpaint can cause and fix.
 
     Examples:
         >>> try:
@@ -39,7 +37,7 @@ class BackendError(LightpaintError):
 
 
 class SceneError(LightpaintError):
-    """A scene that cannot be loaded, or that lacks what was asked of it."""
+    """A scene that cannot be loaded, or that lacks something it was asked for."""
 
 
 class ImageError(LightpaintError):
@@ -47,23 +45,23 @@ class ImageError(LightpaintError):
 
 
 class ViewError(ImageError):
-    """A view transform that there is none of, or that cannot be undone."""
+    """A view transform that does not exist or cannot be inverted."""
 
 
 class KeywordError(LightpaintError, TypeError):
-    """An argument, by name, that a function does not have."""
+    """A keyword argument that a function does not have."""
 
 
 class ColorError(LightpaintError):
-    """A colour, or a colour temperature, that there is none of."""
+    """A colour, or a colour temperature, that is invalid."""
 
 
 class BasisError(LightpaintError):
-    """A basis that is damaged or belongs to something else."""
+    """A basis that is damaged, or belongs to another scene."""
 
 
 class TargetError(LightpaintError):
-    """A painting or an importance mask that no lighting can be solved for."""
+    """A painting or an importance mask that cannot be solved for."""
 
 
 class SizeError(TargetError):
@@ -71,21 +69,21 @@ class SizeError(TargetError):
 
 
 class ConstraintError(LightpaintError):
-    """Something asked of a light that means nothing, contradicts itself, or cannot be had."""
+    """A constraint that is invalid, contradicts itself, or cannot be satisfied."""
 
 
 class PaintError(LightpaintError):
-    """A message to the painter that means nothing, or a session that cannot be had."""
+    """A message that the painter cannot understand, or a session that it cannot open."""
 
 
 class NothingToUndoError(PaintError):
-    """An undo where nothing was done, or a redo where nothing was undone: nobody's mistake."""
+    """An undo with nothing to undo, or a redo with nothing to redo; it is nobody's mistake."""
 
 
 class BatchError(LightpaintError):
-    """A manifest of looks that cannot be done as it stands.
+    """A manifest of looks with mistakes.
 
-    mistakes: one line each; the message is all of them.
+    mistakes: one line each; the message joins them.
     """
 
     def __init__(self, *mistakes: str) -> None:
@@ -100,7 +98,7 @@ class LightingError(LightpaintError):
 class UnknownLightError(LightingError, KeyError):
     """A name that no light has."""
 
-    # A KeyError would quote the line as if it were the key.
+    # KeyError would show the repr of the message, in quotes.
     __str__ = Exception.__str__
 
 
@@ -108,5 +106,5 @@ class OutputError(LightpaintError):
     """A file or folder that cannot be written."""
 
 
-#: Mistakes in a painting, or in what lies where its answer goes, are of that look alone.
-ALONE = (ImageError, TargetError, OutputError)
+#: Errors that concern one look alone: its painting, or the place of its answer.
+LOOK_ERRORS = (ImageError, TargetError, OutputError)

@@ -1,4 +1,4 @@
-"""Names of arguments: one that a function does not have is told with the one that is near."""
+"""Check the names of keyword arguments; an unknown one is reported with the nearest known one."""
 
 import difflib
 import inspect
@@ -14,12 +14,13 @@ _Call = TypeVar("_Call", bound=Callable[..., Any])
 
 
 def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
-    """Make a function, or a class when it is called, raise KeywordError for a name it has not.
+    """Make a function, or a class when it is called, raise KeywordError for an unknown argument.
 
-    Python's own TypeError names no near argument before 3.13, and none of what is passed on.
+    Python's own TypeError suggests no near name before 3.13, and knows nothing of arguments that
+    are passed on.
 
-    passed_on: dataclasses that the function's `**` is passed on to; where it has `**` and none is
-    given, what it is passed on to checks it.
+    passed_on: dataclasses that the function passes its `**` on to. A function with `**` and no such
+    dataclass is left alone: the function that it passes them to checks them.
     """
 
     def decorate(call: _Call) -> _Call:
@@ -31,12 +32,12 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
             return call
 
         @wraps(inner)
-        def checked(*given: Any, **named: Any) -> Any:
-            for name in named:
+        def checked(*args: Any, **kwargs: Any) -> Any:
+            for name in kwargs:
                 if name not in known:
-                    # Of a function that was called, and not of the decorator.
+                    # Named after the function that was called, not the decorator.
                     raise _unknown(call.__qualname__, name, known) from None
-            return inner(*given, **named)
+            return inner(*args, **kwargs)
 
         if isinstance(call, type):
             call.__init__ = checked  # type: ignore[misc]
@@ -47,7 +48,7 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
 
 
 def _names(parameters: Mapping[str, inspect.Parameter]) -> set[str]:
-    """Return the names that can be given, in which an object's own is none."""
+    """Return the names that a caller can give; `self` and `cls` are none of them."""
     kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     return {x.name for x in parameters.values() if x.kind in kinds} - {"self", "cls"}
 

@@ -1,8 +1,7 @@
-"""Telling whoever waits how far long work has come, and letting them stop it.
+"""Progress of long work, for those who wait for it, and a way to cancel it.
 
-Rooms report through a plain callable, so that a terminal, a notebook and a test can all
-listen; which of them listens is the caller's choice. Who listens to the corridor may hear
-remarks, too.
+Long work reports through a plain callable, so that a terminal, a notebook and a test can all
+listen; the caller chooses which. Listeners of the pipeline may receive remarks, too.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,51 +12,51 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Called after each finished piece of work."""
+    """A callable that is called after each finished piece of work."""
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """`done` of `total` pieces of the work named `label` are finished.
+        """Report that `done` of `total` pieces of the work named `label` are finished.
 
-        unit: what is counted; given only where it is not passes.
+        unit: what is counted; given only if it is not passes.
         """
 
 
 class Listener(Progress, Protocol):
-    """Hears how far the work has come, and what is worth knowing of it."""
+    """A receiver of progress, remarks, stages and the state of workers."""
 
     def say(self, text: str) -> None:
-        """A remark, in plain text."""
+        """Show a remark, in plain text."""
 
     def note(self, text: str) -> None:
-        """A stage that is done, and what was used in it: for who wants to know all."""
+        """Record a finished stage and what it used: detail for the verbose."""
 
-    def at_work(self, worker: str, what: str | None) -> None:
-        """What one of several workers does now; None for nothing."""
+    def at_work(self, worker: str, task: str | None) -> None:
+        """Show the present task of one of several workers; None if it is idle."""
 
 
 class _Silent:
-    """Listens to nothing."""
+    """A listener that ignores everything."""
 
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
-        """Hear no progress."""
+        """Ignore progress."""
 
     def say(self, text: str) -> None:
-        """Hear no remark."""
+        """Ignore a remark."""
 
     def note(self, text: str) -> None:
-        """Hear no stage."""
+        """Ignore a stage."""
 
-    def at_work(self, worker: str, what: str | None) -> None:
-        """Hear of no worker."""
+    def at_work(self, worker: str, task: str | None) -> None:
+        """Ignore a worker."""
 
 
-#: Whoever does not listen.
+#: The listener that ignores everything.
 silent = _Silent()
 
 
 @dataclass(frozen=True)
 class _Split:
-    """Progress goes to one, remarks to another, stages to a third, what workers do to a fourth."""
+    """A listener of four separate callables."""
 
     progress: Progress
     remarks: Callable[[str], None]
@@ -73,22 +72,22 @@ class _Split:
     def note(self, text: str) -> None:
         self.stages(text)
 
-    def at_work(self, worker: str, what: str | None) -> None:
-        self.workers(worker, what)
+    def at_work(self, worker: str, task: str | None) -> None:
+        self.workers(worker, task)
 
 
 def listener(progress: Progress) -> Listener:
-    """`progress` as a listener: a plain callable lets remarks and stages pass."""
-    heard = ("say", "note", "at_work")
-    return _Split(progress, *(getattr(progress, name, getattr(silent, name)) for name in heard))
+    """Return `progress` as a listener; a plain callable ignores remarks and stages."""
+    names = ("say", "note", "at_work")
+    return _Split(progress, *(getattr(progress, name, getattr(silent, name)) for name in names))
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C, after what was done has been kept. Its text says how to go on."""
+    """Ctrl-C, after finished work was saved. Its text says how to continue."""
 
 
 def labelled(listen: Listener, name: str) -> Listener:
-    """`listen` whose labels say of what: `verification of balcony`."""
+    """Return `listen` with labels that name their object: `verification of balcony`."""
 
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:
         listen(f"{label} of {name}", done, total, unit)
@@ -103,10 +102,10 @@ _CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: Non
 
 
 @contextmanager
-def while_wanted(check: Callable[[], None]) -> Iterator[None]:
-    """Work that may be given up: what it calls asks `check` now and then.
+def cancellable(check: Callable[[], None]) -> Iterator[None]:
+    """Let the work within be cancelled: whatever it calls runs `check` now and then.
 
-    check: raises whatever is to end the work, from whichever thread takes part in it.
+    check: raises the exception that ends the work, from any thread that takes part in it.
     """
     token = _CHECK.set(check)
     try:
@@ -115,6 +114,6 @@ def while_wanted(check: Callable[[], None]) -> Iterator[None]:
         _CHECK.reset(token)
 
 
-def wanted() -> Callable[[], None]:
-    """What tells, by raising, whether the work that this is part of is wanted no more."""
+def cancellation_check() -> Callable[[], None]:
+    """Return the function that raises if the work that this is part of was cancelled."""
     return _CHECK.get()

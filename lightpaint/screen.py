@@ -1,4 +1,4 @@
-"""What is shown of something long or strange: reprs of one screen, lists cut, notebooks' pages."""
+"""Text for people: reprs of one screen, long lists cut, characters made visible, notebook pages."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -6,12 +6,12 @@ from dataclasses import fields, is_dataclass
 from importlib import import_module
 from typing import Any, TypeVar, cast
 
-#: Characters that are shown of a list, at most; and of one in a message.
-ROOM, ROOM_IN_MESSAGE = 800, 300
+#: Longest list in a repr, and in a message, in characters.
+MAX_LIST_LENGTH, MAX_LENGTH_IN_MESSAGE = 800, 300
 
-#: What does not show itself: it steers a terminal, ends the line, or turns the order of what
-#: follows. (What only joins letters, as in Persian names or in emoji, is left alone.)
-_UNSEEN = re.compile(
+#: Invisible characters that control a terminal, end the line, or reverse the order of what follows.
+#: (Those that only join letters, as in Persian names or in emoji, are left alone.)
+_INVISIBLE = re.compile(
     "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f"
     "\ufeff\ufff9-\ufffb\U000e0000-\U000e007f\ud800-\udfff]"
 )
@@ -20,33 +20,37 @@ _Item = TypeVar("_Item")
 
 
 def visible(text: str) -> str:
-    r"""`text` in one line, with what does not show itself as Python writes it, like `\x1b`."""
-    return _UNSEEN.sub(lambda found: ascii(found[0])[1:-1], text)
+    r"""Return `text` in one line, with invisible characters as Python writes them, like `\\x1b`."""
+    return _INVISIBLE.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def some_names(names: Iterable[str], joint: str = ", ") -> str:
-    """Names as they stand in a message: as many as fit, and how many more there are."""
-    return some_of([_shortened(visible(name)) for name in names], joint, ROOM_IN_MESSAGE)
+    """Return names as they stand in a message: as many as fit, and how many more there are."""
+    return some_of([_shortened(visible(name)) for name in names], joint, MAX_LENGTH_IN_MESSAGE)
 
 
 def _shortened(name: str) -> str:
-    return name if len(name) <= ROOM_IN_MESSAGE // 2 else f"{name[: ROOM_IN_MESSAGE // 2]}…"
+    return (
+        name
+        if len(name) <= MAX_LENGTH_IN_MESSAGE // 2
+        else f"{name[: MAX_LENGTH_IN_MESSAGE // 2]}…"
+    )
 
 
-def some_of(texts: Sequence[str], joint: str = ", ", room: int = ROOM) -> str:
-    """As many of the texts, joined, as fit into `room` characters, and how many are left."""
+def some_of(texts: Sequence[str], joint: str = ", ", room: int = MAX_LIST_LENGTH) -> str:
+    """Return as many of the texts as fit into `room` characters, joined, and how many are left."""
     shown = ""
     for k, text in enumerate(texts):
-        longer = f"{shown}{joint if k else ''}{text}"
-        if len(longer) > room:
+        extended = f"{shown}{joint if k else ''}{text}"
+        if len(extended) > room:
             more = f"… and {len(texts) - k} more"
             return f"{shown}{joint}{more}" if k else more
-        shown = longer
+        shown = extended
     return shown
 
 
 class Listed(tuple[_Item, ...]):
-    """A tuple whose repr has a line for each item, as far as they fit."""
+    """A tuple whose repr has a line for each item, as many as fit."""
 
     __slots__ = ()
 
@@ -54,10 +58,10 @@ class Listed(tuple[_Item, ...]):
         return f"({some_of([repr(item) for item in self], joint=',' + chr(10) + ' ')})"
 
 
-def shortly(value: Any) -> str:
-    """The repr of a dataclass on one screen: its arrays by their shapes, and what is long cut."""
+def short_repr(value: Any) -> str:
+    """Return the repr of a dataclass on one screen: arrays by their shapes, long values cut."""
     shown = [field.name for field in fields(value) if field.repr]
-    room = ROOM // len(shown)
+    room = MAX_LIST_LENGTH // len(shown)
     texts = (f"{name}={_brief(getattr(value, name), room - len(name))}" for name in shown)
     return f"{type(value).__name__}({', '.join(texts)})"
 
@@ -72,10 +76,10 @@ def _brief(value: Any, room: int) -> str:
 
 
 class Shown:
-    """What notebooks show as a page or as a picture.
+    """Base class of values that notebooks show as a page or as a picture.
 
-    What draws it is upstairs, in the report, and found by its name when it is asked for: to be
-    shown, a room need not know it.
+    The report draws them. It is imported by name only when a notebook asks, so that modules below
+    the report need not import it.
     """
 
     __slots__ = ()

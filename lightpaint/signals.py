@@ -1,4 +1,4 @@
-"""What asks a process to end: heard as an interrupt, and held back where that would do harm."""
+"""Signals that end a process: turned into interrupts, and held back where one would do harm."""
 
 import os
 import signal
@@ -10,36 +10,37 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-#: Ctrl-C; `kill`, docker stop, Slurm, timeout; a terminal that closes.
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+#: From Ctrl-C; from `kill`, docker stop, Slurm and timeout; from a terminal that closes.
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
-#: Seconds after which a signal that was lost is sent again.
-SOON_S = 0.01
+#: Seconds after which a lost signal is sent again.
+RESEND_DELAY_S = 0.01
 
 
 @contextmanager
-def hearing(came: list[int]) -> Iterator[None]:
-    """Raise KeyboardInterrupt for Ctrl-C and the like, and add the signal's number to `came`.
+def signals_as_interrupts(received: list[int]) -> Iterator[None]:
+    """Raise KeyboardInterrupt for Ctrl-C and the like, and append the signal's number to
+    `received`.
 
-    For a program, since a library leaves signals to the program that it is part of. Ctrl-C is
-    heard also where a script's shell has started this in its background, and had it ignored; other
-    signals that are ignored, as `nohup` has it, stay so.
+    This is for programs: a library leaves signals to the program that it is part of. Ctrl-C raises
+    also where a script's shell started this process in the background and made it ignore Ctrl-C;
+    other ignored signals, as under `nohup`, stay ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def end(number: int, _frame: FrameType | None) -> None:
-        came.append(number)
+        received.append(number)
         raise KeyboardInterrupt
 
     before = {
         number: signal.signal(number, end)
-        for number in ENDING
+        for number in ENDING_SIGNALS
         if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN
     }
     try:
-        with _sent_again(came):
+        with _resending(received):
             yield
     finally:
         for number, handler in before.items():
@@ -47,27 +48,27 @@ def hearing(came: list[int]) -> Iterator[None]:
 
 
 @contextmanager
-def _sent_again(came: list[int]) -> Iterator[None]:
-    """Send a signal again whose KeyboardInterrupt Python has dropped.
+def _resending(received: list[int]) -> Iterator[None]:
+    """Send a signal again if Python has dropped its KeyboardInterrupt.
 
-    It drops what is raised in a destructor or in the callback of a weak reference, and a signal
-    may come just then. came: the signals that have been heard.
+    Python drops exceptions that are raised in a destructor or in the callback of a weak reference,
+    and a signal may arrive just then. received: numbers of the signals that have arrived.
     """
-    reported, over, is_reporting = sys.unraisablehook, threading.Event(), False
+    reported, ended, is_reporting = sys.unraisablehook, threading.Event(), False
 
     def send(number: int) -> None:
-        while is_reporting:  # it would be dropped again
-            time.sleep(SOON_S)
-        if not over.wait(SOON_S):
+        while is_reporting:  # or it would be dropped again
+            time.sleep(RESEND_DELAY_S)
+        if not ended.wait(RESEND_DELAY_S):
             os.kill(os.getpid(), number)
 
     def report(dropped: Any) -> None:
         nonlocal is_reporting
-        if not (came and isinstance(dropped.exc_value, KeyboardInterrupt)):
+        if not (received and isinstance(dropped.exc_value, KeyboardInterrupt)):
             reported(dropped)
             return
         is_reporting = True
-        threading.Thread(target=send, args=(came[-1],), daemon=True).start()
+        threading.Thread(target=send, args=(received[-1],), daemon=True).start()
         is_reporting = False
 
     sys.unraisablehook = report
@@ -75,21 +76,23 @@ def _sent_again(came: list[int]) -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = reported
-        over.set()
+        ended.set()
 
 
 @contextmanager
 def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
     """Hold Ctrl-C and the like back, and yield a function that lets them through.
 
-    An interrupt inside Dr.Jit's tracing surfaces as some other error and leaves half-recorded
-    loops behind; between two passes it is clean. A signal that is ignored, that ends the process
-    at once, or that a program around this one handles outside Python, is left alone.
+    An interrupt inside Dr.Jit's tracing surfaces as some other error and leaves half-recorded loops
+    behind; between two passes it is clean. Signals that are ignored, that end the process at once,
+    or that are handled outside Python, are left alone.
     """
     # Signals arrive in the main thread; None stands for a handler that is not Python's.
     elsewhere = threading.current_thread() is not threading.main_thread()
-    found = {number: signal.getsignal(number) for number in (() if elsewhere else ENDING)}
-    handlers = {number: its for number, its in found.items() if callable(its)}
+    previous = {
+        number: signal.getsignal(number) for number in (() if elsewhere else ENDING_SIGNALS)
+    }
+    handlers = {number: handler for number, handler in previous.items() if callable(handler)}
     pending: list[int] = []
 
     def let_through() -> None:
@@ -104,5 +107,5 @@ def interruptible_between_pieces() -> Iterator[Callable[[], None]]:
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
-        # One may have come until just now.
+        # One may have arrived in the meantime.
         let_through()

@@ -1,4 +1,4 @@
-"""Threads: one for products of small blocks, several for jobs that have nothing in common."""
+"""Threads: one for products of small blocks, several for independent jobs."""
 
 import os
 from collections.abc import Callable, Iterable
@@ -10,11 +10,11 @@ from itertools import count
 from threading import Event
 from typing import Any, TypeVar
 
-# The controller finds the libraries that are loaded: numpy has to be.
+# The controller finds the libraries that are loaded, and NumPy must be among them.
 import numpy as np  # noqa: F401
 from threadpoolctl import ThreadpoolController
 
-from lightpaint.progress import wanted, while_wanted
+from lightpaint.progress import cancellable, cancellation_check
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -26,75 +26,75 @@ def _controller() -> ThreadpoolController:
 
 
 def one_thread() -> AbstractContextManager[object]:
-    """Within it, BLAS runs on one thread.
+    """Limit BLAS to one thread within the block.
 
-    On small blocks its threads wait for each other longer than they work, and how a sum is
-    split among them decides its last bits.
+    On small arrays its threads wait for each other longer than they work, and the way they split a
+    sum decides its last bits.
     """
     limits: AbstractContextManager[object] = _controller().limit(limits=1, user_api="blas")
     return limits
 
 
 def linear_algebra() -> tuple[str, str]:
-    """The library under NumPy with its version, and its kernel: `openblas 0.3.31`, `Haswell`.
+    """Return NumPy's BLAS with its version, and its kernel: `openblas 0.3.31`, `Haswell`.
 
-    Kernels add in different orders, so that results differ in their last digits. "" for what is not
-    known: a library that is not listed, or says nothing of a kernel.
+    Kernels add in different orders, so that results differ in their last digits. "" for what is
+    unknown: an unlisted library, or one that names no kernel.
     """
-    found = [x for x in _controller().info() if x.get("user_api") == "blas"]
-    # SciPy has one of its own.
-    found.sort(key=lambda library: "numpy" not in library["filepath"])
-    if not found:
+    libraries = [x for x in _controller().info() if x.get("user_api") == "blas"]
+    # SciPy brings its own BLAS: NumPy's comes first.
+    libraries.sort(key=lambda library: "numpy" not in library["filepath"])
+    if not libraries:
         return "", ""
-    first = found[0]
+    first = libraries[0]
     return f"{first['internal_api']} {first.get('version') or ''}".strip(), str(
         first.get("architecture") or ""
     )
 
 
-class _EndedError(Exception):
-    """Work of which the rest was given up."""
+class _CancelledError(Exception):
+    """The end of jobs that are cancelled because another one failed or was interrupted."""
 
 
-def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Result]:
-    """work(job) of each job, several at a time with BLAS on one thread; results in order.
+def parallel_map(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Result]:
+    """Return `work(job)` for each job, several at a time with BLAS on one thread; results in order.
 
-    What comes out has the bits that one job after the other would give. Of several errors the one
-    of the first job is raised. A job may have jobs side by side of its own. Work that is wanted no
-    more ends before the next job.
+    Results are equal, bit for bit, to those of one job after the other. Of several errors that of
+    the first job is raised. A job may call this function itself. Cancelled work ends before the
+    next job.
     """
     waiting = list(jobs)
     results: list[Any] = [None] * len(waiting)
     errors: dict[int, Exception] = {}
     turns = count()
-    ended, check = Event(), wanted()
+    ended, check = Event(), cancellation_check()
 
     def check_both() -> None:
         check()
         if ended.is_set():
-            raise _EndedError
+            raise _CancelledError
 
     def take_turns() -> None:
         while not ended.is_set() and (k := next(turns)) < len(waiting):
             try:
-                with while_wanted(check_both):
+                with cancellable(check_both):
                     check_both()
                     results[k] = work(waiting[k])
             except Exception as error:
                 errors[k] = error
 
     with one_thread():
-        # One thread more than processors: three channels then share two of them evenly.
-        most = (os.cpu_count() or 1) if _limit is None else _limit - 1
-        hands = min(most, len(waiting) - 1)
-        helpers = [_pool().submit(copy_context().run, take_turns) for _ in range(hands)]
+        # One thread more than processors, so that three channels share two of them evenly.
+        max_helpers = (os.cpu_count() or 1) if _limit is None else _limit - 1
+        helper_count = min(max_helpers, len(waiting) - 1)
+        helpers = [_pool().submit(copy_context().run, take_turns) for _ in range(helper_count)]
         try:
             take_turns()
         except BaseException:
-            ended.set()  # an interrupt waits for no job that has not begun
+            ended.set()  # an interrupt waits for no job that has not begun yet
             raise
         finally:
-            # Who has not begun by now finds nothing to do, and others may need all there are.
+            # A helper that has not begun by now has nothing to do, and others may need its thread.
             for helper in helpers:
                 if not helper.cancel():
                     helper.result()
@@ -104,21 +104,22 @@ def side_by_side(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
 
 
 def limit_jobs(count: int | None) -> None:
-    """Let no more than `count` jobs be done at a time in this process; None for all there is."""
+    """Let at most `count` jobs run at a time in this process; None for no limit."""
     global _limit
     _limit = count
 
 
 _limit: int | None = None
 
-#: By the niceness of their threads.
+#: Pools by the niceness of their threads.
 _pools: dict[int, ThreadPoolExecutor] = {}
 
 
 def _pool() -> ThreadPoolExecutor:
-    """Threads that stay, since to begin them anew takes longer than many a job.
+    """Return the lasting pool of threads: starting threads takes longer than many a job.
 
-    As nice as the one that asks, which on Linux is what those that it begins are.
+    There is one pool for each niceness: on Linux threads inherit that of the thread which starts
+    them.
     """
     nice = os.getpriority(os.PRIO_PROCESS, 0) if hasattr(os, "getpriority") else 0
     if nice not in _pools:
@@ -127,4 +128,4 @@ def _pool() -> ThreadPoolExecutor:
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pools.clear)  # threads are not forked
+    os.register_at_fork(after_in_child=_pools.clear)  # a fork copies no threads

@@ -1,4 +1,4 @@
-"""What a value is to be, and the one line that says so where it is something else."""
+"""Checks of values, each with the words that an error uses for what was expected."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,11 +8,11 @@ from typing import Any, get_args
 
 from lightpaint.errors import LightpaintError
 
-#: Whether a value will do, and what else is expected of it.
+#: A test of a value, and words for what was expected if it fails.
 Check = tuple[Callable[[Any], bool], str]
 
 
-#: More than any light emits, and little enough for sums and products in float32.
+#: More than any light emits, yet small enough for sums and products in float32.
 BRIGHTEST = 1e30
 
 
@@ -25,23 +25,23 @@ MAX_PRIMARIES = 16
 
 
 def is_amount(value: float) -> bool:
-    """Whether that much light, or of what makes it, can be computed with."""
+    """Return True for an amount of light, or of what makes it, that can be computed with."""
     return 0 <= value <= BRIGHTEST
 
 
-def check_fields(given: Any, expected: Mapping[str, Check]) -> None:
-    """Raise LightpaintError for the first field of a dataclass that is not what is expected.
+def check_fields(record: Any, expected: Mapping[str, Check]) -> None:
+    """Raise LightpaintError for the first field of a dataclass that is not as expected.
 
     A field that is None by default may be None.
     """
-    for field in fields(given):
-        value, (fits, words) = getattr(given, field.name), expected[field.name]
+    for field in fields(record):
+        value, (fits, words) = getattr(record, field.name), expected[field.name]
         if not (fits(value) or (value is None and field.default is None)):
             raise LightpaintError(f"{field.name} is {value!r}: expected {words}")
 
 
 def whole(least: int, most: float = math.inf) -> Check:
-    """A whole number between these."""
+    """Expect a whole number between the two."""
 
     # bool is an int to Python, and no number to people.
     def fits(value: Any) -> bool:
@@ -51,7 +51,7 @@ def whole(least: int, most: float = math.inf) -> Check:
 
 
 def number(about: str, *, may_be_zero: bool = False) -> Check:
-    """A number > 0, or >= 0, that can be computed with. about: what it is."""
+    """Expect a number > 0, or >= 0, that can be computed with. about: what it is."""
 
     def fits(value: Any) -> bool:
         if not isinstance(value, Real) or _is_bool(value):
@@ -62,7 +62,7 @@ def number(about: str, *, may_be_zero: bool = False) -> Check:
 
 
 def one_of(words: Any) -> Check:
-    """One of the words of a Literal."""
+    """Expect one of the words of a Literal."""
     known = get_args(words)
     expected = " or ".join(map(repr, known))
     return lambda value: isinstance(value, str) and value in known, expected

@@ -23,11 +23,11 @@ from lightpaint.paint.frames import parse_request
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.server.session_clients import Connections
 from lightpaint.pipeline.settings import Settings
-from lightpaint.progress import wanted, while_wanted
+from lightpaint.progress import cancellable, cancellation_check
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import read_lights_file
 from lightpaint.storage.json_records import strict_toml
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 from lightpaint.validation import MAX_LISTED, MAX_NAME, MAX_PRIMARIES
 
 MANY = ["#ff0000", "#00ff00"] * 1500
@@ -137,7 +137,7 @@ def test_samples_and_suggestions_have_an_end(tmp_path: Path) -> None:
 
 
 def _without_end(began: threading.Event) -> None:
-    check = wanted()
+    check = cancellation_check()
     began.set()
     while True:
         check()
@@ -169,7 +169,7 @@ def test_ctrl_c_waits_for_no_job_beside() -> None:
         _without_end(began)
 
     with pytest.raises(KeyboardInterrupt):
-        side_by_side(work, [False, True])
+        parallel_map(work, [False, True])
 
 
 @pytest.mark.parametrize("method", ["polished", "gauss-seidel"])
@@ -183,5 +183,5 @@ def test_a_solve_asks_whether_it_is_wanted(method: Any) -> None:
         if len(asked) > 2:
             raise PaintError("over")
 
-    with pytest.raises(PaintError, match="over"), while_wanted(check):
+    with pytest.raises(PaintError, match="over"), cancellable(check):
         minimise(A.T @ A, A.T @ rng.random(60), upper=0.01, method=method)

@@ -72,7 +72,7 @@ def test_a_painting_in_the_result_folder_is_not_written_over(here: Path) -> None
             (here / "evening" / "report.html").symlink_to("x.exr")
         for how in ([], ["--force"]):
             line = refused(here, *SOLVE, name, "-o", "evening", *how)
-            assert "is read by this command, and would be written over" in line
+            assert "is an input of this command" in line
             assert line.endswith("(-o)")
     (here / "evening" / "x.exr").rename(painting)
     (here / "evening" / "report.html").unlink()
@@ -100,18 +100,20 @@ def test_what_goes_with_a_painting_is_not_written_over_either(
     else:
         file.write_text("[light.'light 0']\noff = true\n", encoding="utf-8")
     line = refused(here, *arguments, "-o", "out", "--force")
-    assert f"out/{where} is read by this command" in line
+    assert f"out/{where} is an input of this command" in line
 
 
 def test_light_groups_are_not_written_over(here: Path) -> None:
     layers = {f"RGBA_{name}": x for name, x in zip("abc", pictures(), strict=True)}
     interleaved(here / "relit.exr", layers)
     write_rgb(here / "p.exr", pictures()[0])
-    assert "relit.exr is read" in refused(here, "solve", "relit.exr", "p.exr", "-o", ".", "--force")
+    assert "relit.exr is an input" in refused(
+        here, "solve", "relit.exr", "p.exr", "-o", ".", "--force"
+    )
     (here / "groups").mkdir()
     (here / "relit.exr").rename(here / "groups" / "relit.exr")
     line = refused(here, "solve", "groups", "p.exr", "-o", "groups", "--force")
-    assert "groups/relit.exr is read" in line
+    assert "groups/relit.exr is an input" in line
 
 
 @pytest.mark.usefixtures("no_render")
@@ -125,19 +127,19 @@ def test_a_scene_is_not_written_over(here: Path, room: Path) -> None:
         if command[0] == "basis":
             os.link(here / "relit.xml", here / "relit.exr")
         line = refused(here, *command)
-        assert "relit.xml belongs to the scene" in line or "relit.exr is read" in line
+        assert "relit.xml belongs to the scene" in line or "relit.exr is an input" in line
     sky = LIGHTS["panel"] + (
         '<emitter type="envmap" id="sky"><string name="filename" value="albedo.exr"/></emitter>'
     )
     write_room(here, lights=sky)
     write_rgb(here / "albedo.exr", np.ones((4, 8, 3), np.float32))
     line = refused(here, "template", "room.xml", "-o", ".", "--force")
-    assert "albedo.exr is read by this command" in line
+    assert "albedo.exr is an input of this command" in line
     line = refused(here, "template", "room.xml", "-o", "albedo.exr", "--force")
-    assert "albedo.exr is read by this command" in line
+    assert "albedo.exr is an input of this command" in line
     os.link(here / "albedo.exr", here / "verified.exr")
     line = refused(here, "solve", "room.xml", "p.exr", "-o", ".", "--force")
-    assert "verified.exr is read by this command" in line
+    assert "verified.exr is an input of this command" in line
 
 
 def test_earlier_results_are_kept_unless_they_answer_the_same_painting(here: Path) -> None:
@@ -312,7 +314,7 @@ def test_relight_keeps_what_is_not_its_own(here: Path, room: Path) -> None:
     assert "results would overwrite each other in look: give" in done.stderr
     os.link(lighting, here / "other" / "relit.png")
     done = relight("look/lighting.json", "-o", "other", "--force")
-    assert "other/relit.png is read by this command" in done.stderr
+    assert "other/relit.png is an input of this command" in done.stderr
     (here / "other" / "relit.png").unlink()
     assert contents(here) == before
 
@@ -379,7 +381,7 @@ def test_a_folder_where_a_result_should_go_is_said_before_it_renders(
         (("template", "room.xml", "-o", "t"), "t/albedo.exr"),
     ):
         line = refused(here, *command)
-        assert f"{file} is a folder, where a file is to be written" in line
+        assert f"{file} is a folder, but a file is to be written there" in line
 
 
 @pytest.mark.usefixtures("no_render")
@@ -400,7 +402,7 @@ def test_places_that_are_not_utf_8_are_said_before_it_renders(here: Path, room: 
     ):
         line = refused(here, *command)
         assert "evening\\udcff" in line
-        assert "is not a name in UTF-8: choose another (-o)" in line
+        assert "is not UTF-8: choose another (-o)" in line
 
 
 def _lighting(room: Path) -> lp.Lighting:

@@ -130,7 +130,7 @@ def test_what_comes_in_a_destructor_is_not_lost(number: signal.Signals, late_s: 
     """
     code = f"""
 import signal, sys, threading, time
-from lightpaint.signals import hearing
+from lightpaint.signals import signals_as_interrupts
 
 start = threading.Thread.start
 threading.Thread.start = lambda thread: (start(thread), time.sleep({late_s}))
@@ -140,7 +140,7 @@ class Ending:
         signal.raise_signal({int(number)})
 
 came = []
-with hearing(came):
+with signals_as_interrupts(came):
     try:
         Ending()
         time.sleep(10)

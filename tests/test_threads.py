@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from lightpaint.lighting.normal_equations import inner_products
-from lightpaint.threads import limit_jobs, one_thread, side_by_side
+from lightpaint.threads import limit_jobs, one_thread, parallel_map
 
 
 def _threads() -> set[int]:
@@ -47,17 +47,17 @@ def test_jobs_within_which_limit_it_once_more():
         return seen
 
     with threadpool_limits(2, "blas"):
-        assert side_by_side(work, range(2)) == [[{1}] * 20] * 2
+        assert parallel_map(work, range(2)) == [[{1}] * 20] * 2
         assert _threads() == {2}
 
 
 def test_results_in_order_and_errors_come_through():
-    assert side_by_side(lambda k: k * k, range(7)) == [k * k for k in range(7)]
-    assert side_by_side(abs, []) == []
+    assert parallel_map(lambda k: k * k, range(7)) == [k * k for k in range(7)]
+    assert parallel_map(abs, []) == []
     with pytest.raises(ZeroDivisionError):
-        side_by_side(lambda k: 1 // k, [1, 0])
+        parallel_map(lambda k: 1 // k, [1, 0])
     with pytest.raises(RuntimeError, match=r"^2$"):
-        side_by_side(_fail_from_2_on, range(9))
+        parallel_map(_fail_from_2_on, range(9))
 
 
 def _fail_from_2_on(k: int) -> None:
@@ -68,7 +68,7 @@ def _fail_from_2_on(k: int) -> None:
 def test_a_process_that_shares_a_machine_does_one_at_a_time():
     limit_jobs(1)
     try:
-        assert {get_ident()} == set(side_by_side(lambda _: get_ident(), range(4)))
+        assert {get_ident()} == set(parallel_map(lambda _: get_ident(), range(4)))
     finally:
         limit_jobs(None)
 
@@ -77,17 +77,17 @@ def test_jobs_within_jobs_wait_for_nobody():
     """However many ask at once for threads that are all busy."""
 
     def tree(depth: int) -> int:
-        return 1 if depth == 0 else sum(side_by_side(tree, [depth - 1] * 4))
+        return 1 if depth == 0 else sum(parallel_map(tree, [depth - 1] * 4))
 
     assert tree(4) == 4**4
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="fork")
 def test_a_fork_has_threads_of_its_own():
-    assert side_by_side(abs, [-1, -2]) == [1, 2]
+    assert parallel_map(abs, [-1, -2]) == [1, 2]
     child = os.fork()
     if child == 0:
-        os._exit(0 if side_by_side(abs, [-1, -2]) == [1, 2] else 1)
+        os._exit(0 if parallel_map(abs, [-1, -2]) == [1, 2] else 1)
     assert os.waitpid(child, 0)[1] == 0
 
 

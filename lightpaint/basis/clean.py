@@ -26,7 +26,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoised, how_denoised, is_there
 from lightpaint.images.resampling import resampled
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 
 FORMAT, PARTS = "lightpaint-clean 1", ("halves", "scales", "present")
 
@@ -192,7 +192,7 @@ def _mixed(halves: Halves, scales: Doubles, weights: Doubles) -> Floats:
     def strip(top: int) -> Floats:
         return mix(halves[:, top : top + STRIP].astype(np.float32), own)
 
-    return np.concatenate(side_by_side(strip, range(0, halves.shape[1], STRIP)))
+    return np.concatenate(parallel_map(strip, range(0, halves.shape[1], STRIP)))
 
 
 def _shape(basis: Basis) -> tuple[int, int, int, int]:
@@ -211,6 +211,6 @@ def _made_of(basis: Basis) -> str:
 
     made = repr((FORMAT, how_denoised(basis.features, raw=""), _shape(basis)))
     content = hashlib.blake2b(made.encode(), digest_size=16)
-    for one in side_by_side(digest, [*range(len(basis.lights)), *others]):
+    for one in parallel_map(digest, [*range(len(basis.lights)), *others]):
         content.update(one)
     return content.hexdigest()

@@ -15,9 +15,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     came: list[int] = []
     try:
         # What takes time to import is imported where an interrupt is heard, and waits.
-        from lightpaint.signals import hearing, interruptible_between_pieces
+        from lightpaint.signals import interruptible_between_pieces, signals_as_interrupts
 
-        with hearing(came):
+        with signals_as_interrupts(came):
             with interruptible_between_pieces():
                 from lightpaint.cli.dispatcher import run_command
             code = run_command(arguments, came)

@@ -19,7 +19,7 @@ from lightpaint.batch.work.derived_looks import (
 from lightpaint.batch.work.work import is_disk_full
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
-from lightpaint.errors import ALONE, OutputError
+from lightpaint.errors import LOOK_ERRORS, OutputError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.result_folder import ResultFolder
@@ -99,7 +99,7 @@ def several_of(
     for job in jobs:
         try:
             anew, places = variation_jobs(job, words), shifted_folders(job, words)
-        except ALONE as error:
+        except LOOK_ERRORS as error:
             if not keep_going:
                 raise
             failed[job.folder.name] = str(error)

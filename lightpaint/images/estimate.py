@@ -12,7 +12,7 @@ from lightpaint.files import one_line
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
-from lightpaint.screen import shortly, some_names
+from lightpaint.screen import short_repr, some_names
 
 #: EXR layer that holds half the difference of two independent halves of the samples.
 HALF_DIFFERENCE = "half_difference"
@@ -37,7 +37,7 @@ class Estimate:
     image: Floats
     half_difference: Floats
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if self.image.shape != self.half_difference.shape:

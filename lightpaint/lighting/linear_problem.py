@@ -14,7 +14,7 @@ from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.weight_penalty import weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.screen import shortly
+from lightpaint.screen import short_repr
 
 
 class LinearProblem:
@@ -152,7 +152,7 @@ class SummedProblem(LinearProblem):
     noise_removed: float = 0.0
     dimming: Doubles | None = None
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     @property
     def transform(self) -> None:

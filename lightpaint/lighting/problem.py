@@ -35,7 +35,7 @@ from lightpaint.lighting.loss.painting import (
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.round_off import remove_traces
 from lightpaint.lighting.views import Views, joint_basis
-from lightpaint.screen import shortly
+from lightpaint.screen import short_repr
 from lightpaint.target.target import Target
 
 #: Mireds by which a light of a range may leave its white in the analysis of uncertainty and bounds.
@@ -104,7 +104,7 @@ class Problem(LinearProblem):
     dimming: Doubles | None = None
     block_side: int = 1
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     @classmethod
     @keywords()

@@ -31,7 +31,7 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.store.steps import name_in_view
 from lightpaint.paint.subject import Subject, painting_path
-from lightpaint.progress import Progress, while_wanted
+from lightpaint.progress import Progress, cancellable
 
 #: Names of long tasks.
 TaskName = Literal["export", "verify", "explain"]
@@ -177,7 +177,7 @@ class BackgroundJobs:
         files: list[Path] = []
         try:
             # Also the exact answer, which may take longer than somebody waits, is given up.
-            with while_wanted(check):
+            with cancellable(check):
                 snapshot, lighting = self._exact_answer()
                 with self._write_lock:
                     check()
@@ -209,7 +209,7 @@ class BackgroundJobs:
 
         try:
             # Also the exact answer, which may take longer than somebody waits, is given up.
-            with self._render_lock, while_wanted(check):
+            with self._render_lock, cancellable(check):
                 check()
                 self._render_and_compare(request.view, check)
         except StoppedError:
@@ -243,7 +243,7 @@ class BackgroundJobs:
             if self._preview_number != request.number:
                 raise StoppedError
 
-        with suppress(StoppedError), while_wanted(check):
+        with suppress(StoppedError), cancellable(check):
             proposed, now = self._host.snapshot_and_lighting(requests)
             weights = now.weights_for(proposed.bases[0])
             clean = self._host.clean_planes(proposed.bases)[request.view]

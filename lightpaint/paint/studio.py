@@ -55,7 +55,7 @@ from lightpaint.paint.store.light_requests import LightRequests
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
-from lightpaint.progress import while_wanted
+from lightpaint.progress import cancellable
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
 
@@ -143,7 +143,7 @@ class Studio:
         with self._lock:
             if self._session is not None:
                 # All is kept before anything is solved, and nobody asks for the answer any more.
-                with suppress(OutdatedError), while_wanted(_raise_outdated):
+                with suppress(OutdatedError), cancellable(_raise_outdated):
                     self._session.client_left(with_stroke=True)
                 self._session.store.close()
 
@@ -400,7 +400,7 @@ class Studio:
                 raise OutdatedError
 
         # The next stroke gets the processors at once, and rings when it is done.
-        with suppress(OutdatedError), while_wanted(check):
+        with suppress(OutdatedError), cancellable(check):
             solution = snapshot.solution()
             self._publish_answer(lambda: session.accept_solution(snapshot, solution))
             if solution is None:

@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.known import Known
 from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
-from lightpaint.files import called
+from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.store.light_requests import LightRequests
@@ -50,7 +50,7 @@ class Subject:
     @property
     def name(self) -> str:
         """Name for people."""
-        return called(Path(self.source))
+        return scene_name(Path(self.source))
 
     @property
     def loaded_scene(self) -> Scene:

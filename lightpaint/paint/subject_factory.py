@@ -9,7 +9,7 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.files import called, file_length
+from lightpaint.files import file_length, scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
@@ -85,7 +85,7 @@ def make_subject(
     name = _name_of(source)
     return Subject(
         source=name,
-        folder=Path(f"{called(Path(name))}.paint").absolute() if folder is None else folder,
+        folder=Path(f"{scene_name(Path(name))}.paint").absolute() if folder is None else folder,
         settings=settings,
         constraints=constraints,
         choice=choice or TransformChoice(),

@@ -46,9 +46,9 @@ from lightpaint.placement.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.presets import on_film
 from lightpaint.scene.scene import Scene
-from lightpaint.screen import shortly
+from lightpaint.screen import short_repr
 from lightpaint.target.target import Target
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 
 
 @dataclass(frozen=True)
@@ -110,14 +110,14 @@ class Job:
     remarks: tuple[str, ...] = field(init=False, repr=False)
     results: ResultFolder = field(init=False, repr=False)
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         self._check_counts()
         if not self.scenes:
             check_nothing_idle(self.settings, self.basis)
         # A painting is read beside the basis, and a mistake in it is said first.
-        *targets, basis = side_by_side(content, [*self.targets, self.basis])
+        *targets, basis = parallel_map(content, [*self.targets, self.basis])
         basis = basis.basis if isinstance(basis, LightGroups) else basis
         if basis is not None and basis.origin.is_light_groups:
             pairs = zip(self.targets, targets, strict=True)

@@ -38,7 +38,7 @@ from lightpaint.screen import some_names
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish
 from lightpaint.target.target import Target
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 
 #: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
 VIEW_KEY = "lightpaint.view"
@@ -214,7 +214,7 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
     def numbers() -> None:
         write_text(folder / "report.json", report_numbers(**how, missed=missed))
 
-    side_by_side(lambda write: write(), (page, comparison, numbers))
+    parallel_map(lambda write: write(), (page, comparison, numbers))
 
 
 def _reported(look: Look, command: str) -> dict[str, Any]:

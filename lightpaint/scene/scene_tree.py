@@ -15,7 +15,7 @@ from typing import Any
 
 from lightpaint.arrays import Position
 from lightpaint.errors import SceneError
-from lightpaint.files import one_line, unnamed
+from lightpaint.files import one_line, without_path
 from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.required import check_required
 from lightpaint.scene.checks.xml import check_nodes, check_xml
@@ -353,4 +353,4 @@ def _without_places(said: str, path: Path) -> str:
     said = re.sub(rf"(?:At|(?:Error w|W)hile loading) {file} \((line \d+, col \d+)\)", r"\1", said)
     said = re.sub(rf'Error while loading XML file "{file}": ', "", said)
     said = re.sub(rf'Parsing of XML file "{file}" failed', "it is no XML", said)
-    return unnamed(said, path)
+    return without_path(said, path)

@@ -63,7 +63,7 @@ def test_only_where_it_is_wanted(room: Path) -> None:
     assert [path.name for path in room.parent.iterdir()] == ["room.xml"]
     assert "must end in .png" in refused(room.parent, "lights", room, "-o", "a.jpg")
     (room.parent / "link.png").symlink_to(room)
-    assert "is read by this command" in refused(room.parent, "lights", room, "-o", "link.png")
+    assert "is an input of this command" in refused(room.parent, "lights", room, "-o", "link.png")
     assert "not allowed with" in refused(room.parent, "lights", room, "-o", "a.png", "--no-sheet")
 
 

@@ -727,7 +727,7 @@ def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
     async def trial() -> None:
         socket = Scripted(*frames, leaves=False)
         page = client.Client(socket)
-        hearing = asyncio.ensure_future(page.receive_all())
+        signals_as_interrupts = asyncio.ensure_future(page.receive_all())
         for _ in range(50):
             await asyncio.sleep(0)
         assert len(frames) - len(socket.to_hear) == 4
@@ -735,7 +735,7 @@ def test_what_a_page_has_said_at_length_is_answered_before_it_says_more(
             heard = await page.next_message()
             assert isinstance(heard.request, Paint)
             assert heard.request.stroke == stroke
-        hearing.cancel()
+        signals_as_interrupts.cancel()
 
     in_a_loop(trial)
 

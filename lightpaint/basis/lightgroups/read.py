@@ -23,7 +23,7 @@ from lightpaint.basis.planes import as_planes
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
-from lightpaint.screen import shortly, some_names
+from lightpaint.screen import short_repr, some_names
 
 #: What one unit of weight is.
 AS_RENDERED = "× as rendered"
@@ -70,7 +70,7 @@ class LightGroups:
     holes: npt.NDArray[np.bool_]
     remarks: tuple[str, ...]
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     @property
     def has_rest(self) -> bool:

@@ -17,7 +17,7 @@ from lightpaint.batch.cluster.parcels import Parcel, files_to_send, pieces
 from lightpaint.batch.cluster.tls import check_trust
 from lightpaint.batch.cluster.worker import versions as own_versions
 from lightpaint.errors import BatchError, LightpaintError
-from lightpaint.files import first_line, in_time
+from lightpaint.files import call_with_timeout, first_line
 from lightpaint.progress import Listener
 
 #: Seconds for the scheduler to answer, to reconnect, and between refreshes of the workers.
@@ -111,7 +111,7 @@ class ClusterWorkers:
             try:
                 # Dask would try to reach one that has ended for 30 s.
                 with dask.config.set({"distributed.comm.timeouts.connect": f"{GONE_S}s"}):
-                    return in_time(work, SILENT_S)
+                    return call_with_timeout(work, SILENT_S)
             except DASK_ERRORS as error:
                 status = _reason(error)
         self.is_gone = True
@@ -191,7 +191,7 @@ def _connect(address: str) -> Any:
             check_trust(address, connection)
         # One that takes the connection and says nothing would be waited for without end.
         make = partial(Client, address, timeout=ANSWER_S, set_as_default=False)
-        return in_time(make, ANSWER_S + GONE_S)
+        return call_with_timeout(make, ANSWER_S + GONE_S)
     except LightpaintError:
         raise
     except DASK_ERRORS as error:

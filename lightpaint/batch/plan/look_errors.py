@@ -13,7 +13,7 @@ from lightpaint.basis.render.render import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.work.worker_cache import WorkerCache
-from lightpaint.errors import ALONE, LightpaintError
+from lightpaint.errors import LOOK_ERRORS, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.pipeline.sources import check_nothing_idle, content
@@ -30,7 +30,7 @@ def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> 
     def attempt(call: Callable[[], Any]) -> Any:
         try:
             return call()
-        except ALONE:
+        except LOOK_ERRORS:
             return None
         except LightpaintError as error:
             mistakes.add(entry.where, str(error))

@@ -22,7 +22,7 @@ from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.derived_looks import adjusted_light_count, derived_folder
 from lightpaint.batch.work.task import EXPORT, answer_task, bases_of, export_task, render_task
 from lightpaint.batch.work.worker_cache import WorkerCache
-from lightpaint.errors import ALONE, BatchError, LightpaintError
+from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.files import check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -98,7 +98,7 @@ class _Planner:
         reads: tuple[Path, ...] = ()
         try:
             entry, reads, remarks = self._resolve_entry(entry)
-        except ALONE as error:
+        except LOOK_ERRORS as error:
             failure = str(error)
         except LightpaintError as error:
             self._mistakes.add(entry.where, str(error))

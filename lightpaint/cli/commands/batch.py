@@ -20,7 +20,7 @@ from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.cli.output import documents, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import BatchError, OutputError
-from lightpaint.files import called
+from lightpaint.files import scene_name
 from lightpaint.screen import some_of, visible
 
 #: Looks that are listed at the end; of more only those that are not done.
@@ -50,7 +50,7 @@ def batch(
         raise BatchError("where is the job to go? give looks.toml --export openjd DIR")
     if form is None and len(paths) > 1:
         raise BatchError(f"{len(paths)} manifests: give one, or --init SCENE PAINTING...")
-    folder = output or Path(called(Path(paths[0])))
+    folder = output or Path(scene_name(Path(paths[0])))
     # The same in all reports, however often it was stopped, and from wherever it is done.
     manifest, into = (str(Path(x).absolute()) for x in (paths[0], folder))
     command = shlex.join(["lightpaint", "batch", manifest, "-o", into])

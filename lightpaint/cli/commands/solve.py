@@ -7,7 +7,7 @@ from lightpaint.cli.commands.answer_text import Table, show_look, spoken_setting
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.tolerances import Wanted
-from lightpaint.errors import ALONE
+from lightpaint.errors import LOOK_ERRORS
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results import Look
@@ -45,7 +45,7 @@ def solve(
             obtained = [look.basis for look in looks]
             if several is not None:
                 several.is_done(job, looks[0].lighting, obtained)
-        except ALONE as error:
+        except LOOK_ERRORS as error:
             if several is None or not several.goes_on(job, error):
                 raise
             continue

@@ -17,8 +17,8 @@ from lightpaint.cli.options.argument_order import options_but
 from lightpaint.cli.output.vocabulary import from_any_folder
 from lightpaint.cli.tolerances import Wanted
 from lightpaint.colour.display.view_transform import TransformChoice
-from lightpaint.errors import ALONE, BasisError, BatchError, OutputError, TargetError
-from lightpaint.files import called, check_files, is_name, is_utf_8, one_line
+from lightpaint.errors import LOOK_ERRORS, BasisError, BatchError, OutputError, TargetError
+from lightpaint.files import check_files, is_name, is_utf_8, one_line, scene_name
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.settings import Settings
@@ -188,7 +188,7 @@ def jobs_of(
     for painting, folder in zip(paintings, folders, strict=True):
         try:
             jobs.append(Job(source, (painting,), folder, basis, asked, settings))
-        except ALONE as error:
+        except LOOK_ERRORS as error:
             if failed is None or not options.keep_going or len(paintings) == 1:
                 raise
             failed[folder.name] = str(error)
@@ -275,7 +275,7 @@ def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> d
     source = sources[0]
     if options.lights_file and not isinstance(source, SceneFile):
         asked = read_constraints(options.lights_file).and_then(asked)
-    named = f"{called(Path(source.path))}.paint"
+    named = f"{scene_name(Path(source.path))}.paint"
     [folder] = folders_of(options.output and Path(options.output), [named])
     # Those that `solve` has too, for the command that answers what was exported.
     dropped = ["output", "new", "host", "port", "with_browser", "view", "exposure"]

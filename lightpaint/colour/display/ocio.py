@@ -119,7 +119,7 @@ def _library_and_config(source: str) -> tuple[Any, Any]:
             config = ocio.Config.CreateFromBuiltinConfig("ocio://default")
         config.validate()
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
-        said = first_line(error, of=source or None)
+        said = first_line(error, path=source or None)
         named = f"OCIO={source}" if source else "the built-in configuration"
         raise ViewError(f"{named} is no OpenColorIO configuration: {said}") from error
     finally:

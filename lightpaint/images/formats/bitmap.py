@@ -110,7 +110,7 @@ def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
     plain["oiio:UnassociatedAlpha"] = 1  # or it multiplies display values by alpha
     file = OpenImageIO.ImageInput.open(str(path), plain)
     if file is None:
-        raise ImageError(f"is damaged: {first_line(OpenImageIO.geterror(), of=path)}")
+        raise ImageError(f"is damaged: {first_line(OpenImageIO.geterror(), path=path)}")
     try:
         if file.format_name() != kind:
             raise ImageError(f"is damaged: it begins like {kind.upper()} and is none")
@@ -119,7 +119,7 @@ def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
         pixels = file.read_image(0, 0, 0, spec.nchannels, spec.format)
         error = file.geterror()
         if pixels is None or error:
-            raise ImageError(f"is damaged or cut off: {first_line(error, of=path)}")
+            raise ImageError(f"is damaged or cut off: {first_line(error, path=path)}")
         if kind == "tiff":
             _check_pages(file, spec)
     finally:

@@ -132,7 +132,7 @@ def read_parts(path: Path) -> list[ExrPart]:
         try:
             parts = OpenEXR.File(str(path), separate_channels=True).parts
         except Exception as error:
-            raise ImageError(f"{path} is damaged: {first_line(error, of=path)}") from error
+            raise ImageError(f"{path} is damaged: {first_line(error, path=path)}") from error
     if len(parts) != len(declared):
         raise ImageError(
             f"{path} is cut off or damaged: only {len(parts)} of its {len(declared)} parts can be "
@@ -148,7 +148,7 @@ def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
         declared = [(part.name(), dict(part.header)) for part in header.parts]
         _windows(declared[0][1])
     except Exception as error:
-        raise ImageError(_why_unreadable(path, first_line(error, of=path))) from error
+        raise ImageError(_why_unreadable(path, first_line(error, path=path))) from error
     return declared
 
 
@@ -249,7 +249,7 @@ def write_parts(path: Path, parts: Sequence[ExrPart]) -> None:
         try:
             OpenEXR.File(exr_parts).write(str(beside))
         except RuntimeError as error:  # the library's word for a full disk and the like
-            raise OutputError(f"cannot write {path}: {first_line(error, of=beside)}") from error
+            raise OutputError(f"cannot write {path}: {first_line(error, path=beside)}") from error
 
 
 def is_worth_packing(channels: Channels) -> bool:

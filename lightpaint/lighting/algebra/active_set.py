@@ -7,7 +7,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.algebra.clipped_newton import RIDGE
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic
-from lightpaint.progress import wanted
+from lightpaint.progress import cancellation_check
 
 
 @dataclass
@@ -32,7 +32,7 @@ def polish(q: Quadratic, x: Doubles, *, tolerance: float, max_steps: int) -> tup
     working = _working_set(q, x)
     release_all, best, since_best = True, np.inf, 0
     progress = 0.0  # of the objective, since the last optimum of a working set
-    check = wanted()
+    check = cancellation_check()
     for step in range(max_steps):
         check()
         gradient = q.gradient(x)

@@ -10,7 +10,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra.clipped_newton import RIDGE
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic, kkt_residual
-from lightpaint.progress import wanted
+from lightpaint.progress import cancellation_check
 
 #: Steps after which methods take over that cannot cycle.
 MAX_STEPS = 20
@@ -23,7 +23,7 @@ def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Double
     multipliers = q.cap_multipliers(x, q.gradient(x))
     at_lower, at_upper = q.active_caps(x)
     at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
-    check = wanted()
+    check = cancellation_check()
     for step in range(MAX_STEPS + 1):
         check()
         gradient = q.gradient(x)

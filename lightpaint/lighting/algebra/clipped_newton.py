@@ -13,7 +13,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.algebra.nearest_optimum import is_suspect
 from lightpaint.lighting.algebra.quadratic import EPSILON, kkt_step
-from lightpaint.progress import wanted
+from lightpaint.progress import cancellation_check
 
 #: Ridge per √n on the unit diagonal of M, so that no set of lights is singular, not even of
 #: coincident ones. Each step is then one of the proximal-point method, whose repetition converges
@@ -44,7 +44,7 @@ def clipped_newton(
     good (see nearest_optimum.py). Where a residual is above `tolerance`, x is of no use.
     """
     matrix, counts = np.eye(0), np.einsum("cii->ci", M) > 0
-    check = wanted()
+    check = cancellation_check()
     for step in range(MAX_STEPS + 1):
         check()
         gradient = np.matmul(M, x[:, :, None])[:, :, 0] - b

@@ -14,8 +14,8 @@ from lightpaint.lighting.algebra.clipped_newton import clipped_newton
 from lightpaint.lighting.algebra.gauss_seidel import sweep
 from lightpaint.lighting.algebra.nearest_optimum import nearest_equal
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER, Cap, Quadratic, scaled
-from lightpaint.progress import wanted
-from lightpaint.threads import one_thread, side_by_side
+from lightpaint.progress import cancellation_check
+from lightpaint.threads import one_thread, parallel_map
 
 #: The paper's iteration alone, or Newton's on the active set, with the paper's to fall back on.
 Method = Literal["polished", "gauss-seidel"]
@@ -144,7 +144,7 @@ def minimise_each(
 
     left = [c for c in range(count) if c not in found]
     solved = (
-        side_by_side(solve, left)
+        parallel_map(solve, left)
         if n > MAX_BATCHED_UNKNOWNS and len(left) > 1
         else map(solve, left)
     )
@@ -243,7 +243,7 @@ def _solve_by_sweeps(
     """Solve by Gauss–Seidel sweeps alone; return (x, sweeps, 0)."""
     _, _, residual = q.violations(x)
     sweeps = 0
-    check = wanted()
+    check = cancellation_check()
     while residual > tolerance and sweeps < max_sweeps:
         check()
         # The gradient is computed anew each time, so that its round-off does not decide when to

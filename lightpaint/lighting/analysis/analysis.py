@@ -17,8 +17,8 @@ from lightpaint.lighting.analysis.constraint_cost import without_constraints
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
-from lightpaint.screen import shortly
-from lightpaint.threads import side_by_side
+from lightpaint.screen import short_repr
+from lightpaint.threads import parallel_map
 
 
 @keywords()
@@ -51,7 +51,7 @@ class Analysis:
     unconstrained: Solution | None
     color_choices: Choices = ()
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
 
 @keywords()
@@ -73,7 +73,7 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     jobs += [partial(_ambiguities, solution)]
     jobs += [partial(without_constraints, view) for view in views]
     # The jobs are independent, and each leaves a processor idle now and then.
-    answers = iter(side_by_side(lambda ask: ask(), jobs))
+    answers = iter(parallel_map(lambda ask: ask(), jobs))
     looked_at: list[tuple[Seen, Diagnosis]] = [next(answers) for _ in views]
     seen = [its for its, _ in looked_at]
     diagnoses = [diagnosis for _, diagnosis in looked_at]

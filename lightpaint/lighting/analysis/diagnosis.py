@@ -27,7 +27,7 @@ from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
-from lightpaint.screen import shortly
+from lightpaint.screen import short_repr
 
 #: Blocks along each side of the image for finding where light is missing, and regions along each
 #: side that sentences name: left, middle, right.
@@ -99,7 +99,7 @@ class Diagnosis:
     painting_noise: float = 0.0
     lighting_total: float = 0.0
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     @property
     def avoidable(self) -> float:

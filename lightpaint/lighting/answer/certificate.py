@@ -9,7 +9,7 @@ from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.answer.software_versions import Software
-from lightpaint.screen import shortly
+from lightpaint.screen import short_repr
 
 
 @keywords()
@@ -69,7 +69,7 @@ class Certificate:
     software: Software | None = None
     basis_spp: int | None = None
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     def __str__(self) -> str:
         state = "closest there is"

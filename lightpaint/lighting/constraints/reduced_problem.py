@@ -17,7 +17,7 @@ from lightpaint.lighting.constraints.knobs import Knob
 from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.constraints.unknown_blocks import Block
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 
 #: Pull towards the start in channels where a light reaches nothing, relative to its other channels.
 DARK_PULL = 1e-8
@@ -304,7 +304,7 @@ def _solve_blocks(
         return minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps, start=begin, **options)
 
     parts = _block_problems(left, across, reduction)
-    return side_by_side(solve, parts) if len(parts) > 1 else [solve(p) for p in parts]
+    return parallel_map(solve, parts) if len(parts) > 1 else [solve(p) for p in parts]
 
 
 def _without_dark_channels(

@@ -17,7 +17,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import SizeError
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.threads import one_thread, side_by_side
+from lightpaint.threads import one_thread, parallel_map
 
 #: Pixels along the side of a tile. Smaller tiles fit a brush better, but there are more to add.
 TILE_SIDE = 16
@@ -104,7 +104,7 @@ class TiledEquations:
         blocks = product(_split_range(rows, few // wide), _split_range(columns, wide))
         sum_block = partial(self._sum, with_M=with_M)
         if with_M and self._count > MAX_CHEAP_LIGHTS:
-            side_by_side(sum_block, blocks)
+            parallel_map(sum_block, blocks)
         else:
             with one_thread():
                 for block in blocks:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 
 #: Pixels in a strip.
 STRIP_PIXELS = 2**13
@@ -108,7 +108,7 @@ class PixelLoss(ABC):
         """Return the result of each strip, in order."""
         if len(self.strips) == 1:
             return [work(*self.strips[0])]
-        return side_by_side(lambda strip: work(*strip), self.strips)
+        return parallel_map(lambda strip: work(*strip), self.strips)
 
 
 class Loss(ABC):

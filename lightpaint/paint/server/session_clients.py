@@ -46,7 +46,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.server.client import Client, IncomingMessage
 from lightpaint.paint.session_owner import SessionOwner
 from lightpaint.paint.store.store import Store
-from lightpaint.progress import while_wanted
+from lightpaint.progress import cancellable
 
 #: Clients, at most.
 MAX_PAGES = 16
@@ -181,7 +181,7 @@ class Connections:
 
     def _run_while_open(self, work: Callable[..., _Result], *arguments: Any) -> _Result:
         """Run work that gives up once the connections are closed."""
-        with while_wanted(self._check_open):
+        with cancellable(self._check_open):
             return work(*arguments)
 
     def _check_open(self) -> None:

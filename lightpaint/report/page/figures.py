@@ -23,7 +23,7 @@ from lightpaint.report.answer_pictures import (
     residual_of,
     residual_picture,
 )
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 
 #: Ends of the importance map's legend, as `importance_picture` shows a mid grey.
 UNCOUNTED, COUNTED = "#393939", "#e8d8a2"
@@ -142,8 +142,8 @@ def wipe(looks: list[PagePicture]) -> str:
             for k, look in enumerate(looks)
         )
 
-    shown = side_by_side(lambda look: data_uri(to_8_bit(look.pixels)), looks)
-    raw = side_by_side(_raw_uri, looks)
+    shown = parallel_map(lambda look: data_uri(to_8_bit(look.pixels)), looks)
+    raw = parallel_map(_raw_uri, looks)
     images = "".join(
         f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
         f'width="{width}" height="{height}" draggable="false" alt="{look.name}: {look.alt}" '

@@ -30,7 +30,7 @@ from lightpaint.report.uncertainty_sentences import (
     spoken_errors,
     unreached_channels,
 )
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 
 #: Headings of the columns, with the classes of their cells.
 COLUMNS = (
@@ -127,7 +127,7 @@ def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int,
         return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
 
     return make_once(
-        basis, ("thumbnails", is_clean), lambda: side_by_side(shown, range(len(basis.lights)))
+        basis, ("thumbnails", is_clean), lambda: parallel_map(shown, range(len(basis.lights)))
     )
 
 

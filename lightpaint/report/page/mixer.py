@@ -30,7 +30,7 @@ from lightpaint.lighting.answer.lighting_file import lighting_fields
 from lightpaint.report.basis_memo import cached_clean_planes, make_once
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.lights_table import most_visible_lights
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 from lightpaint.viewer.bundle import bundled, styles
 
 #: Pixels of a plane from left to right, and of all planes together, at most.
@@ -150,11 +150,11 @@ def _compact_planes(
             made = planes.plane(lights[k]) if planes else basis.planes.plane(lights[k])
         return np.asarray(block_mean(made, factor), np.float32)
 
-    pictures = side_by_side(small, range(len(lights) + len(mixes)))
+    pictures = parallel_map(small, range(len(lights) + len(mixes)))
     if is_clean and planes is None and factor < CLEAN_REDUCTION:
         features = basis.features and basis.features.reduced(factor)
         pictures = [denoised(picture, features) for picture in pictures]
-    return list(pictures[0].shape[:2]), side_by_side(plane_data, pictures)
+    return list(pictures[0].shape[:2]), parallel_map(plane_data, pictures)
 
 
 def _light(basis: Basis, lighting: Lighting, k: int) -> dict[str, Any]:

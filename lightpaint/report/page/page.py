@@ -44,7 +44,7 @@ from lightpaint.report.page.suggestion_section import suggestion_section
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
-from lightpaint.threads import side_by_side
+from lightpaint.threads import parallel_map
 
 
 def report_page(
@@ -101,7 +101,7 @@ def report_page(
         ),
         partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
     )
-    made = side_by_side(lambda make: make(), making)
+    made = parallel_map(lambda make: make(), making)
     mixer, of_pixels, pictures, what_is_missed, constraints, lights = made
     return Template(template.read_text(encoding="utf-8")).substitute(
         title=escape(f"{target.name} · {basis.origin.scene}"),

@@ -42,7 +42,7 @@ from lightpaint.lighting.analysis.diagnosis import (
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 from lightpaint.lighting.solution import Solution
-from lightpaint.screen import shortly
+from lightpaint.screen import short_repr
 
 #: Mean ΔE up to which a result is close: visible only side by side; and from which on it is another
 #: picture.
@@ -108,7 +108,7 @@ class Seen:
     parts: Mapping[str, float] = field(default_factory=dict)
     elsewhere: UnpaintedChange | None = None
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     @property
     def causes(self) -> tuple[Reason, ...]:

@@ -32,7 +32,7 @@ from lightpaint.lighting.loss.weight_penalty import dimming_factors
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, gamuts_for
 from lightpaint.lighting.solution import Solution
-from lightpaint.screen import shortly
+from lightpaint.screen import short_repr
 
 #: The least number of pixels in a sample, the pixels for each light, and compared painted pixels.
 MIN_SAMPLE, PIXELS_PER_LIGHT, COMPARED_PIXELS = 2**12, 2**6, 2**12
@@ -75,7 +75,7 @@ class ColorChoice:
     color: RGB
     weights: Doubles
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
 
 #: Of one view.

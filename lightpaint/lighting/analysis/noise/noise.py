@@ -15,7 +15,7 @@ from lightpaint.basis.planes import BLOCK, FEW_LIGHTS, Planes, run_of
 from lightpaint.lighting.analysis.noise.peaks import Peaks
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
-from lightpaint.threads import one_thread, side_by_side
+from lightpaint.threads import one_thread, parallel_map
 
 #: The largest share of M, in any direction of the weights, that may be removed as noise. Beyond,
 #: the estimate is itself noise, and the rest of M would soon be indefinite.
@@ -93,7 +93,7 @@ def noise_sums(solution: Solution) -> Noise:
     length = BLOCK * max(1, -(-counted.size // (BLOCK * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
     sums = [_Sums.zeros(len(weights))] + (
-        side_by_side(lambda its: pixels.sums(its, weights, pulled, is_coupled=is_coupled), parts)
+        parallel_map(lambda its: pixels.sums(its, weights, pulled, is_coupled=is_coupled), parts)
         if len(weights) <= FEW_LIGHTS
         else [pixels.sums(its, weights, pulled, is_coupled=is_coupled) for its in parts]
     )

@@ -34,7 +34,7 @@ from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
-from lightpaint.screen import shortly
+from lightpaint.screen import short_repr
 
 #: Standard errors on either side of a 95 % interval, and the share of all cases outside.
 NORMAL_95, OUTSIDE_SHARE = 1.96, 0.05
@@ -91,7 +91,7 @@ class Uncertainty:
     target_norm2: Doubles
     untold: Bools
 
-    __repr__ = shortly
+    __repr__ = short_repr
 
     @property
     def relative_excess(self) -> float:
