@@ -1,7 +1,7 @@
 """Round trips through paint programs, where they are installed: the same lighting in all formats.
 
 Each program paints on a template, by a script and with its own means, and saves that in all formats
-it has. What docs/targets.md says of programs was measured in the same way on a real scene.
+it has. What docs/benchmarks.md says of formats was measured in the same way on a real scene.
 """
 
 import os
