@@ -10,9 +10,9 @@ from functools import lru_cache
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.display.srgb import decode_display, encode_display, to_8_bit
 from lightpaint.colour.planckian_locus import nearest_mired, uv_of, uv_of_black_body, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.colour.srgb import decode_display, encode_display, to_8_bit
 from lightpaint.errors import ColorError
 
 #: Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2).

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.srgb import decode_display
 from lightpaint.colour.primaries import REC709, adaptation, rgb_to_xyz, to_rec709
+from lightpaint.colour.srgb import decode_display
 from lightpaint.errors import ImageError
 
 Curve = Callable[[Floats], Floats]

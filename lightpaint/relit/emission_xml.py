@@ -8,7 +8,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
 from lightpaint.relit.xml_edit import Element, XmlFile, tag
-from lightpaint.scene.lights.emission import AS_AUTHORED, Scaling
+from lightpaint.scene.emission import AS_AUTHORED, Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene
 

@@ -20,7 +20,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.emission_xml import Changes, set_emission
 from lightpaint.relit.xml_edit import XmlFile, tag
-from lightpaint.scene.lights.emission import Scaling
+from lightpaint.scene.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.screen import some_names

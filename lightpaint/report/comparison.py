@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
 from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
 from lightpaint.lighting.solution import Solution

@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.colour.display.srgb import encode_display, to_8_bit
+from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.lighting import Lighting

@@ -20,16 +20,17 @@ from lightpaint.files import file_length
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.legacy import words_for_old_scenes
 from lightpaint.scene.checks.xml import MAX_XML
+from lightpaint.scene.emission import EmitterSetting
 from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.integrator import Integrator, IntegratorChoice
-from lightpaint.scene.lights.emission import EmitterSetting
 from lightpaint.scene.lights.emitters import Emitter, check_emitters, find_emitters, point_emitter
 from lightpaint.scene.lights.light import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights.light_choice import REST, choose_lights
 from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside, lights_file_for
+from lightpaint.scene.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene_tree import ParsedScene, mitsuba_errors, render_errors
+from lightpaint.scene.scene_tree import ParsedScene
 from lightpaint.scene.shape_names import shape_names
 from lightpaint.screen import Listed, Shown, some_names, some_of
 

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats, largest
-from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture

@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.errors import LightpaintError, TargetError
 from lightpaint.files import one_line, read_text, write_bytes, write_text
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from lightpaint.colour.display.srgb import decode_display, encode_display
 from lightpaint.colour.display.tone_curves import AGX_INSET, MIDDLE_GREY
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import decode_display, encode_display
 from lightpaint.errors import ViewError
 
 BUILT_IN = ["srgb", "linear", "filmic", "agx"]

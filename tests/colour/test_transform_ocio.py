@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.display.srgb import encode_display
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import encode_display
 from lightpaint.errors import ViewError
 
 ocio: Any = pytest.importorskip("PyOpenColorIO", reason="OpenColorIO")

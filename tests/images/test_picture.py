@@ -16,8 +16,8 @@ import tifffile
 from picture_files import ADOBE, P3, SRGB, SRGB_CURVE, curv, icc, layered, para, png, psd
 from PIL import Image, ImageCms
 
-from lightpaint.colour.display.srgb import decode_display
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import decode_display
 from lightpaint.errors import ImageError
 from lightpaint.images.formats import openraster as layered_module
 from lightpaint.images.formats.png import MAX_CHUNK, longest_png

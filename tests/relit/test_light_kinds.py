@@ -14,7 +14,7 @@ from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.lights.emission import MULTIPLE, Scaling
+from lightpaint.scene.emission import MULTIPLE, Scaling
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 

@@ -12,8 +12,8 @@ from PIL import Image, ImageDraw
 
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.srgb import encode_display, to_8_bit
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.png import png_bytes

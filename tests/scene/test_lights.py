@@ -7,7 +7,7 @@ import pytest
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
-from lightpaint.scene.lights.emission import MULTIPLE, EmissionKind, Scaling
+from lightpaint.scene.emission import MULTIPLE, EmissionKind, Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.light_choice import REST, choose_lights

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.colour.display.srgb import encode_display
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import encode_display
 from lightpaint.errors import SizeError, TargetError
 from lightpaint.images.formats.exr import read_parts
 from lightpaint.lighting.solve import solve

@@ -18,10 +18,10 @@ from lightpaint.basis.render.separate import (
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
+from lightpaint.scene.mitsuba_errors import render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, plan_passes, view_seed
-from lightpaint.scene.scene_tree import render_errors
 from lightpaint.scene.surfaces import render_first_hits
 
 #: Camera samples that choices of emitters are learned from before any counts.

@@ -19,8 +19,8 @@ from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook
 from lightpaint.batch.work.task import EXPORT, Kind
 from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.errors import LightpaintError
 from lightpaint.files import read_text, replacing
 from lightpaint.images.denoiser import denoised

@@ -15,7 +15,7 @@ from lightpaint.pipeline.result_folder import RECORD
 from lightpaint.pipeline.results import Look
 from lightpaint.relit.verification import Verification
 from lightpaint.report.report_json import finite, verification_numbers
-from lightpaint.scene.lights.emission import MULTIPLE
+from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.lights.light import WHOLE_EMISSION, Light
 from lightpaint.scene.scene import Scene
 

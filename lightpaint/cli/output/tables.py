@@ -10,7 +10,7 @@ from lightpaint.relit.verification import Verification
 from lightpaint.report.page.suggestion_section import spoken_position, spoken_suggestions
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.verdict import agreement
-from lightpaint.scene.lights.emission import MULTIPLE
+from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.scene import Scene

@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats, largest
 from lightpaint.colour.color import luminance
-from lightpaint.colour.display.srgb import MAX_STOPS
+from lightpaint.colour.srgb import MAX_STOPS
 
 #: Luminance of middle grey, beside white at 1; and the percentile of what is lit that is its
 #: highlights, of which a picture is not judged by the brightest few.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.srgb import decode_display, encode_display
+from lightpaint.colour.srgb import decode_display, encode_display
 
 #: AgX's log range, in stops about middle grey.
 AGX_STOPS = (-10.0, 6.5)

@@ -20,8 +20,8 @@ from typing import Protocol
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.srgb import MAX_STOPS
 from lightpaint.colour.display.tone_curves import BUILT_IN, Curve
+from lightpaint.colour.srgb import MAX_STOPS
 from lightpaint.errors import ViewError
 from lightpaint.keywords import keywords
 

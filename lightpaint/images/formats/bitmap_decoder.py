@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.srgb import encode_display
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.icc import Profile
 from lightpaint.colour.primaries import converted
+from lightpaint.colour.srgb import encode_display
 from lightpaint.errors import ImageError
 from lightpaint.images.formats.bitmap import Bitmap
 

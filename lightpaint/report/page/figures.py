@@ -9,8 +9,8 @@ import numpy.typing as npt
 from PIL import Image
 
 from lightpaint.arrays import Floats, largest
-from lightpaint.colour.display.srgb import encode_display, to_8_bit
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.solution import Solution

@@ -12,8 +12,8 @@ from lightpaint.arrays import RGB, Doubles, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
-from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.photometry import Photometry
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.answer.lighting import Lighting

@@ -17,10 +17,10 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.transform_table import curve_of, lattice_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.photometry import photometry
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.page_picture import Compact, compact
 from lightpaint.images.pixel_blocks import block_mean

@@ -5,8 +5,8 @@ from dataclasses import replace
 from html import escape
 
 from lightpaint.arrays import Floats
-from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.page.figures import data_uri

@@ -12,7 +12,7 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
-from lightpaint.scene.lights.emission import (
+from lightpaint.scene.emission import (
     AS_AUTHORED,
     ENVIRONMENTS,
     PLUGINS,

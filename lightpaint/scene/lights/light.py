@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
-from lightpaint.scene.lights.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
+from lightpaint.scene.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.screen import some_names
 

@@ -7,7 +7,7 @@ A street of three hundred lamps without ids is three hundred unknowns that nobod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import count, pairwise
 
-from lightpaint.scene.lights.emission import Scaling
+from lightpaint.scene.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
 
 #: So many that are alike stay apart: they can be looked at one by one.

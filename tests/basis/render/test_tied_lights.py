@@ -11,7 +11,7 @@ from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import SEPARATE, is_of, render_basis
 from lightpaint.basis.render.separate import BLACK, WHITE
-from lightpaint.scene.lights.emission import MULTIPLE
+from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.scene import Scene, load_scene
 
 #: A lamp of the kind and the colour of `bulb`.

@@ -21,7 +21,7 @@ from neighbour import Neighbour
 from websockets.sync.client import ClientConnection, connect
 
 import lightpaint as lp
-from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio

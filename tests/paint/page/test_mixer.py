@@ -12,8 +12,8 @@ from interface import Finger
 
 import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.display.srgb import to_8_bit
 from lightpaint.colour.display.transform_table import curve_of, lattice_of
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.page_picture import BRIGHTEST, DROPPED, compact, expanded
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.page.html import SHOWN

@@ -20,7 +20,7 @@ from renderer import REPOSITORY
 
 import lightpaint as lp
 from lightpaint.cli.commands.session_options import solve_command
-from lightpaint.colour.display.srgb import to_8_bit
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
 from lightpaint.paint.server.server import Server

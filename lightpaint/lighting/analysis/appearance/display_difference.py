@@ -11,8 +11,8 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.planes import Planes
 from lightpaint.colour.color_difference import ciede2000, lab
 from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.colour.display.srgb import decode_display
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import decode_display
 from lightpaint.lighting.loss.painting import at_least_mask, target_light
 from lightpaint.lighting.problem import Problem
 
