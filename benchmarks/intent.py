@@ -42,7 +42,7 @@ from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.images.denoiser import denoised
-from lightpaint.lighting.analysis.appearance import limiting_reasons as held_back
+from lightpaint.lighting.analysis.appearance import limiting_reasons
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SIZES = {"gallery": "160x90", "stage": "160x90", "cornell": "64x64"}
@@ -174,8 +174,8 @@ def loosened(name: str, options: argparse.Namespace) -> None:
                 continue
             holds = [solution.problem.fit.hold]
             for share in SHARES:
-                held_back.LOOSENED_SHARE = share
-                hold = next(x for x in held_back.reasons_of(solution) if x.kind == "hold")
+                limiting_reasons.LOOSENED_SHARE = share
+                hold = next(x for x in limiting_reasons.reasons_of(solution) if x.kind == "hold")
                 holds.append(hold.loosening.hold if hold.loosening else holds[0])
             answers = [answer(basis, case, {"hold": hold}) for hold in [*holds, 0.0]]
             found.append([case.judged(x) for x in (case.current, *answers)])

@@ -51,9 +51,9 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.appearance.appearance import what_is_seen as what_is_seen
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
+    from lightpaint.lighting.analysis.noise.noise_correction import correct_noise as correct_noise
     from lightpaint.lighting.analysis.noise.refinement import refine as refine
     from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty as Uncertainty
-    from lightpaint.lighting.analysis.noise.uncertainty import correct_noise as correct_noise
     from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
     from lightpaint.lighting.answer.certificate import Certificate as Certificate
     from lightpaint.lighting.answer.lighting import Lighting as Lighting
@@ -122,7 +122,7 @@ _HOMES = {
     "ViewTransform": "colour.display.view_transform",
     "analyse": "lighting.analysis.analysis",
     "combine": "lighting.answer.lighting",
-    "correct_noise": "lighting.analysis.noise.uncertainty",
+    "correct_noise": "lighting.analysis.noise.noise_correction",
     "diagnose": "lighting.analysis.diagnosis",
     "display_picture": "images.formats.png",
     "error_bars": "lighting.analysis.noise.uncertainty",

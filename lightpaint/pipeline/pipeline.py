@@ -13,7 +13,7 @@ from lightpaint.basis.render.render import render_basis, samples_for
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution

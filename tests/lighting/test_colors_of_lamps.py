@@ -11,7 +11,7 @@ from lightpaint.basis.render.render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.white_range import white_range
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 
 ROOT = Path(__file__).parent.parent.parent
 

@@ -12,8 +12,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.diagnosis import diagnose
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.refinement import refine
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise, error_bars
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.lighting import Lighting, combine
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced

@@ -18,7 +18,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.commands.session_options import solve_command
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import plane_denoiser as cleaning
 from lightpaint.paint import protocol, studio, subject
 from lightpaint.paint import session_exports as exports

@@ -11,7 +11,7 @@ from conftest import BasisFactory
 from scipy.stats import kstest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare

@@ -9,7 +9,8 @@ from nightly import at_night
 from renderer import CORNELL
 
 import lightpaint as lp
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise, error_bars
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.render_rounds import refine_by_rendering
 from lightpaint.scene.scene_render import Stream, pass_seed

@@ -8,7 +8,7 @@ import pytest
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.constraint_cost import without_constraints
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.constraint_section import constraints_section

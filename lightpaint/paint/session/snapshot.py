@@ -11,10 +11,10 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.clean import CleanPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.analysis.appearance.appearance import NOTICED
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.error_place import NOTICED
 from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution

@@ -14,7 +14,8 @@ from lightpaint.basis.lightgroups.folder import is_light_groups
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise, error_bars
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
 

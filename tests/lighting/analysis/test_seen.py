@@ -10,9 +10,9 @@ from lightpaint.colour.color_difference import delta_e
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.analysis.appearance import limiting_reasons as held_back
 from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Seen, what_is_seen
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.pixel_sample import PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
 from lightpaint.lighting.answer.lighting import combine
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -182,7 +182,7 @@ def test_what_counts_of_the_few_pixels_is_what_counts_of_all(make_basis: Any):
     look = _look(basis)
     target = _over(look, (slice(None), slice(0, 240)), 0.6)
     solution = solve(basis, target, hold=3.0)
-    sample = held_back._PixelSample.of(solution)
+    sample = PixelSample.of(solution)
     weights = sample.solve((), sample.others)
     np.testing.assert_allclose(weights, solution.weights, rtol=2e-3)  # where both solves stop
 
@@ -205,7 +205,7 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     weaker = hold.loosening
     assert weaker is not None
     assert 0 < weaker.hold < 10
-    sample = held_back._PixelSample.of(solution)
+    sample = PixelSample.of(solution)
     holds = (weaker.hold, 1.3 * weaker.hold)  # the steps of the search are finer than that
     brought, less = (sample.share_of(sample.solve((), sample.others, hold=h)) for h in holds)
     assert brought >= 0.5 * hold.share > less

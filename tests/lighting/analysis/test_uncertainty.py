@@ -12,11 +12,11 @@ from lightpaint.basis.basis import Basis
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.refinement import refine
 from lightpaint.lighting.analysis.noise.uncertainty import (
     NORMAL_95,
     _one_sided,
-    correct_noise,
     error_bars,
     with_error_bars,
 )

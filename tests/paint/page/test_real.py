@@ -22,7 +22,7 @@ import lightpaint as lp
 from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.object_map import Objects
-from lightpaint.lighting.analysis.noise.uncertainty import correct_noise
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.steps import name_in_view
 from lightpaint.paint.store.store import Store

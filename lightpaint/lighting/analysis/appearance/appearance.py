@@ -10,30 +10,32 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, as_rgb
-from lightpaint.colour.color import luminance
-from lightpaint.colour.color_difference import ciede2000
 from lightpaint.images.estimate import Estimate
-from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
     ConstraintsByLight,
 )
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.error_place import (
+    NOTICED,
+    SPOT,
+    block_differences,
+    lights_at,
+    object_with_most_error,
+    place_with_most_error,
+)
 from lightpaint.lighting.analysis.appearance.limiting_reasons import (
     HEADLINE_SHARE,
-    LimitGroup,
     Reason,
     reasons_of,
 )
-from lightpaint.lighting.analysis.appearance.object_miss import object_with_most
+from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
     UnpaintedChange,
     unpainted_change,
 )
 from lightpaint.lighting.analysis.diagnosis import (
-    REGIONS,
     Diagnosis,
     Place,
     diagnose,
@@ -48,24 +50,14 @@ from lightpaint.screen import short_repr
 #: picture.
 CLOSE, FAR = 3.0, 10.0
 
-#: ΔE that is visible at a glance, and the smallest share of the paint of such a spot.
-NOTICED, SPOT = 6.0, 0.02
-
 #: ΔE that is invisible, and the least share of the requested change that has to come about.
 INVISIBLE, MIN_CHANGE = 1.0, 0.3
 
 #: Largest share of a great change that may be missing before the answer counts as far.
 FAR_SHARE = 0.5
 
-#: Share of its light on its brightest pixels from which a light reaches a place, and from which it
-#: contributes much there.
-GETS_THERE, DOES_MUCH = 0.01, 0.1
-
 #: Kinds of constraints that fix the level of a light.
 FIXING_KINDS: tuple[ConstraintKind, ...] = ("off", "lock")
-
-#: Step between pixels, along each side, that suffices to find the brightest.
-STEP = 2
 
 
 @keywords()
@@ -213,7 +205,7 @@ def what_is_seen(
     look = PaintComparison.of_problem(problem)
     light, grain = look.pixels(predicted.image), look.pixels(predicted.half_difference)
     now = look.pixels(problem.basis.mix(problem.basis.present_weights))
-    with_noise, missed = _block_differences(look, light, grain)
+    with_noise, missed = block_differences(look, light, grain)
     delta_e, left = (float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed))
     seen = Seen(delta_e, max(delta_e - left, 0.0), look.mean(look.difference(now)))
     if len(problem.views) > 1:
@@ -221,14 +213,14 @@ def what_is_seen(
     seen = replace(seen, elsewhere=_unpainted_change(solution, look, predicted))
     if not missed.any():
         return seen
-    place, share = _place(look, missed, light, grain)
+    place, share = place_with_most_error(look, missed, light, grain)
     seen = replace(seen, place=place, is_spot=share >= SPOT)
     if seen.is_close and not seen.is_spot:
         return seen
-    there, does_much = _lights_at(solution, place)
+    there, does_much = lights_at(solution, place)
     if (objects := solution.basis.objects) is not None:
         seen = replace(
-            seen, place=replace(place, object=_error_object(look, objects, missed, light))
+            seen, place=replace(place, object=object_with_most_error(look, objects, missed, light))
         )
     # Without the constraint to be white, which applies to all.
     by_light = constraints_by_light(problem.constraints, solution.basis.lights)
@@ -265,98 +257,3 @@ def _unpainted_change(
         before[its] = solution.weights[its]
     now = basis.mix(before)
     return unpainted_change(look, basis, target.importance > 0, now, predicted.image)
-
-
-def _block_differences(
-    look: PaintComparison, light: Doubles, grain: Doubles
-) -> tuple[Doubles, Doubles]:
-    """Return the mean ΔE in each block, (rows, columns), as it is, and without the part of noise.
-
-    Noise and error add as squares, since they are independent. But a painting over the same renders
-    shares their noise: so noise explains at most the differences between pixels that remain
-    without their mean, which noise hardly moves.
-    """
-    of_light, of_paint = look.lab(light), look.lab_goal(light)
-    whole = look.in_blocks(ciede2000(of_light, of_paint))
-    if not grain.any():
-        return whole, whole
-    of_means = ciede2000(look.in_blocks(of_light), look.in_blocks(of_paint))
-    between = np.square(whole) - np.square(np.minimum(of_means, whole))
-    noise = np.square(look.in_blocks(ciede2000(of_light, look.lab(light + grain))))
-    return whole, np.sqrt(np.square(whole) - np.minimum(noise, between))
-
-
-def _place(
-    look: PaintComparison, missed: Doubles, light: Doubles, grain: Doubles
-) -> tuple[Place, float]:
-    """Find the place with most of the fit's error, and the share of paint with visible error
-    there."""
-    weights = look.block_weights
-    amount = weights * _block_errors(look, light, grain)
-    if not amount.any():
-        amount = weights * missed
-    region = np.zeros((REGIONS, REGIONS))
-    at = [REGIONS * np.arange(length) // length for length in amount.shape]
-    np.add.at(region, np.ix_(*at), amount)
-    worst = np.unravel_index(int(np.argmax(region)), region.shape)
-    inside = (at[0] == worst[0])[:, None] & (at[1] == worst[1])
-    row, column = np.unravel_index(int(np.argmax(np.where(inside, amount, -1))), amount.shape)
-    # Paint and answer there, weighted by the error.
-    its = np.where(inside, amount, 0)
-    painted, reached = (
-        np.average(look.in_blocks(x).reshape(-1, 3), axis=0, weights=its.ravel())
-        for x in (look.painted[look.counts].astype(np.float64), light)
-    )
-    place = Place(
-        region=(int(worst[0]), int(worst[1])),
-        share=float(region[worst] / region.sum()),
-        box=look.box(int(row), int(column)),
-        painted=as_rgb(painted),
-        reached=as_rgb(reached),
-    )
-    return place, float((weights * (missed > NOTICED) * inside).sum() / weights.sum())
-
-
-def _block_errors(look: PaintComparison, light: Doubles, grain: Doubles) -> Doubles:
-    """Return the error of each block in the fit, (rows, columns), less its noise.
-
-    Noise explains at most the differences between pixels, as in `_missed`.
-    """
-    whole = look.in_blocks(look.fit_errors(light))
-    if not grain.any():
-        return whole
-    shown, meant = look.compare(light), look.compare(look.goal(light))
-    of_means = np.square(look.in_blocks(meant) - look.in_blocks(shown)).sum(axis=-1)
-    noise = look.in_blocks(np.square(look.compare(light + grain) - shown).sum(axis=-1))
-    return np.asarray(whole - np.minimum(noise, np.maximum(whole - of_means, 0)))
-
-
-def _error_object(look: PaintComparison, objects: Objects, missed: Doubles, light: Doubles) -> str:
-    """Return the object with most of the visible error; "" if there is no single one."""
-    noticed = missed > NOTICED
-    told = look.spread_blocks(noticed if noticed.any() else missed > 0)
-    amount = told * look.fit_errors(light) * look.weight[look.counts]
-    return object_with_most(
-        objects, look.pixels(objects.index.astype(np.float32)).astype(np.intp), amount
-    )
-
-
-def _lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
-    """Return the lights that reach a place, and whether one contributes much there.
-
-    If it is too bright, the sources of most of its light; else lights by their effect there
-    relative to their brightest pixels, which does not depend on their strength.
-    """
-    basis = solution.basis
-    top, left, bottom, right = place.box
-    there = basis.planes.rows(top, bottom)[:, :, left:right].mean(axis=(1, 2), dtype=np.float64)
-    if luminance(np.array(place.painted)) < luminance(np.array(place.reached)):
-        part, enough = luminance(there * solution.weights), DOES_MUCH
-        whole = np.full(len(part), part.sum())
-    else:
-        part, enough = np.where(basis.is_fixed, 0, luminance(there)), GETS_THERE
-        every = np.stack([luminance(x[::STEP, ::STEP]) for x in basis.planes])
-        whole = np.percentile(every.reshape(len(part), -1), 99, axis=1)
-    share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
-    names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)
-    return tuple(names), bool(share.max() > DOES_MUCH)

@@ -1,0 +1,122 @@
+"""The place of a picture with most of its error: its object, and the lights that reach it."""
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, as_rgb
+from lightpaint.colour.color import luminance
+from lightpaint.colour.color_difference import ciede2000
+from lightpaint.images.object_map import Objects
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.analysis.appearance.object_miss import object_with_most
+from lightpaint.lighting.analysis.diagnosis import (
+    REGIONS,
+    Place,
+)
+from lightpaint.lighting.solution import Solution
+
+#: ΔE that is visible at a glance, and the smallest share of the paint of such a spot.
+NOTICED, SPOT = 6.0, 0.02
+
+#: Share of its light on its brightest pixels from which a light reaches a place, and from which it
+#: contributes much there.
+GETS_THERE, DOES_MUCH = 0.01, 0.1
+
+#: Step between pixels, along each side, that suffices to find the brightest.
+STEP = 2
+
+
+def block_differences(
+    look: PaintComparison, light: Doubles, grain: Doubles
+) -> tuple[Doubles, Doubles]:
+    """Return the mean ΔE in each block, (rows, columns), as it is, and without the part of noise.
+
+    Noise and error add as squares, since they are independent. But a painting over the same renders
+    shares their noise: so noise explains at most the differences between pixels that remain
+    without their mean, which noise hardly moves.
+    """
+    of_light, of_paint = look.lab(light), look.lab_goal(light)
+    whole = look.in_blocks(ciede2000(of_light, of_paint))
+    if not grain.any():
+        return whole, whole
+    of_means = ciede2000(look.in_blocks(of_light), look.in_blocks(of_paint))
+    between = np.square(whole) - np.square(np.minimum(of_means, whole))
+    noise = np.square(look.in_blocks(ciede2000(of_light, look.lab(light + grain))))
+    return whole, np.sqrt(np.square(whole) - np.minimum(noise, between))
+
+
+def place_with_most_error(
+    look: PaintComparison, missed: Doubles, light: Doubles, grain: Doubles
+) -> tuple[Place, float]:
+    """Find the place with most of the fit's error, and the share of paint with visible error
+    there."""
+    weights = look.block_weights
+    amount = weights * _block_errors(look, light, grain)
+    if not amount.any():
+        amount = weights * missed
+    region = np.zeros((REGIONS, REGIONS))
+    at = [REGIONS * np.arange(length) // length for length in amount.shape]
+    np.add.at(region, np.ix_(*at), amount)
+    worst = np.unravel_index(int(np.argmax(region)), region.shape)
+    inside = (at[0] == worst[0])[:, None] & (at[1] == worst[1])
+    row, column = np.unravel_index(int(np.argmax(np.where(inside, amount, -1))), amount.shape)
+    # Paint and answer there, weighted by the error.
+    its = np.where(inside, amount, 0)
+    painted, reached = (
+        np.average(look.in_blocks(x).reshape(-1, 3), axis=0, weights=its.ravel())
+        for x in (look.painted[look.counts].astype(np.float64), light)
+    )
+    place = Place(
+        region=(int(worst[0]), int(worst[1])),
+        share=float(region[worst] / region.sum()),
+        box=look.box(int(row), int(column)),
+        painted=as_rgb(painted),
+        reached=as_rgb(reached),
+    )
+    return place, float((weights * (missed > NOTICED) * inside).sum() / weights.sum())
+
+
+def _block_errors(look: PaintComparison, light: Doubles, grain: Doubles) -> Doubles:
+    """Return the error of each block in the fit, (rows, columns), less its noise.
+
+    Noise explains at most the differences between pixels, as in `block_differences`.
+    """
+    whole = look.in_blocks(look.fit_errors(light))
+    if not grain.any():
+        return whole
+    shown, meant = look.compare(light), look.compare(look.goal(light))
+    of_means = np.square(look.in_blocks(meant) - look.in_blocks(shown)).sum(axis=-1)
+    noise = look.in_blocks(np.square(look.compare(light + grain) - shown).sum(axis=-1))
+    return np.asarray(whole - np.minimum(noise, np.maximum(whole - of_means, 0)))
+
+
+def object_with_most_error(
+    look: PaintComparison, objects: Objects, missed: Doubles, light: Doubles
+) -> str:
+    """Return the object with most of the visible error; "" if there is no single one."""
+    noticed = missed > NOTICED
+    told = look.spread_blocks(noticed if noticed.any() else missed > 0)
+    amount = told * look.fit_errors(light) * look.weight[look.counts]
+    return object_with_most(
+        objects, look.pixels(objects.index.astype(np.float32)).astype(np.intp), amount
+    )
+
+
+def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
+    """Return the lights that reach a place, and whether one contributes much there.
+
+    If it is too bright, the sources of most of its light; else lights by their effect there
+    relative to their brightest pixels, which does not depend on their strength.
+    """
+    basis = solution.basis
+    top, left, bottom, right = place.box
+    there = basis.planes.rows(top, bottom)[:, :, left:right].mean(axis=(1, 2), dtype=np.float64)
+    if luminance(np.array(place.painted)) < luminance(np.array(place.reached)):
+        part, enough = luminance(there * solution.weights), DOES_MUCH
+        whole = np.full(len(part), part.sum())
+    else:
+        part, enough = np.where(basis.is_fixed, 0, luminance(there)), GETS_THERE
+        every = np.stack([luminance(x[::STEP, ::STEP]) for x in basis.planes])
+        whole = np.percentile(every.reshape(len(part), -1), 99, axis=1)
+    share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
+    names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)
+    return tuple(names), bool(share.max() > DOES_MUCH)

@@ -1,0 +1,267 @@
+"""A sample of the pixels of all views, on which an answer is solved again without some reasons."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import as_planes
+from lightpaint.images.pixel_blocks import block_sums
+from lightpaint.lighting.analysis.appearance.constraint_kinds import (
+    ConstraintKind,
+    ConstraintsByLight,
+)
+from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss.painting import importance_sums, unpainted_weight
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.views import Views
+from lightpaint.target.target import Target
+
+#: Groups of reasons: the hold of unpainted pixels, colours of lights, constraints, and the
+#: paintings of other views.
+LimitGroup = Literal["hold", "colors", "constraints", "views"]
+
+#: Painted pixels, and unpainted ones, of a sufficient sample, in all views together.
+SAMPLE_PIXELS = 2**11
+
+
+@dataclass(frozen=True)
+class PixelSample:
+    """A sample of the pixels of all views, each view in one row.
+
+    problem: of all pixels of all views. mine: the index of the analysed view. names: of the views.
+    weights: (n, 3), the answer.
+    """
+
+    problem: Problem
+    bases: Sequence[Basis]
+    targets: Sequence[Target]
+    mine: int
+    names: tuple[str, ...]
+    look: PaintComparison
+    weights: Doubles
+    _shares: dict[tuple[frozenset[LimitGroup], tuple[int, ...]], float] = field(
+        default_factory=dict
+    )
+
+    @staticmethod
+    def of(solution: Solution) -> "PixelSample":
+        """Return a sample of the pixels that `solution`, or the solution it is a part of, met."""
+        problem = (solution.whole or solution).problem
+        views = _average_blocks(problem.views, problem.block_side)
+        mine = next(k for k, basis in enumerate(problem.views.bases) if basis is solution.basis)
+        painted = [(target.importance > 0).ravel() for target in views.targets]
+        # One step for all views, so that each keeps its weight.
+        total, rest = (sum(int((x == is_it).sum()) for x in painted) for is_it in (True, False))
+        steps = max(total // SAMPLE_PIXELS, 1), max(rest // SAMPLE_PIXELS, 1)
+        bases, targets = [], []
+        for basis, target, where in zip(views.bases, views.targets, painted, strict=True):
+            its = [
+                np.flatnonzero(x)[::step] for x, step in zip((where, ~where), steps, strict=True)
+            ]
+            made = _pixel_row(basis, target, np.sort(np.concatenate(its)))
+            bases.append(made[0])
+            targets.append(made[1])
+        sensors = tuple(basis.origin.sensor for basis in views.bases)
+        names = tuple(target.name for target in views.targets)
+        alone = Problem.of(bases[mine], targets[mine], fit=problem.fit)
+        return PixelSample(
+            problem,
+            bases,
+            targets,
+            mine,
+            sensors if len(set(sensors)) == len(sensors) else names,
+            PaintComparison.of_problem(alone),
+            solution.weights,
+        )
+
+    @property
+    def others(self) -> Sequence[int]:
+        """The indices of the other views."""
+        return [k for k in range(len(self.bases)) if k != self.mine]
+
+    @property
+    def groups(self) -> tuple[LimitGroup, ...]:
+        """The groups of reasons besides the painting that are in force."""
+        fit = self.problem.fit
+        on: dict[LimitGroup, bool] = {
+            "hold": bool(fit.hold or fit.unpainted),
+            "colors": fit.colors != "free",
+            "constraints": bool(self.problem.constraints),
+            "views": bool(self.others),
+        }
+        return tuple(name for name, is_on in on.items() if is_on)
+
+    @cached_property
+    def by_light(self) -> ConstraintsByLight:
+        """The constraints on each light."""
+        return ConstraintsByLight.of(self.problem.constraints, self.problem.basis.lights)
+
+    @cached_property
+    def pull(self) -> Doubles:
+        """(n,), the initial effect of each light on the error if it moved alone.
+
+        It is relative to the light's power in the picture, so that lights compare.
+        """
+        problem = self.problem
+        gradient = np.abs(problem.equations.gradient(self.weights)).sum(axis=1)
+        power = np.sqrt(np.einsum("cii->ic", problem.equations.M).sum(axis=1))
+        return np.asarray(gradient / np.where(power > 0, power, 1))
+
+    @cached_property
+    def now(self) -> float:
+        """Loss of the answer over the painted pixels."""
+        return self.cost(self.weights)
+
+    def cost(self, weights: Doubles) -> float:
+        """Return the error of weights (n, 3) over the paint of the view, in the fit."""
+        look = self.look
+        return look.mean(look.fit_errors(look.pixels(self.bases[self.mine].mix(weights))))
+
+    def share_of(self, weights: Doubles) -> float:
+        """Return the share of the error that these weights (n, 3) avoid."""
+        return 1 - self.cost(weights) / self.now
+
+    def share(self, without: Collection[LimitGroup], views: Sequence[int] | None = None) -> float:
+        """Return that share for the best weights without some groups of reasons.
+
+        views: those to release with the group `views`; all others by default. Results are cached.
+        """
+        views = self.others if views is None else views
+        key = frozenset(without), tuple(views)
+        if key not in self._shares:
+            self._shares[key] = self.share_of(self.solve(without, views))
+        return self._shares[key]
+
+    def share_without(self, kind: ConstraintKind, lights: Collection[int]) -> float:
+        """Return that share without one kind of constraint on some lights, by their places."""
+        asked = self.by_light.without(kind, lights)
+        return self.share_of(self.solve((), self.others, constraints=asked))
+
+    def light_names(self, kind: ConstraintKind, lights: Collection[int]) -> tuple[str, ...]:
+        """Return names of lights under one kind of constraint; none for kinds that apply to all."""
+        if kind in ("sparse", "prefer_current"):
+            return ()
+        return tuple(self.by_light.lights[k].name for k in lights)
+
+    def limiting_views(self, kind: LimitGroup) -> tuple[str, ...]:
+        """Return names of the views that hold the lights, for the group `views`."""
+        if kind != "views":
+            return ()
+        its = self.others
+        if len(its) > 1:
+            part = self.share(["views"]) / 2
+            its = [k for k in its if self.share(["views"], views=[k]) > part] or its
+        return tuple(self.names[k] for k in its)
+
+    def solve(
+        self,
+        without: Collection[LimitGroup],
+        views: Sequence[int],
+        *,
+        constraints: Constraints | None = None,
+        hold: float | None = None,
+    ) -> Doubles:
+        """Solve for the best weights, (n, 3), without some groups of reasons.
+
+        views: those to release with the group `views`. constraints, hold: instead of the present
+        ones.
+        """
+        gone = set(views) if "views" in without else set()
+        left = [k for k in range(len(self.bases)) if k not in gone]
+        fit = self.problem.fit if hold is None else replace(self.problem.fit, hold=hold)
+        change: dict[str, Any] = {"hold": 0.0, "unpainted": 0.0}
+        if "hold" not in without:
+            change["unpainted"] = self._unpainted_weight(fit, left)
+        if "colors" in without:
+            change["colors"] = "free"
+        asked = self.problem.constraints if constraints is None else constraints
+        problem = Problem.of(
+            [self.bases[k] for k in left],
+            [self.targets[k] for k in left],
+            constraints=Constraints() if "constraints" in without else asked,
+            fit=replace(fit, **change),
+        )
+        begin = replace(problem, start=self.problem.start)
+        return solution_of(begin).weights
+
+    def _unpainted_weight(self, fit: Fit, left: Sequence[int]) -> float:
+        """Return the weight of each of the sampled unpainted pixels of some views.
+
+        Relative to the painted ones, they weigh as much as all unpainted pixels do.
+        """
+        (painted, rest), (few_painted, few_rest) = (
+            importance_sums(
+                Views(tuple(views.bases[k] for k in left), tuple(views.targets[k] for k in left))
+            )
+            for views in (self.problem.views, Views(tuple(self.bases), tuple(self.targets)))
+        )
+        if few_rest <= 0 or painted <= 0:
+            return 0.0
+        return unpainted_weight(painted, rest, fit) * (rest / few_rest) * (few_painted / painted)
+
+
+def _average_blocks(views: Views, side: int) -> Views:
+    """Average the pixels of views in blocks, if single ones are mostly noise.
+
+    Incomplete blocks at the right and at the bottom are left out.
+    """
+    sizes = [[side * (n // side) for n in basis.size] for basis in views.bases]
+    parts = zip(views.targets, sizes, strict=True)
+    if side == 1 or not all(target.importance[:h, :w].any() for target, (h, w) in parts):
+        return views
+    bases, targets = [], []
+    for basis, target, (height, width) in zip(views.bases, views.targets, sizes, strict=True):
+        its = target.cropped(height, width).reduced(side)
+        unseen = ~basis.emitters_seen[:height, :width]
+        total = block_sums(unseen.astype(np.float64), side)
+        counts, safe = unseen[..., None], np.where(total > 0, total, 1)[..., None]
+        images, halves = (
+            np.stack([block_sums(x[:height, :width] * counts, side) / safe for x in planes])
+            for planes in (basis.planes, basis.noise)
+        )
+        made = replace(
+            basis,
+            planes=as_planes(images.astype(np.float32)),
+            noise=as_planes(halves.astype(np.float32)),
+            emitters_seen=total == 0,
+            learned=None,
+            features=None,
+            objects=None,
+        )
+        bases.append(made)
+        targets.append(its)
+    return Views(tuple(bases), tuple(targets))
+
+
+def _pixel_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tuple[Basis, Target]:
+    """Return some of the pixels of a view as one row. chosen: (p,), places of the pixels."""
+
+    def cut(image: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        return image.reshape(1, -1, *image.shape[2:])[:, chosen]
+
+    row = replace(
+        basis.with_requests(type(basis.requests)()),
+        planes=basis.planes.picked(chosen),
+        noise=basis.noise.picked(chosen),
+        emitters_seen=cut(basis.emitters_seen),
+        learned=None,
+        features=None,
+        objects=None,
+    )
+    its = replace(
+        target,
+        image=cut(target.image),
+        importance=cut(target.importance),
+        at_least=None if target.at_least is None else cut(target.at_least),
+    )
+    return row, its
