@@ -56,8 +56,8 @@ if TYPE_CHECKING:
     from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty as Uncertainty
     from lightpaint.lighting.analysis.noise.uncertainty import error_bars as error_bars
     from lightpaint.lighting.answer.certificate import Certificate as Certificate
+    from lightpaint.lighting.answer.combination import combine as combine
     from lightpaint.lighting.answer.lighting import Lighting as Lighting
-    from lightpaint.lighting.answer.lighting import combine as combine
     from lightpaint.lighting.answer.lighting_file import read_lighting as read_lighting
     from lightpaint.lighting.answer.lighting_file import write_lighting as write_lighting
     from lightpaint.lighting.constraints.constraints import Constraints as Constraints
@@ -72,12 +72,12 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.call import paint_with_light as paint_with_light
     from lightpaint.pipeline.job import Job as Job
     from lightpaint.pipeline.pipeline import run as run
-    from lightpaint.pipeline.renders import render_template as render_template
-    from lightpaint.pipeline.renders import template_of_basis as template_of_basis
     from lightpaint.pipeline.results import Look as Look
     from lightpaint.pipeline.settings import Settings as Settings
     from lightpaint.pipeline.sources import Painting as Painting
     from lightpaint.pipeline.sources import SceneFile as SceneFile
+    from lightpaint.pipeline.templates import render_template as render_template
+    from lightpaint.pipeline.templates import template_of_basis as template_of_basis
     from lightpaint.placement.light_search import suggest_lights as suggest_lights
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
@@ -121,7 +121,7 @@ _HOMES = {
     "Verification": "relit.verification",
     "ViewTransform": "colour.display.view_transform",
     "analyse": "lighting.analysis.analysis",
-    "combine": "lighting.answer.lighting",
+    "combine": "lighting.answer.combination",
     "correct_noise": "lighting.analysis.noise.noise_correction",
     "diagnose": "lighting.analysis.diagnosis",
     "display_picture": "images.formats.png",
@@ -136,8 +136,8 @@ _HOMES = {
     "refine": "lighting.analysis.noise.refinement",
     "relight": "relit.relight",
     "render_basis": "basis.render.render",
-    "render_template": "pipeline.renders",
-    "template_of_basis": "pipeline.renders",
+    "render_template": "pipeline.templates",
+    "template_of_basis": "pipeline.templates",
     "run": "pipeline.pipeline",
     "solve": "lighting.solve",
     "suggest_lights": "placement.light_search",

@@ -48,7 +48,7 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
         from lightpaint.signals import interruptible_between_pieces
 
         with _without_garbage(), interruptible_between_pieces():
-            from lightpaint.cli.options.job_options import values_of
+            from lightpaint.cli.options.command_arguments import values_of
             from lightpaint.cli.output import terminal
             from lightpaint.scene.runtime.variant import SlowBackendWarning
 

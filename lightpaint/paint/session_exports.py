@@ -14,7 +14,8 @@ from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
 from lightpaint.images.denoiser import denoised, how_denoised
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.lighting.answer.lighting import Lighting, combine
+from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.subject import Subject, painting_path, picture_path
 from lightpaint.pipeline.answer_folder import LIGHTING, RELIT, write_answer

@@ -14,7 +14,7 @@ from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of

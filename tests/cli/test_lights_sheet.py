@@ -10,8 +10,8 @@ from PIL import Image
 from renderer import LIGHTS, write_room
 
 from lightpaint.images.formats.png import png_says
-from lightpaint.pipeline import renders
-from lightpaint.pipeline.renders import SHEET_KEY
+from lightpaint.pipeline import light_sheets
+from lightpaint.pipeline.light_sheets import SHEET_KEY
 from lightpaint.scene.runtime.variant import use_variant
 
 
@@ -71,7 +71,7 @@ def test_where_rendering_is_slow_the_list_is_all(
     room: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slow = replace(use_variant(), note="rendering is slow here")
-    monkeypatch.setattr(renders, "use_variant", lambda: slow)
+    monkeypatch.setattr(light_sheets, "use_variant", lambda: slow)
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
     done = run(room.parent, "lights", room)
     assert done.returncode == 0
@@ -82,8 +82,8 @@ def test_where_rendering_is_slow_the_list_is_all(
 def test_a_render_for_each_light_is_not_made_just_to_look(
     room: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(renders, "why_not_one_pass", lambda _scene: "fog")
-    monkeypatch.setattr(renders, "FEW_RENDERS", 1)
+    monkeypatch.setattr(light_sheets, "why_not_one_pass", lambda _scene: "fog")
+    monkeypatch.setattr(light_sheets, "FEW_RENDERS", 1)
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
     done = run(room.parent, "lights", room)
     assert "no lights.png: fog, so that each light takes a render of its own" in done.stderr

@@ -13,8 +13,9 @@ from renderer import write_room
 
 from lightpaint.basis.file import write_basis
 from lightpaint.basis.lightgroups.read import read_light_groups
-from lightpaint.cli.options.job_options import basis_of, jobs_of, settings_of
+from lightpaint.cli.options.job_options import jobs_of, settings_of
 from lightpaint.cli.options.parser import command_parser
+from lightpaint.cli.options.source_options import basis_of
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.lighting.answer.lighting import Lighting

@@ -28,8 +28,10 @@ from websockets.typing import Origin, Subprotocol
 
 from lightpaint.basis.file import write_basis
 from lightpaint.cli.commands.session_options import solve_command
-from lightpaint.cli.options.job_options import painted_of, settings_of, values_of
+from lightpaint.cli.options.command_arguments import values_of
+from lightpaint.cli.options.job_options import settings_of
 from lightpaint.cli.options.parser import command_parser
+from lightpaint.cli.options.source_options import painted_of
 from lightpaint.paint.background_threads import BackgroundThreads
 from lightpaint.paint.frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION

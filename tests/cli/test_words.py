@@ -11,8 +11,8 @@ import pytest
 
 import lightpaint
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.cli.options.job_options import LOADING
 from lightpaint.cli.options.parser import command_parser
+from lightpaint.cli.options.source_options import LOADING
 from lightpaint.cli.output.vocabulary import _SAID, OPTIONS, SPELLINGS, spoken
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.settings import Settings

@@ -17,7 +17,8 @@ from lightpaint.errors import (
     SizeError,
     TargetError,
 )
-from lightpaint.lighting.answer.lighting import Lighting, combine
+from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.loss.painting import target_squares
 from lightpaint.lighting.solve import solve

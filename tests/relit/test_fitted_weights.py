@@ -12,7 +12,7 @@ from scipy.stats import kstest
 
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.target.target import Target

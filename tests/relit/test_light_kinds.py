@@ -10,7 +10,8 @@ from lightpaint.basis.render.render import render_basis
 from lightpaint.basis.render.separate import WHITE
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.answer.lighting import Lighting, combine
+from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify

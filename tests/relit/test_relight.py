@@ -15,7 +15,8 @@ from renderer import CORNELL, LIGHTS, REPOSITORY, mitsuba_render, one_pass, writ
 
 from lightpaint.errors import LightingError, OutputError, SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.answer.lighting import Lighting, LightSetting, combine
+from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.relight import check_relightable, relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.relit.xml_patch import scene_patch

@@ -11,7 +11,8 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.render.render import render_basis
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.answer.lighting import Lighting, combine
+from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.detection_power import LightShares
 from lightpaint.relit.relight import relight
 from lightpaint.relit.sample_budget import FEWEST

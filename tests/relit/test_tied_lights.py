@@ -11,7 +11,8 @@ from renderer import LIGHTS, mitsuba_render, one_pass, write_room
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import BasisError, LightingError, SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.answer.lighting import Lighting, combine
+from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.pipeline.call import paint_with_light

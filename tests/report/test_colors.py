@@ -10,7 +10,7 @@ import pytest
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.hue import spoken_hue
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
-from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solve import solve
 from lightpaint.report.influences import fit_options, fit_sentence
 from lightpaint.report.page.color_section import closer_choice, colors_section, spoken_choice

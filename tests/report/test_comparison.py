@@ -17,7 +17,8 @@ from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.files import write_bytes
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.lighting.answer.lighting import Lighting, combine
+from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.report import comparison

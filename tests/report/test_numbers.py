@@ -17,7 +17,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting import solve as solve_module
 from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints import reduced_problem
 from lightpaint.lighting.constraints.constraints import Constraints

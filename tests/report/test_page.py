@@ -14,7 +14,8 @@ from PIL import Image
 from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.errors import SizeError
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.answer.lighting import Lighting, combine
+from lightpaint.lighting.answer.combination import combine
+from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare
 from lightpaint.report.measures import energy_shares, noise_residual, relative_residual

@@ -18,7 +18,7 @@ from lightpaint.lighting.analysis.appearance.appearance import Seen
 from lightpaint.lighting.analysis.appearance.limiting_reasons import HEADLINE_SHARE, Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
-from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare

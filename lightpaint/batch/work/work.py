@@ -32,7 +32,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import run
-from lightpaint.pipeline.renders import relight_look, relit_folder
+from lightpaint.pipeline.relit_renders import relight_look, relit_folder
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.pipeline.results import view_names
 from lightpaint.pipeline.settings import Settings

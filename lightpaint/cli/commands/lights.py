@@ -5,8 +5,8 @@ from pathlib import Path
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import BackendError, OutputError
+from lightpaint.pipeline.light_sheets import check_sheet, render_sheet
 from lightpaint.pipeline.remarks import remarks_of_scene
-from lightpaint.pipeline.renders import check_sheet, render_sheet
 from lightpaint.pipeline.sources import SceneFile
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene

@@ -21,15 +21,8 @@ from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import obtain
+from lightpaint.pipeline.relit_renders import relight_look, relit_folder
 from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
-from lightpaint.pipeline.renders import (
-    look_of_basis,
-    relight_look,
-    relit_folder,
-    render_look,
-    render_template,
-    template_of_basis,
-)
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.pipeline.results import result_folders, verify_result
 from lightpaint.pipeline.settings import Settings
@@ -39,6 +32,12 @@ from lightpaint.pipeline.sources import (
     Painting,
     SceneFile,
     check_nothing_idle,
+)
+from lightpaint.pipeline.templates import (
+    look_of_basis,
+    render_look,
+    render_template,
+    template_of_basis,
 )
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.presets import on_film, samples

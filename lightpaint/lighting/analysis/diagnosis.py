@@ -24,7 +24,7 @@ from lightpaint.lighting.analysis.noise.directions import all_columns
 from lightpaint.lighting.analysis.noise.grain import grain
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse, residual_and_noise
 from lightpaint.lighting.answer.active_bound import Bound
-from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
 from lightpaint.screen import short_repr

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
 from lightpaint.basis.basis import Basis
@@ -15,7 +14,6 @@ from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.dataframes import CHANNELS, by_channel, number, pandas, xarray
 from lightpaint.errors import LightingError, UnknownLightError
-from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
@@ -261,74 +259,6 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                     f"{some_names(light.members)} in the basis"
                 )
         return np.array([given[name] for name in lights.names], dtype=np.float64)
-
-
-@keywords()
-def combine(
-    basis: Basis, lighting: Lighting | Mapping[str, float | Sequence[float]] | npt.ArrayLike
-) -> Estimate:
-    """Return the predicted image Σ w_i Φ_i, with the noise of the basis.
-
-    Args:
-        basis: Of n lights.
-        lighting: Of the same lights; or weights >= 0 of some of them by name, a number or RGB each,
-            the others being off; or (n,) or (n, 3) weights in the order of the basis. Fixed lights
-            have the weight 1.
-
-    Raises:
-        LightingError: If the two do not name the same lights, or for invalid weights.
-
-    Examples:
-        >>> solution = lp.solve(basis, target)
-        >>> bool(np.abs(lp.combine(basis, solution.lighting).image - target.image).max() < 2e-3)
-        True
-        >>> twice = lp.combine(basis, {"bulb": 2}).image
-        >>> bool(np.abs(twice - 2 * basis.image("bulb")).max() < 1e-6)
-        True
-    """
-    lighting_or_weights = lighting
-    weights = (
-        lighting_or_weights.weights_for(basis)
-        if isinstance(lighting_or_weights, Lighting)
-        else _weights(basis, lighting_or_weights)
-    )
-    return Estimate(basis.mix(weights), basis.noise.mix(weights))
-
-
-def _weights(basis: Basis, values: Mapping[str, Any] | npt.ArrayLike) -> Doubles:
-    """Return weights (n, 3) from weights by name, or of all lights in their order."""
-    n, names = len(basis.lights), basis.names
-    weights = np.where(basis.is_fixed[:, None], np.ones(3), np.zeros(3))
-    if isinstance(values, Mapping):
-        if unknown := [str(name) for name in values if name not in names]:
-            raise UnknownLightError(
-                f"no light {some_of(unknown, room=400)} in the basis: it has "
-                f"{some_of(names, room=400)}"
-            )
-        for name, weight in values.items():
-            weights[names.index(name)] = _numbers(weight, f"light {name!r}", ((), (3,)))
-    else:
-        whole = _numbers(values, f"a lighting of {n} lights", ((n,), (n, 3)))
-        weights = np.broadcast_to(whole.reshape(n, -1), (n, 3)).copy()
-    for k in np.flatnonzero(basis.is_fixed & (weights != 1).any(axis=1)):
-        raise LightingError(f"light {names[k]!r} is kept as it is: its weight is 1")
-    return weights
-
-
-def _numbers(values: Any, what: str, shapes: tuple[tuple[int, ...], ...]) -> Doubles:
-    """Return weights as an array of one of these shapes. Raises LightingError for anything else."""
-    expected = " or ".join(str(shape) if shape else "one number" for shape in shapes)
-    try:
-        weights = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise LightingError(
-            f"{what}: weights of the type {type(values).__name__}: expected {expected}"
-        ) from None
-    if weights.shape not in shapes:
-        raise LightingError(f"{what}: weights of the shape {weights.shape}: expected {expected}")
-    if (wrong := weights[~(np.isfinite(weights) & (weights >= 0))]).size:
-        raise LightingError(f"{what}: a weight of {wrong[0]:g}: expected finite numbers >= 0")
-    return weights
 
 
 def _setting(

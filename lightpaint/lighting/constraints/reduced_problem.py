@@ -12,22 +12,15 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.optimum import Method, Optimum, minimise, minimise_each
-from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
-from lightpaint.lighting.constraints.knobs import Knob
+from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.constraints.starting_unknowns import nearest_unknowns
 from lightpaint.lighting.constraints.unknown_blocks import Block
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.threads import parallel_map
 
 #: Pull towards the start in channels where a light reaches nothing, relative to its other channels.
 DARK_PULL = 1e-8
-
-#: Determinant of the colours that a light mixes, relative to their size, below which they are too
-#: alike.
-SINGULAR_DETERMINANT = 1e-6
-
-#: Distance from a bound, relative to the light's other values, that is round-off of a start.
-BOUND_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
@@ -197,91 +190,6 @@ def _block_equations(M: Doubles, b: Doubles, block: Block) -> tuple[Doubles, Dou
         made_M[e.columns[:, None], e.columns] += part
         made_b[e.columns] += right
     return made_M, made_b
-
-
-def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Doubles:
-    """Return the x (k,) whose emissions are nearest to `start`, (n, 3), within the limits of each
-    knob.
-
-    reached: (n,). For a light that reaches something, a luminance at its limit is good enough.
-    """
-    x = np.zeros(len(reduction.unknowns))
-    for kind in reduction.knob_groups:
-        low, high = reduction.lower[kind.places], reduction.upper[kind.places]
-        present = start[kind.lights].reshape(len(low), -1)
-        if kind.is_free:
-            x[kind.places] = np.minimum(np.maximum(present, low), high)
-            continue
-        wanted = np.einsum("kue,ke->ku", kind.columns, present)
-        if kind.is_orthogonal:
-            its = wanted / np.square(kind.columns).sum(axis=2)
-        else:
-            squares = np.matmul(kind.columns, kind.columns.swapaxes(1, 2))
-            its = _solve_mixes(kind.columns, present)
-            out = np.flatnonzero(~((its >= low) & (its <= high)).all(axis=1))
-            if out.size:
-                low_out, high_out = low[out], high[out]
-                found = minimise_each(
-                    squares[out],
-                    wanted[out],
-                    lower=low_out,
-                    upper=high_out,
-                    start=np.clip(0, low_out, high_out),
-                )
-                its[out] = np.stack([optimum.x for optimum in found])
-        x[kind.places] = _snap_to_bounds(its, low, high)
-    for stack in reduction.limited_knobs:
-        a, its, now = (
-            stack.coefficients,
-            stack.unknowns,
-            (stack.coefficients * x[stack.unknowns]).sum(axis=1),
-        )
-        wanted = np.minimum(np.maximum(now, stack.lower), stack.upper)
-        out = now != wanted
-        low, high = reduction.lower[its[out]], reduction.upper[its[out]]
-        x[its[out]] = clip_to_sums(a[out], x[its[out]], low, high, wanted[out])
-        for k in stack.knobs[out]:
-            knob = reduction.knobs[k]
-            if not (knob.is_free or reached[knob.lights[0]]):
-                x[list(reduction.places[k])] = _nearest_limited(knob, start)
-    return x
-
-
-def _solve_mixes(columns: Doubles, emission: Doubles) -> Doubles:
-    """Return the x (k, u) with C x = emission, (k, e); nan where C is not square or singular.
-
-    columns: (k, u, e), C transposed.
-    """
-    x = np.full(columns.shape[:2], np.nan)
-    if columns.shape[1] == columns.shape[2]:
-        size = np.abs(columns).max(axis=(1, 2)) ** columns.shape[1]
-        regular = np.abs(np.linalg.det(columns)) > SINGULAR_DETERMINANT * size
-        C = columns[regular].swapaxes(1, 2)
-        x[regular] = np.linalg.solve(C, emission[regular, :, None])[..., 0]
-    return x
-
-
-def _nearest_limited(knob: Knob, start: Doubles) -> Doubles:
-    """Return the x of a light with limited luminance whose emission is nearest to `start`."""
-    assert knob.limit is not None
-    C = np.array([unknown.columns[0][1] for unknown in knob.unknowns])
-    lower = np.array([unknown.lower for unknown in knob.unknowns])
-    upper = np.array([unknown.upper for unknown in knob.unknowns])
-    cap = Cap(tuple(range(len(C))), *knob.limit)
-    right = C @ start[knob.lights[0]]
-    return _snap_to_bounds(
-        minimise(C @ C.T, right, lower=lower, upper=upper, caps=(cap,)).x, lower, upper
-    )
-
-
-def _snap_to_bounds(x: Doubles, lower: Doubles, upper: Doubles) -> Doubles:
-    """Return x, (k,) or one knob a row, moved into its bounds, and onto those within round-off.
-
-    Only unknowns exactly at a bound have multipliers.
-    """
-    near = BOUND_ROUND_OFF * np.abs(x).max(axis=-1, keepdims=True, initial=0)
-    x = np.where(np.abs(x - lower) <= near, lower, np.maximum(x, lower))
-    return np.asarray(np.where(np.abs(x - upper) <= near, upper, np.minimum(x, upper)))
 
 
 def _solve_blocks(

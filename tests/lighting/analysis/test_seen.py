@@ -14,7 +14,7 @@ from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Seen, what
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
-from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.report.verdict import headline

@@ -11,8 +11,9 @@ from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.constraints import gamut_bounds as near_sides
 from lightpaint.lighting.constraints.gamut_bounds import solve_near_sides
 from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.constraints.reduced_problem import nearest_unknowns, solve_reduced
+from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.constraints.starting_unknowns import nearest_unknowns
 from lightpaint.lighting.constraints.white_neighbours import next_whites
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.normal_equations import NormalEquations

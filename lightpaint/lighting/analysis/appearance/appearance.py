@@ -41,7 +41,7 @@ from lightpaint.lighting.analysis.diagnosis import (
     diagnose,
     error_shares,
 )
-from lightpaint.lighting.answer.lighting import combine
+from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import short_repr

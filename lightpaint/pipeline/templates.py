@@ -1,36 +1,24 @@
-"""What is rendered to be painted on or looked at: templates, and scenes as they were relit."""
+"""Templates: what is rendered, or summed up of a basis, to be painted on."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import is_of, render_basis
 from lightpaint.basis.render.separate import emitters_seen
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.errors import OutputError
-from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.images.denoiser import Features, denoised, how_denoised
-from lightpaint.images.estimate import Estimate, write_estimate
-from lightpaint.images.formats.png import png_bytes, png_says, write_png
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
-from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.pipeline.answer_folder import answer_files, new_answer
 from lightpaint.pipeline.pipeline import obtain
 from lightpaint.pipeline.remarks import remarks_of_pictures
-from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Listener, Progress, listener, silent
-from lightpaint.report.light_sheet import light_sheet
-from lightpaint.scene.presets import Preset, on_film
-from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.presets import Preset
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_features, render_surfaces
@@ -38,17 +26,6 @@ from lightpaint.target.template import LIGHTS, SHOWN, Template, write_look, writ
 
 #: Rendering of what each light does alone, to recognise it by.
 THUMBNAIL = Preset(32, 2**14)
-
-#: Rendering of a sheet of lights, and its seed: one of its own, so that no answer that goes on from
-#: what is kept depends on whether somebody has looked at the lights.
-SHEET, SHEET_SEED = Preset(16, 2**15), 2**31 - 1
-
-#: Pixels of all lights together that are rendered for it, and of each at least; bytes of a kept
-#: basis that is read for it, at most; lights that it is rendered for where each takes a render.
-MANY_PIXELS, FEW_PIXELS, MUCH, FEW_RENDERS = 2**20, 2**12, 2**27, 6
-
-#: Text of a PNG that is a sheet of lights.
-SHEET_KEY = "lightpaint.lights"
 
 
 @keywords()
@@ -189,50 +166,6 @@ def render_look(
     return write_look(path, look, shown, clean=clean, texts=how_denoised(features, raw=path.name))
 
 
-def check_sheet(scene: Scene, path: Path, *, force: bool = False) -> None:
-    """Raise OutputError for a place that the sheet of `scene` cannot or should not go to."""
-    if path.suffix.lower() != ".png":
-        raise OutputError(f"{path} must end in .png, the format that is written")
-    check_files([path], scene.read_files)
-    check_writable(path.parent)
-    if path.exists() and not force and not (path.is_file() and png_says(path, SHEET_KEY)):
-        raise OutputError(
-            f"{path} is there, and no sheet of lights: choose another name with folder=..., or "
-            "pass force=True"
-        )
-
-
-def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
-    """Write what each light of `scene` does alone to `path`, a PNG to look at.
-
-    Of a basis that is kept or, where there is none, of few samples on a small film. Returns why
-    nothing was written, if that takes too long here; "" if it was.
-    """
-    sensor = scene.sensor_names[scene.sensor]
-    basis = cache.any_of(scene.identity, sensor, samples=SHEET.spp * FEW_PIXELS, largest=MUCH)
-    if basis is None:
-        if why := _why_no_sheet(scene):
-            return why
-        pixels = max(min(SHEET.pixels or 0, MANY_PIXELS // len(scene.lights)), FEW_PIXELS)
-        small = scene.reduced(f"1/{Preset(SHEET.spp, pixels).reduction(scene.film)}")
-        basis = obtain_basis(small, spp=SHEET.spp, seed=SHEET_SEED, progress=progress)
-    title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {len(scene.lights)} lights"
-    texts = how_denoised(basis.features, raw=f"basis of {basis.origin.spp} samples per pixel")
-    image = light_sheet(basis, title=title)
-    write_bytes(path, png_bytes(image, {SHEET_KEY: "what each light does alone", **texts}))
-    return ""
-
-
-def _why_no_sheet(scene: Scene) -> str:
-    """Why the lights of `scene` are not rendered just to be looked at; "" if they are."""
-    if note := use_variant().note:
-        return note
-    why = why_not_one_pass(scene)
-    if why is None or len(scene.lights) <= FEW_RENDERS:
-        return ""
-    return f"{why}, so that each light takes a render of its own"
-
-
 def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | None:
     """The basis whose sum is the look, kept for the solve.
 
@@ -305,55 +238,3 @@ def _small_planes(basis: Basis, factor: int) -> dict[str, Floats]:
         return small
     features = None if basis.features is None else basis.features.reduced(factor)
     return {name: denoised(image, features) for name, image in small.items()}
-
-
-def relit_folder(
-    scene: Scene,
-    lighting: Path,
-    folder: Path,
-    *,
-    views: Sequence[str] = ("",),
-    force: bool = False,
-) -> ResultFolder:
-    """Where `relight_look` writes. lighting: the file whose lighting it is. views: as there."""
-    files = answer_files(folder, scene=scene, has_lighting=True)
-    files += [folder / view / name for view in views for name in ("relit.exr", "relit.png")]
-    reads = (lighting, *scene.read_files)
-    return ResultFolder(folder, tuple(files), reads, (lighting,), adds_to=lighting, force=force)
-
-
-def relight_look(
-    scenes: Mapping[str, Scene],
-    lighting: Lighting,
-    results: ResultFolder,
-    *,
-    spp: int | None = None,
-    seed: int = 0,
-    resolution: str | None = None,
-    progress: Progress = silent,
-    rendered: Callable[[Scene], Estimate] | None = None,
-) -> None:
-    """Write relit.xml, and its renders as relit.exr and, denoised, as relit.png.
-
-    scenes: one through each sensor, by the folder in `results` that its pictures go to; "" for that
-    itself. resolution: part of the film that is rendered, as of `Settings`. rendered: who renders
-    the relit scene, instead of this process.
-    """
-    for remark in remarks_of_pictures():
-        listener(progress).say(remark)
-    results.check()
-    how: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
-    first, *_ = scenes.values()
-    with new_answer(results, lighting, scene=first, has_lighting=True) as answer:
-        for view, scene in scenes.items():
-            folder = answer.path
-            relit = on_film(answer.seen_through(scene.sensor), None, resolution)
-            label = f"relit of {view}" if view else "relit"
-            image = rendered(relit) if rendered else render(relit, spp=spp, label=label, **how)
-            (folder / view).mkdir(exist_ok=True)
-            write_estimate(folder / view / "relit.exr", image, {})
-            features = render_features(relit, seed=seed)
-            clean = denoised(image.image, features, quality="high")
-            texts = how_denoised(features, raw="relit.exr")
-            stops = choose_exposure(clean, emitters_seen(relit))
-            write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)

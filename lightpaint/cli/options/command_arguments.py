@@ -1,0 +1,176 @@
+"""From options to the arguments of the function that runs a command."""
+
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lightpaint.cli.options.argument_order import options_but
+from lightpaint.cli.options.job_options import (
+    constraints_of,
+    folders_of,
+    jobs_of,
+    settings_of,
+    transform_of,
+)
+from lightpaint.cli.options.source_options import (
+    painted_of,
+    scene_of,
+    scene_to_export,
+    source_of_template,
+)
+from lightpaint.cli.tolerances import Wanted
+from lightpaint.errors import BatchError
+from lightpaint.files import scene_name
+from lightpaint.lighting.constraints.constraints_file import read_constraints
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import GroupsFile, SceneFile
+
+if TYPE_CHECKING:
+    from lightpaint.batch.run_options import RunOptions
+
+
+def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
+    """The arguments that the function of a command takes. given: as they were typed."""
+    asked, settings = vars(options), settings_of(options, given)
+    output = Path(asked["output"]) if asked.get("output") else None
+    match options.command:
+        case "lights":
+            is_drawn = output is not None or not (options.no_sheet or options.as_json)
+            return {
+                "scene": scene_of(options),
+                "cd_per_unit": options.cd_per_unit,
+                "sheet": (output or Path("lights.png")) if is_drawn else None,
+                "is_asked": output is not None,
+                "force": options.force,
+            }
+        case "basis":
+            output = output or Path(Path(options.scene).stem + ".basis.exr")
+            return {"scene": scene_of(options), "output": output, "settings": settings}
+        case "template":
+            output, transform = output or Path("template"), transform_of(options)
+            return {
+                "source": source_of_template(options),
+                "output": output,
+                "transform": None if transform.is_open else transform.over(None),
+                "settings": settings,
+                "force": options.force,
+            }
+        case "demo":
+            output = output or Path("lightpaint-demo")
+            return {"folder": output, "variant": options.variant, "settings": settings}
+        case "solve":
+            return _to_solve(options, settings)
+        case "batch":
+            return _to_do(options)
+        case "export":
+            return {
+                "lighting": Path(options.lighting),
+                "to": options.to,
+                "scene": scene_to_export(options),
+                "groups": GroupsFile(options.groups, options.pattern) if options.groups else None,
+                "stage": Path(options.stage) if options.stage else None,
+                "output": output,
+                "force": options.force,
+            }
+        case "paint":
+            return _to_paint(options, settings, given)
+        case "relight":
+            scene = scene_of(options, is_to_solve=False, use_lights_file=False)
+            paths = list(map(Path, options.lightings))
+            return {"scene": scene, "lightings": paths, "output": output, "settings": settings}
+        case "verify":
+            folders = list(map(Path, options.folders))
+            return {"folders": folders, "variant": options.variant, "settings": settings}
+        case "cache":
+            return {"action": options.action, "names": options.names}
+        case _:
+            return {"variant": options.variant}
+
+
+def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
+    """What `solve` is asked for, with a gallery where it is of several looks."""
+    how: dict[str, Any] = {
+        "table": options.table,
+        "wanted": Wanted(options.max_miss, options.min_fit),
+    }
+    if len(options.targets) <= 1 and not options.variations:
+        return {"jobs": jobs_of(options, settings), **how}
+
+    # Galleries, which one look has no need of.
+    from lightpaint.batch.manifest.variations import parse_variations
+    from lightpaint.cli.solve_variations import several_of
+
+    failed: dict[str, str] = {}
+    jobs, several = several_of(
+        jobs_of(options, settings, failed),
+        parse_variations(options.variations),
+        failed,
+        output=Path(options.output) if options.output else None,
+        keep_going=options.keep_going,
+        force=options.force,
+    )
+    return {"jobs": jobs, "several": several, **how}
+
+
+def _to_do(options: Namespace) -> dict[str, Any]:
+    """What `batch` is asked for."""
+    return {
+        "paths": options.paths,
+        "output": Path(options.output) if options.output else None,
+        "is_first": options.init,
+        "is_dry": options.dry_run,
+        "only": options.only,
+        "form": options.export,
+        "how": _how(options),
+        "force": options.force,
+        "log": Path(options.log) if options.log else None,
+    }
+
+
+def _how(options: Namespace) -> "RunOptions":
+    """How a batch is done. Raises BatchError for what does not go together."""
+    from lightpaint.batch.run_options import RunOptions
+
+    if options.cluster is None and (options.shared_fs or options.task_limit_s is not None):
+        idle = "--shared-fs" if options.shared_fs else "--task-limit"
+        raise BatchError(f"{idle} is about workers of a cluster: give --cluster ADDRESS, too")
+    if options.cluster is not None and options.workers > 1:
+        raise BatchError(
+            f"--cluster {options.cluster} and --workers {options.workers}: give one of them"
+        )
+    return RunOptions(
+        options.workers,
+        options.keep_going,
+        options.retry,
+        options.apart,
+        options.cluster,
+        options.shared_fs,
+        options.task_limit_s,
+    )
+
+
+def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> dict[str, Any]:
+    """What `paint` is asked for."""
+    sources, asked = painted_of(options), constraints_of(options)
+    source = sources[0]
+    if options.lights_file and not isinstance(source, SceneFile):
+        asked = read_constraints(options.lights_file).and_then(asked)
+    named = f"{scene_name(Path(source.path))}.paint"
+    [folder] = folders_of(options.output and Path(options.output), [named])
+    # Those that `solve` has too, for the command that answers what was exported.
+    dropped = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
+    dropped += ["as_json", "is_quiet", "is_verbose"]
+    dropped += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)
+    return {
+        "sources": sources,
+        "folder": folder,
+        "settings": settings,
+        "constraints": asked,
+        "choice": transform_of(options),
+        "options": options_but(options.parser, given[given.index("paint") + 1 :], *dropped),
+        "new": options.new,
+        "host": options.host,
+        "port": options.port,
+        "with_browser": options.with_browser,
+    }

@@ -1,0 +1,161 @@
+"""From options to sources: scenes, bases and light groups.
+
+`solve --lights FILE.exr TARGET` and `solve FILE.exr TARGET` both mean another renderer's light
+groups; `--lights key,fill` goes on to mean the lights of a scene.
+"""
+
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.file import is_basis_file
+from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_basis
+from lightpaint.errors import BasisError
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile, check_needed
+
+#: Options that say how a scene is loaded, by the names that Python has for them.
+LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")
+
+
+def source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
+    """Return what `template` is to show: a scene, a saved basis, or light groups."""
+    given = ",".join(options.lights or ())
+    if options.scene is None:
+        if not given:
+            raise BasisError("nothing to paint on: give a scene, a basis, or light groups")
+        _check_light_groups(given)
+        options.scene, options.lights = given, None
+    elif given and _is_file_to_be(given, Path(options.scene)):
+        raise BasisError(f"{options.scene} and --lights {given} at once: give one to paint on")
+    options.source, options.targets, options.masks, options.views = options.scene, [], [], []
+    return basis_of(options) or scene_of(options)
+
+
+def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> SceneFile:
+    """The scene that was asked for. is_to_solve: whether its lights are chosen."""
+    path = options.source if options.command in ("solve", "paint") else options.scene
+    if is_to_solve:
+        how |= {
+            "lights": options.lights,
+            "groups": _groups(options.groups),
+            "lights_file": options.lights_file,
+            "use_lights_file": options.use_lights_file,
+            "group_alike": options.group_alike,
+        }
+    loading = {"sensor": options.sensor, "variant": options.variant, **how}
+    loading["integrator"] = options.integrator
+    return SceneFile(path, parameters=dict(options.parameters), **loading)
+
+
+def scene_to_export(options: Namespace) -> SceneFile | None:
+    """The scene that a lighting is exported for, if one was given; its lights are all told of."""
+    if options.scene is None:
+        return None
+    parameters = dict(options.parameters)
+    how: dict[str, Any] = {"sensor": options.sensor, "variant": options.variant}
+    return SceneFile(options.scene, parameters=parameters, use_lights_file=False, **how)
+
+
+def painted_of(options: Namespace) -> list[SceneFile | BasisFile | GroupsFile]:
+    """What `paint` paints: a scene, by each sensor that is named; bases of several views; or light
+    groups, also those that --lights names.
+    """
+    given = ",".join(options.lights or ())
+    paths = options.sources
+    if not paths and not given:
+        raise BasisError("nothing to paint: give a scene, a basis, or light groups")
+    options.sensor = options.sensors[0] if options.sensors else None
+    if not paths:
+        _check_light_groups(given)
+        paths, options.lights = [given], None
+    elif given and _is_file_to_be(given, Path(paths[0])):
+        raise BasisError(f"{paths[0]} and --lights {given} at once: give one to paint")
+    made = []
+    for options.source in paths:
+        made.append(basis_of(options) or scene_of(options))
+    if len(paths) > 1 and not all(isinstance(one, BasisFile) for one in made):
+        raise BasisError(
+            f"{len(paths)} things to paint: several are bases of the views of one scene; views of "
+            "a scene are named with --sensor, once for each"
+        )
+    if len(options.sensors) > 1:
+        return [scene_of(options, sensor=sensor) for sensor in options.sensors]
+    return made
+
+
+def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
+    """The basis or the light groups that `solve` starts from; None where it is a scene.
+
+    Where `--lights` names the light groups, the source is put in front of the targets, since it
+    is one. Raises BasisError for options that a basis without its scene has no use of.
+    """
+    source, names = Path(options.source), options.lights
+    given = ",".join(names or ())
+    basis: BasisFile | GroupsFile
+    if given and _is_file_to_be(given, source):
+        _check_light_groups(given)
+        options.targets = [options.source, *options.targets]
+        basis, names = _groups_file(given, options), None
+    elif source.suffix.lower() != ".xml" and is_light_groups(source):
+        basis = _groups_file(options.source, options)
+    elif options.pattern:
+        raise BasisError(
+            f"--pattern names the layers of light groups, and {source} has none: leave it out, or "
+            "give the EXR"
+        )
+    elif is_basis_file(source):
+        basis = BasisFile(options.source)
+    else:
+        return None
+    if options.views:
+        raise BasisError(
+            f"--target cannot be used with {basis.path}, which has one view only: give the scene, "
+            "to solve for several"
+        )
+    is_groups = isinstance(basis, GroupsFile)
+    idle = [name for name in LOADING if getattr(options, name) and name != "lights"]
+    check_needed([*idle, *(["lights"] if names and not is_groups else [])], basis)
+    if names:
+        raise BasisError(
+            f"--lights {given} chooses lights of a scene: of light groups, keep the "
+            "others as they are with --lock NAME"
+        )
+    return basis
+
+
+def _groups_file(path: str, options: Namespace) -> GroupsFile:
+    """Light groups, in whose folder what this command paints with may lie."""
+    pictures = (*options.targets, *(options.masks or ()))
+    return GroupsFile(path, options.pattern, leave_out=pictures)
+
+
+def _is_file_to_be(given: str, source: Path) -> bool:
+    """Whether `--lights` means a file or folder, and not lights of a scene or a basis."""
+    if given.lower().endswith(".exr"):
+        return True
+    # A folder or file may well have the name of a light: results are kept in such.
+    return source.suffix.lower() != ".xml" and Path(given).exists()
+
+
+def _check_light_groups(given: str) -> None:
+    """Raise BasisError for a `--lights` that names something else, ImageError for one damaged."""
+    path = Path(given)
+    if not path.exists():
+        raise BasisError(f"no such file or folder of light groups: --lights {given}")
+    if path.is_dir() and not is_light_groups(path):
+        raise BasisError(f"--lights {given} is a folder without an .exr file")
+    # What is no EXR at all is refused where it is read.
+    if path.is_file() and is_exr(path) and is_own_basis(path):
+        raise BasisError(
+            f"--lights {given} holds no light groups: give an EXR of another renderer's, or a "
+            "folder of them; a basis of lightpaint's own stands where the scene does"
+        )
+
+
+def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
+    """Emitters by name of the group. Given twice, a group has both lists."""
+    groups: dict[str, list[str]] = {}
+    for name, members in given:
+        groups[name] = groups.get(name, []) + members
+    return groups

@@ -1,0 +1,72 @@
+"""Renders of a scene under a lighting, in a folder with the relit scene."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lightpaint.basis.render.separate import emitters_seen
+from lightpaint.colour.display.exposure import choose_exposure
+from lightpaint.images.denoiser import denoised, how_denoised
+from lightpaint.images.estimate import Estimate, write_estimate
+from lightpaint.images.formats.png import write_png
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.pipeline.answer_folder import answer_files, new_answer
+from lightpaint.pipeline.remarks import remarks_of_pictures
+from lightpaint.pipeline.result_folder import ResultFolder
+from lightpaint.progress import Progress, listener, silent
+from lightpaint.scene.presets import on_film
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, render
+from lightpaint.scene.surfaces import render_features
+
+
+def relit_folder(
+    scene: Scene,
+    lighting: Path,
+    folder: Path,
+    *,
+    views: Sequence[str] = ("",),
+    force: bool = False,
+) -> ResultFolder:
+    """Where `relight_look` writes. lighting: the file whose lighting it is. views: as there."""
+    files = answer_files(folder, scene=scene, has_lighting=True)
+    files += [folder / view / name for view in views for name in ("relit.exr", "relit.png")]
+    reads = (lighting, *scene.read_files)
+    return ResultFolder(folder, tuple(files), reads, (lighting,), adds_to=lighting, force=force)
+
+
+def relight_look(
+    scenes: Mapping[str, Scene],
+    lighting: Lighting,
+    results: ResultFolder,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    resolution: str | None = None,
+    progress: Progress = silent,
+    rendered: Callable[[Scene], Estimate] | None = None,
+) -> None:
+    """Write relit.xml, and its renders as relit.exr and, denoised, as relit.png.
+
+    scenes: one through each sensor, by the folder in `results` that its pictures go to; "" for that
+    itself. resolution: part of the film that is rendered, as of `Settings`. rendered: who renders
+    the relit scene, instead of this process.
+    """
+    for remark in remarks_of_pictures():
+        listener(progress).say(remark)
+    results.check()
+    how: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
+    first, *_ = scenes.values()
+    with new_answer(results, lighting, scene=first, has_lighting=True) as answer:
+        for view, scene in scenes.items():
+            folder = answer.path
+            relit = on_film(answer.seen_through(scene.sensor), None, resolution)
+            label = f"relit of {view}" if view else "relit"
+            image = rendered(relit) if rendered else render(relit, spp=spp, label=label, **how)
+            (folder / view).mkdir(exist_ok=True)
+            write_estimate(folder / view / "relit.exr", image, {})
+            features = render_features(relit, seed=seed)
+            clean = denoised(image.image, features, quality="high")
+            texts = how_denoised(features, raw="relit.exr")
+            stops = choose_exposure(clean, emitters_seen(relit))
+            write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)
