@@ -1,5 +1,5 @@
 # PYTHON_ARGCOMPLETE_OK
-"""`python -m lightpaint`: the command line, where its script is not on the path."""
+"""Run the command line as `python -m lightpaint`, where its script is not on the path."""
 
 import sys
 

@@ -82,9 +82,9 @@ def test_each_value_is_of_the_kind_that_was_meant() -> None:
         ({"sums": {"a": 1}}, "sums is an object"),
         ({"sums": []}, "sums is an object"),
         ({"flux": [1, 2, None]}, "flux is a list"),
-        ({"parts": [{"size": 1}]}, "it lacks name"),
+        ({"parts": [{"size": 1}]}, "the key name is missing"),
         ({"parts": ["a"]}, "'a' is not an object"),
-        ({"more": 1}, "nothing is called 'more'"),
+        ({"more": 1}, "the key 'more' is unknown"),
     ],
 )
 def test_what_is_something_else(change: dict[str, Any], words: str) -> None:
@@ -97,9 +97,9 @@ def test_what_may_be_missing_and_what_may_be_there_too() -> None:
     least = {key: GOOD[key] for key in needed}
     assert read_record(Whole, least).names == ()
     for key in needed:
-        with pytest.raises(ValueError, match=f"it lacks {key}"):
+        with pytest.raises(ValueError, match=f"the key {key} is missing"):
             read_record(Whole, {k: v for k, v in least.items() if k != key})
-    with pytest.raises(ValueError, match="it lacks names"):
+    with pytest.raises(ValueError, match="the key names is missing"):
         read_record(Whole, least, required=["names"])
     assert read_record(Whole, GOOD | {"more": 1}, others=True) == read_record(Whole, GOOD)
     for odd in (None, [], "text", 1):
@@ -121,9 +121,9 @@ def test_there_and_back(part: Part) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        *((text, "is no number in JSON") for text in ("NaN", "[Infinity]", "-Infinity")),
+        *((text, "is not a number of JSON") for text in ("NaN", "[Infinity]", "-Infinity")),
         *((text, "is too large") for text in ("1e999", "-1e999", "9" * 400)),
-        ('{"a": 1, "a": 2}', "a name stands twice among a, a"),
+        ('{"a": 1, "a": 2}', "a key is repeated among a, a"),
         (r'"\ud800"', "not Unicode"),
         ("[" * 100_000, "nested too deeply"),
         ("{", "Expecting"),

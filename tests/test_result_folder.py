@@ -391,7 +391,7 @@ def test_places_that_are_not_utf_8_are_said_before_it_renders(here: Path, room: 
     for ending in ("png", "exr"):
         os.link(here / "p.exr", here / f"{name}.{ending}")
         line = refused(here, *SOLVE, f"{name}.{ending}")
-        assert f"evening\\udcff.{ending} is not a name in UTF-8: rename the file" in line
+        assert f"evening\\udcff.{ending} is a name that is not UTF-8: rename the file" in line
     lp.write_lighting("l.json", _lighting(room))
     for command in (
         ("solve", "room.xml", "p.exr", "-o", name),

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from lightpaint.errors import OutputError
-from lightpaint.storage import linux_calls as system
+from lightpaint.storage import mount_points as system
 from lightpaint.storage import staging
 from lightpaint.storage.staging import JOURNAL, MARK, finish, staged
 

@@ -24,7 +24,7 @@ from lightpaint.basis.cache_folder import CLEAN, is_own
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
-from lightpaint.images.denoiser import denoised, how_denoised, is_there
+from lightpaint.images.denoiser import denoised, denoiser_text, oidn_is_installed
 from lightpaint.images.resampling import resampled
 from lightpaint.threads import parallel_map
 
@@ -133,7 +133,7 @@ def clean_planes(
     None where there are none, and sums of so few pixels are denoised sooner.
     """
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
-    if pixels < FEWEST or not is_there():
+    if pixels < FEWEST or not oidn_is_installed():
         return None
     found = kept_planes(basis)
     if found is None and pixels <= most:
@@ -209,7 +209,7 @@ def _made_of(basis: Basis) -> str:
         plane = basis.planes.plane(which) if isinstance(which, int) else which
         return hashlib.blake2b(np.ascontiguousarray(plane).data).digest()
 
-    made = repr((FORMAT, how_denoised(basis.features, raw=""), _shape(basis)))
+    made = repr((FORMAT, denoiser_text(basis.features, raw=""), _shape(basis)))
     content = hashlib.blake2b(made.encode(), digest_size=16)
     for one in parallel_map(digest, [*range(len(basis.lights)), *others]):
         content.update(one)

@@ -40,7 +40,7 @@ from lightpaint.images.formats.exr import (
     read_headers,
     read_parts,
 )
-from lightpaint.images.formats.exr_rows import NotByRowsError, PartLayout, RowFile
+from lightpaint.images.formats.exr_rows import PartLayout, RowFile, RowsUnsupportedError
 from lightpaint.images.formats.exr_streams import PartHead, write_streamed
 from lightpaint.keywords import keywords
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
@@ -157,7 +157,7 @@ def _large(path: Path) -> Basis | None:
     """
     try:
         file = RowFile(path)
-    except (NotByRowsError, OSError):
+    except (RowsUnsupportedError, OSError):
         return None
     lit = [p for p in file.parts if LIGHT_KEY in p.texts]
     if not lit or not is_large(len(lit), lit[0].size):

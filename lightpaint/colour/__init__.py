@@ -1,1 +1,1 @@
-"""Colours as numbers: spaces, temperatures, view transforms, displays. Knows no files."""
+"""Colours as numbers: spaces, temperatures, view transforms, displays. No files are read here."""

@@ -1,6 +1,5 @@
-"""Colours as people name them.
-
-Everything here takes linear Rec.709 (D65) with a last axis of 3.
+"""Colour temperature, hexadecimal colours and luminance.  All functions take linear Rec.709 (D65)
+with a last axis of 3.
 """
 
 import math
@@ -18,37 +17,42 @@ from lightpaint.errors import ColorError
 #: Luminance of linear Rec.709 (ITU-R BT.709-6, item 3.2).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
-#: Correlated colour temperatures that there is a locus for, in kelvin.
+#: Correlated colour temperatures for which the locus is computed, in kelvin.
 KELVIN_RANGE = (1000.0, 100_000.0)
 
 #: |Duv| beyond which a colour has no correlated colour temperature (CIE 15:2018, 9.5).
 LARGEST_DUV = 0.05
 
-#: Newton's steps to the nearest black body from the nearest of those tried, with one to spare.
-STEPS = 5
+#: Newton's steps from the nearest tabulated black body to the nearest of all, with one to spare.
+NEWTON_STEPS = 5
 
 
 def luminance(rgb: Floats) -> Floats:
-    """Relative luminance, (…,), of linear Rec.709 colours (…, 3)."""
+    """Return the relative luminance, (…,), of linear Rec.709 colours (…, 3)."""
     return np.asarray(rgb @ LUMINANCE)
 
 
 @lru_cache(1024)  # 0.6 ms each, and 64 lights with ranges ask for 128
 def kelvin_to_rgb(kelvin: float, duv: float = 0.0) -> Doubles:
-    """Linear Rec.709 of luminance 1, (3,), not to be written to, of a correlated temperature.
+    """Return linear Rec.709 of luminance 1, (3,), read-only, of a correlated colour temperature.
 
     The locus is Planck's at all temperatures; `duv` is the distance from it in CIE 1960 (u, v),
-    positive towards green (Ohno 2013). D65 is 6504 K with a Duv of 0.0032.
-    Rec.709 does not contain all of them: below 1901 K a black body's blue is negative. Lights
-    cannot emit that, so negative components are set to 0 before the luminance is.
+    positive towards green (Ohno 2013). D65 is 6504 K with a Duv of 0.0032. Rec.709 does not contain
+    all of these colours: below 1901 K a black body's blue is negative. Lights cannot emit that, so
+    negative components are set to 0 before the luminance is scaled to 1.
 
-    Raises ColorError outside of 1000 to 100,000 K and of a Duv of ±0.05.
+    Raises ColorError outside 1000 to 100,000 K and a Duv of ±0.05.
     """
     lowest, highest = KELVIN_RANGE
     if not lowest <= kelvin <= highest:
-        raise ColorError(f"a colour temperature of {kelvin:g} K: need {lowest:g} to {highest:g} K")
+        raise ColorError(
+            f"a colour temperature of {kelvin:g} K is out of range: expected {lowest:g} to "
+            f"{highest:g} K"
+        )
     if not abs(duv) <= LARGEST_DUV:
-        raise ColorError(f"a Duv of {duv:g}: need -{LARGEST_DUV:g} to {LARGEST_DUV:g}")
+        raise ColorError(
+            f"a Duv of {duv:g} is out of range: expected -{LARGEST_DUV:g} to {LARGEST_DUV:g}"
+        )
     at, along, _ = _locus(1e6 / kelvin)
     xyz = xyz_of(at + duv * _towards_green(along))
     rgb = np.maximum(np.linalg.solve(rgb_to_xyz(REC709), xyz), 0)
@@ -58,12 +62,13 @@ def kelvin_to_rgb(kelvin: float, duv: float = 0.0) -> Doubles:
 
 
 def cct_and_duv(rgb: Floats) -> tuple[float, float] | None:
-    """Correlated colour temperature in kelvin and Duv of a colour (3,), by Ohno 2013.
+    """Return the correlated colour temperature in kelvin and the Duv of a colour (3,), by Ohno
+    2013.
 
-    None where it has none: for black, for a colour more than 0.05 from Planck's locus, and
-    beyond 1000 and 100,000 K. Raises ColorError unless it is three finite numbers.
+    Returns None for black, for a colour more than 0.05 from Planck's locus, and outside 1000 to
+    100,000 K. Raises ColorError unless it is three finite numbers.
     """
-    return _cct_and_duv(*_three(rgb).tolist())
+    return _cct_and_duv(*_three_numbers(rgb).tolist())
 
 
 @lru_cache(maxsize=4096)
@@ -76,56 +81,56 @@ def _cct_and_duv(*light: float) -> tuple[float, float] | None:
         return None
     uv = uv_of(xyz)
     mired = nearest_mired(uv)
-    # Newton's steps lead to where the difference is at a right angle to the locus, so that a
-    # temperature that was asked for comes back as it was, to 1e-9.
-    for _ in range(STEPS):
+    # Newton's steps end where the difference is perpendicular to the locus, so that the temperature
+    # given to `kelvin_to_rgb` comes back, to 1e-9.
+    for _ in range(NEWTON_STEPS):
         at, along, bend = _locus(mired)
         mired += float((uv - at) @ along / (along @ along - (uv - at) @ bend))
         mired = min(max(mired, 1e6 / (2 * KELVIN_RANGE[1])), 2e6 / KELVIN_RANGE[0])
     at, along, _ = _locus(mired)
     kelvin, duv = 1e6 / mired, float((uv - at) @ _towards_green(along))
     lowest, highest = KELVIN_RANGE
-    # The ends of the range come back as they went in, but for round-off.
+    # The ends of the range come back up to round-off.
     if not (lowest - 0.1 <= kelvin <= highest + 10 and abs(duv) <= LARGEST_DUV + 1e-5):
         return None
     return kelvin, duv
 
 
 def hex_to_rgb(text: str) -> Floats:
-    """Linear Rec.709 in [0, 1], (3,), of a display colour like `#ffaa66` or `#fa6`.
+    """Return linear Rec.709 in [0, 1], (3,), of a display colour like `#ffaa66` or `#fa6`.
 
     Raises ColorError for any other text.
     """
-    # colour.notation.HEX_to_RGB takes #ffaa6 as well, and a second to import.
-    found = re.fullmatch(r"#?([0-9a-fA-F]{6}|[0-9a-fA-F]{3})", text.strip())
-    if found is None:
-        raise ColorError(f"{text!r} is no colour: need six hexadecimal digits, like #ffaa66")
-    digits = found[1] if len(found[1]) == 6 else "".join(digit * 2 for digit in found[1])
+    # colour.notation.HEX_to_RGB accepts #ffaa6 too, and takes a second to import.
+    match = re.fullmatch(r"#?([0-9a-fA-F]{6}|[0-9a-fA-F]{3})", text.strip())
+    if match is None:
+        raise ColorError(f"{text!r} is not a colour: expected six hexadecimal digits, like #ffaa66")
+    digits = match[1] if len(match[1]) == 6 else "".join(digit * 2 for digit in match[1])
     return decode_display(np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)]) / 255)
 
 
 def rgb_to_hex(rgb: Floats) -> str:
-    """The display colour of a light, like `#ffaa66`: its brightest channel at full.
+    """Return the display colour of a light, like `#ffaa66`, with its brightest channel at full.
 
-    rgb: (3,) linear Rec.709. Black is `#000000`; negative components are shown as 0.
-    Raises ColorError unless it is three finite numbers.
+    rgb: (3,) linear Rec.709. Black is `#000000`; negative components become 0. Raises ColorError
+    unless it is three finite numbers.
     """
-    rgb = _three(rgb)
+    rgb = _three_numbers(rgb)
     brightest = float(rgb.max())
     shown = rgb / brightest if brightest > 0 else np.zeros(3)
     r, g, b = to_8_bit(encode_display(shown))
     return f"#{r:02x}{g:02x}{b:02x}"
 
 
-def _three(rgb: Floats) -> Floats:
+def _three_numbers(rgb: Floats) -> Floats:
     values = np.asarray(rgb, dtype=np.float64)
     if values.shape != (3,) or not all(map(math.isfinite, values)):
-        raise ColorError(f"{rgb!r} is no colour: need three finite numbers")
+        raise ColorError(f"{rgb!r} is not a colour: expected three finite numbers")
     return values
 
 
 def _locus(mired: float) -> tuple[Doubles, Doubles, Doubles]:
-    """CIE 1960 (u, v) of a black body of 1e6/mired kelvin, and its two derivatives by mired."""
+    """Return CIE 1960 (u, v) of a black body of 1e6/mired kelvin, and two derivatives by mired."""
     step = 1e-4 * mired
     kelvin = 1e6 / (mired + step * np.array([-1, 0, 1]))
     before, at, after = uv_of_black_body(kelvin)
@@ -133,5 +138,5 @@ def _locus(mired: float) -> tuple[Doubles, Doubles, Doubles]:
 
 
 def _towards_green(along: Floats) -> Floats:
-    """Unit vector at a right angle to a direction of the locus towards larger mireds."""
+    """Return the unit vector towards green, perpendicular to the locus's direction `along`."""
     return np.asarray(np.array([-along[1], along[0]]) / np.hypot(*along))

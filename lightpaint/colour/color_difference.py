@@ -1,6 +1,6 @@
-"""How far apart two colours look: CIEDE2000 (CIE 142-2001; Sharma, Wu and Dalal 2005).
+"""The visible difference of two colours, CIEDE2000 (CIE 142-2001; Sharma, Wu and Dalal 2005).
 
-Written out, since colour-science takes a second to import, and three times as long per pixel.
+colour-science would take a second to import, and three times as long per pixel.
 """
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.colour.primaries import REC709
 
-#: 25⁷, beside which the weight of chroma levels off.
+#: 25⁷, the seventh power of the chroma around which its weight levels off.
 _SEVENTH = 25.0**7
 
 #: XYZ of linear Rec.709 (SMPTE RP 177, from the primaries), white at Y = 1.
@@ -22,16 +22,16 @@ _MATRIX = np.array(
 
 
 def delta_e(a: Floats, b: Floats) -> Floats:
-    """CIEDE2000 between two images as a display would show them, (…,).
+    """Return CIEDE2000, (…,), between two images as a display would show them.
 
-    a, b: (…, 3) linear Rec.709 at the exposure they are looked at, white = 1. What a display
-    cannot show is clipped, as the display would.
+    a, b: (…, 3) linear Rec.709 at the exposure they are viewed at, white = 1. Values that a display
+    cannot show are clipped, as the display would.
     """
     return ciede2000(lab(np.clip(a, 0, 1)), lab(np.clip(b, 0, 1)))
 
 
 def lab(image: Floats) -> Doubles:
-    """CIE L*a*b* under D65, (…, 3), of linear Rec.709 (…, 3), white = 1."""
+    """Return CIE L*a*b* under D65, (…, 3), of linear Rec.709 (…, 3), white = 1."""
     x, y = REC709[6:]
     white = np.array([x / y, 1.0, (1 - x - y) / y])
     ratio = np.asarray(image, np.float64) @ (_MATRIX / white[:, None]).T
@@ -42,13 +42,13 @@ def lab(image: Floats) -> Doubles:
 
 
 def ciede2000(one: Doubles, other: Doubles) -> Doubles:
-    """CIEDE2000, (…,), between colours (…, 3) in L*a*b*."""
+    """Return CIEDE2000, (…,), between colours (…, 3) in L*a*b*."""
     (L1, a1, b1), (L2, a2, b2) = (np.moveaxis(x, -1, 0) for x in (one, other))
     mean = (np.hypot(a1, b1) + np.hypot(a2, b2)) / 2
     stretch = 1.5 - 0.5 * _levelled(mean)
     C1, h1 = _polar(stretch * a1, b1)
     C2, h2 = _polar(stretch * a2, b2)
-    # Of hue, the short way round; between greys there is none.
+    # The difference of hue, the short way round; greys have no hue.
     both = C1 * C2 > 0
     turn = np.where(both, (h2 - h1 + 180) % 360 - 180, 0.0)
     turn = np.where(both & (h2 - h1 == 180), 180.0, turn)
@@ -61,7 +61,7 @@ def ciede2000(one: Doubles, other: Doubles) -> Doubles:
     dL = (L2 - L1) / (1 + 0.015 * lighter / np.sqrt(20 + lighter))
     dC = (C2 - C1) / (1 + 0.045 * C)
     dH = 2 * np.sqrt(C1 * C2) * np.sin(np.radians(turn / 2)) / (1 + 0.015 * C * T)
-    # A sum of squares but for round-off: the rotation is less than 2.
+    # The rotation is less than 2, so that this is a sum of squares, up to round-off.
     return np.asarray(np.sqrt(np.maximum(dL**2 + dC**2 + dH**2 + rotation * dC * dH, 0)))
 
 
@@ -70,12 +70,12 @@ def _levelled(chroma: Doubles) -> Doubles:
 
 
 def _polar(a: Doubles, b: Doubles) -> tuple[Doubles, Doubles]:
-    """Chroma, and hue in degrees from 0 to 360."""
+    """Return chroma, and hue in degrees from 0 to 360."""
     return np.hypot(a, b), np.degrees(np.arctan2(b, a)) % 360
 
 
 def _between(h1: Doubles, h2: Doubles) -> Doubles:
-    """The hue half way between two, on the shorter side."""
+    """Return the hue half way between two, on the shorter side."""
     half = (h1 + h2) / 2
     return np.where(np.abs(h1 - h2) <= 180, half, np.where(half < 180, half + 180, half - 180))
 

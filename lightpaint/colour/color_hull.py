@@ -1,7 +1,7 @@
-"""Colours that light may have: all mixes of some, as a polygon in CIE 1976 (u', v').
+"""Colours that a light may have: all mixes of given ones, as a polygon in CIE 1976 (u', v').
 
-Mixes of two lights lie on the straight line between them there, so that what is mixed of colours
-in a convex polygon stays in it. The polygon is given by how far it reaches in some directions.
+There mixes of two lights lie on the straight line between them, so that mixes of colours in a
+convex polygon stay in it. The polygon is given by how far it reaches in a fixed set of directions.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.planckian_locus import uv_of, xyz_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 
-#: Directions in which a polygon is bounded, in degrees: closer where it is the curve of whites that
-#: ends it towards green.
+#: Directions in which a polygon is bounded, in degrees; closer together where the curve of whites
+#: bounds it towards green.
 DEGREES = (0, 30, 60, 90, 120, 135, 150, 165, 180, 210, 240, 270, 300, 330)
 
 #: The same as vectors, (k, 2), of length 1.
 DIRECTIONS = np.stack([np.cos(np.deg2rad(DEGREES)), np.sin(np.deg2rad(DEGREES))], axis=1)
 
-#: Distance beyond a bound that is round-off, in (u', v').
+#: Distance beyond a bound that counts as round-off, in (u', v').
 ROUND_OFF = 1e-9
 
 
@@ -31,22 +31,20 @@ def chromaticity(rgb: Floats) -> Doubles:
 
 
 def reach_of(rgb: Floats) -> Doubles:
-    """Return how far the farthest of colours (n, 3), linear, reaches in each direction, (k,)."""
+    """Return the reach (k,) of colours (n, 3), linear, in each direction."""
     return np.asarray((chromaticity(rgb) @ DIRECTIONS.T).max(axis=0))
 
 
 def sides_of(reach: Doubles) -> Doubles:
-    """Return by what a light has >= 0 that reaches no further than (…, k): linear in it, (…, k, 3).
+    """Return linear functions, (…, k, 3), of light that are >= 0 within a reach (…, k).
 
     u' = 4 X / W and v' = 9 Y / W with W = X + 15 Y + 3 Z, so that d·(u', v') <= r is
     r W - 4 d₁ X - 9 d₂ Y >= 0.
     """
     X, Y, _ = to_xyz = rgb_to_xyz(REC709)
     W = np.array([1.0, 15.0, 3.0]) @ to_xyz
-    one, other = DIRECTIONS.T
-    return np.asarray(
-        reach[..., None] * W - np.outer(4 * one, X) - np.outer(9 * other, Y), np.float64
-    )
+    x, y = DIRECTIONS.T
+    return np.asarray(reach[..., None] * W - np.outer(4 * x, X) - np.outer(9 * y, Y), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +59,9 @@ class ColorHull:
 
     @cached_property
     def primaries(self) -> Doubles:
-        """(m, 3), linear Rec.709 of luminance 1, whose mixes with weights >= 0 these are.
+        """Colours (m, 3), linear Rec.709 of luminance 1, whose non-negative mixes are the hull.
 
-        No more than Rec.709 has.
+        The hull is cut to Rec.709.
         """
         corners = chromaticity(np.eye(3))
         for direction, reach in zip(DIRECTIONS, self.reach, strict=True):
@@ -74,40 +72,50 @@ class ColorHull:
         return rgb
 
     def fan(self, side: int) -> Doubles:
-        """Return the three colours, (3, 3), of the triangle that a side makes with the middle.
+        """Return the three colours, (3, 3), of the triangle between a side and the middle.
 
-        Each of its colours is a mix of three of one triangle, and of two on the boundary.
+        Each colour of the hull is a mix of three colours of one triangle; on the boundary, of two.
         """
-        its = self.primaries
-        return np.stack([its.mean(axis=0), its[side % len(its)], its[(side + 1) % len(its)]])
+        primaries = self.primaries
+        return np.stack(
+            [
+                primaries.mean(axis=0),
+                primaries[side % len(primaries)],
+                primaries[(side + 1) % len(primaries)],
+            ]
+        )
 
     def side_towards(self, rgb: Doubles) -> int:
-        """Return the side in whose triangle a colour (3,), linear, lies, or beyond which."""
+        """Return the side in whose triangle, or beyond which, a colour (3,), linear, lies."""
         corners = chromaticity(self.primaries)
         middle = chromaticity(self.primaries.mean(axis=0))
-        ways, way = corners - middle, chromaticity(rgb) - middle
-        turn = _cross(ways, way)
-        facing = _cross(ways, np.roll(ways, -1, axis=0)).sum()
-        # It is to the left of the one end of a side, and to the right of the other.
+        to_corners, to_color = corners - middle, chromaticity(rgb) - middle
+        turn = _cross(to_corners, to_color)
+        facing = _cross(to_corners, np.roll(to_corners, -1, axis=0)).sum()
+        # The colour is to the left of one end of that side, and to the right of the other.
         left = turn * facing >= 0
-        found = np.flatnonzero(left & ~np.roll(left, -1))
-        return int(found[0]) if found.size else 0
+        sides = np.flatnonzero(left & ~np.roll(left, -1))
+        return int(sides[0]) if sides.size else 0
 
     @cached_property
     def _sides(self) -> Doubles:
         return sides_of(self.reach)
 
     def has(self, rgb: Doubles) -> bool:
-        """Return whether the colour of a light (3,), linear, is in it; black is."""
+        """Return True if the hull contains the colour of a light (3,), linear; black is in every
+        hull.
+        """
         return bool((self._sides @ rgb >= -ROUND_OFF * rgb.sum()).all())
 
     def nearest(self, rgb: Doubles) -> Doubles:
-        """Return a light (3,), linear, mixed with its own colour until it is in it, as bright."""
+        """Return a light (3,), linear, mixed with the hull's own colour until it is inside, as
+        bright.
+        """
         if self.has(rgb):
             return rgb
         room, own = self._sides @ rgb, self._sides @ self.own
         beyond = (room < 0) & (own > 0)
-        # With so much of its own colour beside it is within all sides.
+        # This much of the hull's own colour brings it within all sides.
         mixed = rgb + float(np.max(-room[beyond] / own[beyond], initial=0.0)) * self.own
         return np.asarray(mixed * (luminance(rgb) / luminance(mixed)), np.float64)
 

@@ -1,8 +1,8 @@
 """Embedded ICC profiles: from a file's own RGB or grey to linear Rec.709.
 
 Profiles of three curves and a matrix, and of one curve for grey, are understood (ICC.1:2022, F.2
-and F.3): those are the working spaces of paint programs. What is built of tables over all three
-colours (printers, some scanners) is refused.
+and F.3): those are the working spaces of paint programs. Profiles of tables over all three colours
+(printers, some scanners) are refused.
 """
 
 import struct
@@ -18,12 +18,12 @@ from lightpaint.errors import ImageError
 
 Curve = Callable[[Floats], Floats]
 
-#: XYZ of the white that all profiles refer to, D50.
+#: XYZ of D50, the white that all profiles refer to.
 D50 = np.array([0.9642, 1.0, 0.8249])
 
-#: By how much a profile may differ from sRGB in light, of 1, and still be it. Programs ship curves
+#: Largest difference in light, of 1, at which a profile still counts as sRGB: programs ship curves
 #: of 1024 points and matrices of four decimals.
-SAME = 2e-3
+SRGB_TOLERANCE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -40,23 +40,23 @@ class Profile:
 
     @property
     def is_srgb(self) -> bool:
-        """Whether the numbers mean what they would without a profile."""
+        """True if the numbers mean the same as without a profile."""
         return self._curves_are(decode_display) and bool(
-            np.allclose(self.matrix, np.eye(3), rtol=0, atol=SAME)
+            np.allclose(self.matrix, np.eye(3), rtol=0, atol=SRGB_TOLERANCE)
         )
 
     @property
     def is_linear(self) -> bool:
-        """Whether the numbers are proportional to light."""
+        """True if the numbers are proportional to light."""
         return self._curves_are(lambda v: v)
 
     def _curves_are(self, curve: Curve) -> bool:
         v = np.linspace(0, 1, 256)
-        return all(np.abs(own(v) - curve(v)).max() < SAME for own in self.curves)
+        return all(np.abs(own(v) - curve(v)).max() < SRGB_TOLERANCE for own in self.curves)
 
 
 def read_icc(data: bytes) -> Profile:
-    """The profile in these bytes. Raises ImageError if it is damaged or of another kind."""
+    """Return the profile in these bytes. Raises ImageError if it is damaged or of another kind."""
     try:
         return _read(data)
     except (struct.error, IndexError, ValueError, UnicodeDecodeError) as error:
@@ -71,13 +71,13 @@ def gamma_profile(gamma: float, primaries: tuple[float, ...] | None) -> Profile:
 
 
 def srgb_profile(name: str, primaries: tuple[float, ...]) -> Profile:
-    """sRGB's curve with other primaries."""
+    """Return the profile of sRGB's curve with other primaries."""
     return Profile(name, (decode_display,) * 3, to_rec709(primaries))
 
 
 def _read(data: bytes) -> Profile:
     if len(data) < 132 or data[36:40] != b"acsp":
-        raise ValueError("it is cut off, or none")
+        raise ValueError("it is cut off, or is not a profile")
     space, connection = data[16:20], data[20:24]
     tags = {}
     (count,) = struct.unpack_from(">I", data, 128)
@@ -99,10 +99,10 @@ def _read(data: bytes) -> Profile:
         )
     columns = [_xyz(tags[b"%cXYZ" % c]) for c in b"rgb"]
     red, green, blue = (_curve(tags[b"%cTRC" % c]) for c in b"rgb")
-    ours = adaptation(rgb_to_xyz(REC709).sum(axis=1), D50) @ rgb_to_xyz(REC709)
-    matrix = np.linalg.solve(ours, np.stack(columns, axis=1))
+    to_xyz_d50 = adaptation(rgb_to_xyz(REC709).sum(axis=1), D50) @ rgb_to_xyz(REC709)
+    matrix = np.linalg.solve(to_xyz_d50, np.stack(columns, axis=1))
     if not abs(np.linalg.det(matrix)) > 1e-6:
-        raise ValueError("its colours span nothing")
+        raise ValueError("its three colours are not independent")
     return Profile(name, (red, green, blue), matrix)
 
 
@@ -144,7 +144,10 @@ def _curve(tag: bytes) -> Curve:
 
 
 def _parametric(kind: int, values: list[float]) -> Curve:
-    """(a x + b)^g + e from x = d on, c x + f below: ICC's types 0 to 4, which leave some out."""
+    """Return ICC's parametric curve: (a x + b)^g + e from x = d on, c x + f below.
+
+    Types 0 to 4 leave out some of the parameters.
+    """
     g, a, b, c, d, e, f = values[0], 1.0, 0.0, 0.0, -1.0, 0.0, 0.0
     if kind in (1, 2):
         a, b = values[1:3]

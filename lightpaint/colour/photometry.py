@@ -1,12 +1,12 @@
 """A light as an eye sees it: colour, colour temperature, luminous quantities and flux.
 
-A scene in RGB has no absolute scale: only its author knows what radiance 1 stands for. Told
-once, in cd/m², it holds for everything: with radiance 1 W/(m² sr) ≙ u cd/m², the luminance-
-weighted mean Y of an emission E is
+A scene in RGB has no absolute scale: only its author knows what radiance 1 stands for. One number,
+in cd/m², gives the scale of everything: if radiance 1 W/(m² sr) stands for u cd/m², an emission
+with the luminance-weighted mean Y is
 
     area, constant   u Y(L) cd/m²      point, spot   u Y(I) cd      directional   u Y(E) lx
 
-and a flux of Φ watts is u Y(Φ) lm. Without u there are numbers in proportion, and no units.
+and a flux of Φ watts is u Y(Φ) lm. Without u the numbers are only relative, and have no units.
 """
 
 import math
@@ -18,20 +18,20 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.color import cct_and_duv, luminance, rgb_to_hex
 
-#: Luminous counterpart of the units of emission. Multiples of what a scene has are not in it.
+#: Luminous counterparts of the units of emission. Multiples of a scene's emission have none.
 LUMINOUS_UNITS = {"W/(m² sr)": "cd/m²", "W/sr": "cd", "W/m²": "lx"}
 
 
 @dataclass(frozen=True)
 class Photometry:
-    """One light as it is set.
+    """The photometric quantities of one light.
 
     y: luminance-weighted emission, 0.2126 R + 0.7152 G + 0.0722 B.
     hex: its display colour, brightest channel at full. kelvin, duv: its correlated colour
-    temperature. None where it has none: off, of unknown colour, far from Planck's locus.
-    flux_w: radiant flux per channel; None where a light has none of its own, as the sun.
-    flux_y: the same, luminance-weighted.
-    luminous, luminous_unit, flux_lm: with a scale; in cd/m², cd or lx, and in lumen.
+    temperature; None if it has none: off, of unknown colour, far from Planck's locus. flux_w:
+    radiant flux per channel; None for a light without a flux of its own, like the sun. flux_y: the
+    same, luminance-weighted. luminous, luminous_unit, flux_lm: in cd/m², cd or lx, and in lumens;
+    only with a scale.
     """
 
     y: float
@@ -46,22 +46,24 @@ class Photometry:
 
     @property
     def color(self) -> str:
-        """`#ffaa66 2856 K`, as far as there is one; "" if there is none."""
+        """Colour and temperature, `#ffaa66 2856 K`, as far as the light has them."""
         kelvin = "" if self.kelvin is None else f"{self.kelvin:.0f} K"
         return " ".join(filter(None, (self.hex, kelvin)))
 
     def without_colour(self) -> "Photometry":
-        """The same of a light whose colour nobody knows."""
+        """Return the same for a light of unknown colour."""
         return replace(self, hex=None, kelvin=None, duv=None)
 
     @property
     def amounts(self) -> tuple[str, str]:
-        """Luminous quantity and luminous flux for people to read, each "" if there is none."""
-        luminous = "" if self.luminous is None else f"{_spoken(self.luminous)} {self.luminous_unit}"
-        return luminous, "" if self.flux_lm is None else f"{_spoken(self.flux_lm)} lm"
+        """Luminous quantity and luminous flux in words, each "" if there is none."""
+        luminous = (
+            "" if self.luminous is None else f"{_in_words(self.luminous)} {self.luminous_unit}"
+        )
+        return luminous, "" if self.flux_lm is None else f"{_in_words(self.flux_lm)} lm"
 
     def fields(self) -> dict[str, Any]:
-        """For JSON (docs/formats.md); what there is not is left out."""
+        """Return the fields for JSON (docs/formats.md); missing quantities are left out."""
         named = {
             "y": self.y,
             "hex": self.hex,
@@ -79,7 +81,7 @@ class Photometry:
 def photometry(
     emission: RGB, *, unit: str, unit_flux: RGB | None = None, cd_per_unit: float | None = None
 ) -> Photometry:
-    """What a light with `emission` in `unit` is.
+    """Return the photometric quantities of a light with `emission` in `unit`.
 
     unit_flux: watts that it radiates per channel at an emission of 1.
     cd_per_unit: cd/m² that radiance 1 stands for.
@@ -88,15 +90,15 @@ def photometry(
     y = float(luminance(np.array(emission)))
     flux = None if unit_flux is None else _times(emission, unit_flux)
     flux_y = None if flux is None else float(luminance(np.array(flux)))
-    # Of a multiple of several colours, only what all of them radiate together has a colour.
+    # A multiple of several emissions has no colour of its own; their total flux has one.
     colour = emission if is_colour else flux
-    is_seen = colour is not None and any(colour)
-    temperature = cct_and_duv(np.array(colour)) if is_seen else None
+    has_colour = colour is not None and any(colour)
+    temperature = cct_and_duv(np.array(colour)) if has_colour else None
     kelvin, duv = temperature or (None, None)
     scale = cd_per_unit
     return Photometry(
         y=y,
-        hex=rgb_to_hex(np.array(colour)) if is_seen else None,
+        hex=rgb_to_hex(np.array(colour)) if has_colour else None,
         kelvin=kelvin,
         duv=duv,
         flux_w=flux,
@@ -108,20 +110,20 @@ def photometry(
 
 
 def lambertian_flux(area: float) -> float:
-    """Watts per unit of radiance of a surface that is equally bright from all sides: π A."""
+    """Return the watts per unit of radiance of a surface equally bright from all sides: π A."""
     return math.pi * area
 
 
 def point_flux() -> float:
-    """Watts per unit of intensity of a light that shines alike in all directions: 4π."""
+    """Return the watts per unit of intensity of a light equally bright in all directions: 4π."""
     return 4 * math.pi
 
 
 def spot_flux(cutoff: float, beam_width: float) -> float:
-    """Watts per unit of intensity of Mitsuba's spot; both angles from the axis, in radians.
+    """Return the watts per unit of intensity of Mitsuba's spot; angles from the axis, in radians.
 
-    Its intensity is whole up to the beam width b, and from there on falls linearly in the
-    angle to 0 at the cutoff c:
+    Its intensity is constant up to the beam width b, and then falls linearly with the angle to 0 at
+    the cutoff c:
 
         2π (∫₀ᵇ sin θ dθ + ∫ᵇᶜ (c − θ)/(c − b) sin θ dθ) = 2π (1 − (sin c − sin b)/(c − b))
     """
@@ -132,8 +134,8 @@ def spot_flux(cutoff: float, beam_width: float) -> float:
     return 2 * math.pi * (1 - math.cos((c + b) / 2) * sinc)
 
 
-def _spoken(value: float) -> str:
-    # 1,480 and not 1.48e+03, but no hundred digits either.
+def _in_words(value: float) -> str:
+    # 1,480 instead of 1.48e+03, but not a hundred digits either.
     return f"{value:,.0f}" if 1000 <= value < 1e7 else f"{value:.3g}"
 
 

@@ -1,7 +1,7 @@
-"""Planck's locus: where black bodies lie in CIE 1960 (u, v), by their temperature.
+"""Planck's locus: CIE 1960 (u, v) of black bodies by their temperature.
 
-Planck's law summed over the CIE 1931 colour matching functions, nanometre by nanometre, as
-colour-science does it. That takes a second to import, and every answer names temperatures.
+Planck's law is summed over the CIE 1931 colour matching functions, nanometre by nanometre, as in
+colour-science. That library takes a second to import, and every answer names temperatures.
 """
 
 from functools import cache
@@ -14,42 +14,43 @@ from lightpaint.arrays import Doubles, Floats
 #: Second radiation constant in m K, as CIE 15:2004 rounds it.
 C2 = 0.014388
 
-#: Mireds at which it is tried which black body is nearest; beyond 1000 and 100,000 K.
-TRIED = np.concatenate([[5.0], np.geomspace(10, 2000, 400)])
+#: Mireds of the tabulated black bodies, from which the search for the nearest starts; they reach
+#: beyond 1000 and 100,000 K.
+TABLE_MIREDS = np.concatenate([[5.0], np.geomspace(10, 2000, 400)])
 
 
 def uv_of_black_body(kelvin: Doubles) -> Doubles:
-    """(k, 2), CIE 1960 (u, v) of black bodies of temperatures (k,)."""
+    """Return CIE 1960 (u, v), (k, 2), of black bodies of temperatures (k,)."""
     wavelength, observer = _observer()
     radiance = wavelength[:, None] ** -5 / np.expm1(C2 / (wavelength[:, None] * kelvin))
     return uv_of(radiance.T @ observer)
 
 
 def uv_of(xyz: Floats) -> Doubles:
-    """CIE 1960 (u, v), (…, 2), of XYZ (…, 3)."""
+    """Return CIE 1960 (u, v), (…, 2), of XYZ (…, 3)."""
     X, Y, Z = np.moveaxis(np.asarray(xyz, np.float64), -1, 0)
     return np.asarray(np.stack([4 * X, 6 * Y], axis=-1) / (X + 15 * Y + 3 * Z)[..., None])
 
 
 def xyz_of(uv: Floats | tuple[float, float]) -> Doubles:
-    """XYZ of luminance 1, (3,), of CIE 1960 (u, v)."""
+    """Return XYZ of luminance 1, (3,), of CIE 1960 (u, v)."""
     u, v = uv
     return np.asarray(np.array([3 * u, 2 * v, 4 - u - 10 * v]) / (2 * v))
 
 
 def nearest_mired(uv: Floats) -> float:
-    """Of the black bodies that are tried, the nearest to (u, v), (2,), in mireds."""
-    return float(TRIED[np.argmin(np.square(_tried() - uv).sum(axis=1))])
+    """Return the mireds of the tabulated black body nearest to (u, v), (2,)."""
+    return float(TABLE_MIREDS[np.argmin(np.square(_table_uv() - uv).sum(axis=1))])
 
 
 @cache
-def _tried() -> Doubles:
-    return uv_of_black_body(1e6 / TRIED)
+def _table_uv() -> Doubles:
+    return uv_of_black_body(1e6 / TABLE_MIREDS)
 
 
 @cache
 def _observer() -> tuple[Doubles, Doubles]:
-    """Wavelengths in metres, (m,), and the colour matching functions there, (m, 3)."""
+    """Return wavelengths in metres, (m,), and the colour matching functions there, (m, 3)."""
     text = files("lightpaint.colour").joinpath("cie_1931.csv").read_text("utf-8")
     table = np.loadtxt(text.splitlines(), delimiter=",")
     return table[:, 0] * 1e-9, table[:, 1:]

@@ -1,4 +1,4 @@
-"""From the colours that a file declares to linear Rec.709."""
+"""Conversion from the primaries that a file declares to linear Rec.709."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -7,24 +7,24 @@ from functools import lru_cache
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.science import colour_science
+from lightpaint.colour.colour_science import colour_science
 from lightpaint.errors import ImageError
 
-#: CIE xy of red, green, blue and white of Rec.709, the colours of every image here.
+#: CIE xy of red, green, blue and white of Rec.709, the primaries of every image in memory.
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 #: CIE XYZ itself, as a set of primaries.
 XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
 
-#: Files round the numbers: to three decimals, or to float16.
+#: Tolerance for numbers that files round to three decimals, or to float16.
 ROUNDING = 1e-3
 
-#: From XYZ to the responses in which Bradford's transform adapts (Lam 1985; ICC.1:2022, annex E).
+#: From XYZ to the cone responses of Bradford's adaptation (Lam 1985; ICC.1:2022, annex E).
 BRADFORD = np.array(
     [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
 )
 
-#: The spaces that renderers work in, as files name them and as colour-science does.
+#: Working spaces of renderers: their names in files, and in colour-science.
 SPACES = {
     "lin_ap1_scene": "ACEScg",
     "lin_ap0_scene": "ACES2065-1",
@@ -34,16 +34,17 @@ SPACES = {
 
 
 def primaries_in(space: str) -> tuple[float, ...]:
-    """CIE xy of red, green, blue and white of a space that colour-science knows by this name."""
+    """Return CIE xy of red, green, blue and white of a space, by its name in colour-science."""
     known = colour_science().RGB_COLOURSPACES[space]
     return tuple(map(float, (*known.primaries.ravel(), *known.whitepoint)))
 
 
 @lru_cache(64)
 def rgb_to_xyz(primaries: tuple[float, ...]) -> Doubles:
-    """(3, 3) matrix from linear RGB of these primaries (SMPTE RP 177) to XYZ, white at Y = 1.
+    """Return the matrix (3, 3) from linear RGB of these primaries (SMPTE RP 177) to XYZ, white at Y
+    = 1.
 
-    Not to be written to. Raises ImageError where they span no colours.
+    It is read-only. Raises ImageError if the primaries span no colours.
     """
     xy = np.asarray(primaries, dtype=np.float64).reshape(4, 2)
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
@@ -57,19 +58,20 @@ def rgb_to_xyz(primaries: tuple[float, ...]) -> Doubles:
 
 
 def adaptation(white: Doubles, to: Doubles) -> Doubles:
-    """(3, 3) matrix that takes XYZ as seen under `white` to how it looks under `to` (Bradford).
+    """Return the matrix (3, 3) from XYZ as seen under `white` to how it looks under `to`
+    (Bradford).
 
-    Most paintings have a profile, and would wait for colour-science for these two lines alone.
+    colour-science has this too, but most paintings have a profile, and its import would delay them.
     """
     ratio = (BRADFORD @ to) / (BRADFORD @ white)
     return np.asarray(np.linalg.solve(BRADFORD, ratio[:, None] * BRADFORD))
 
 
 def to_rec709(primaries: tuple[float, ...]) -> Doubles:
-    """(3, 3) matrix from linear RGB of these primaries to linear Rec.709.
+    """Return the matrix (3, 3) from linear RGB of these primaries to linear Rec.709.
 
-    Another white is adapted: what is white in the file is white here. XYZ is no RGB space with a
-    white of its own but colours as measured, and taken as it is.
+    A different white is adapted: white in the file becomes white here. XYZ has no white of its own,
+    holds colours as measured, and is taken as it is.
     """
     ours, theirs = rgb_to_xyz(REC709), rgb_to_xyz(primaries)
     is_same_white = np.allclose(primaries[6:], REC709[6:], rtol=0, atol=ROUNDING)
@@ -78,19 +80,19 @@ def to_rec709(primaries: tuple[float, ...]) -> Doubles:
     return np.asarray(np.linalg.solve(ours, theirs), np.float64)
 
 
-def are_same(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:
-    """Whether two declare the same primaries, None for Rec.709's, but for how files round."""
-    return np.allclose(one or REC709, other or REC709, rtol=0, atol=ROUNDING)
+def are_same(a: Sequence[float] | None, b: Sequence[float] | None) -> bool:
+    """Return True if both are the same primaries up to the rounding of files; None is Rec.709."""
+    return np.allclose(a or REC709, b or REC709, rtol=0, atol=ROUNDING)
 
 
 def is_rec709(primaries: Sequence[float] | None) -> bool:
-    """Whether these are the primaries of every image here; a file that declares none has them."""
+    """Return True for Rec.709's primaries; a file that declares none has them."""
     return are_same(primaries, None)
 
 
 def converted(image: Floats, matrix: Floats) -> Floats:
-    """Each pixel of (h, w, 3) by a (3, 3) matrix, as float32."""
-    # NaN and Inf are found, and counted, afterwards.
+    """Return each pixel of (h, w, 3) multiplied by a (3, 3) matrix, as float32."""
+    # The caller finds NaN and Inf, and counts them.
     with np.errstate(invalid="ignore", over="ignore"):
         return np.asarray(image.astype(np.float32, copy=False) @ matrix.T.astype(np.float32))
 

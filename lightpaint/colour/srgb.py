@@ -1,7 +1,5 @@
-"""From linear light to what a display shows, in sRGB.
-
-For a million pixels of float32 encoding takes 28 ms and decoding 15; colour-science takes 65 and
-70, and gives float64.
+"""sRGB: linear light to display values, and back.  Encoding a million pixels of float32 takes 28 ms
+and decoding 15; colour-science takes 65 and 70, and returns float64.
 """
 
 import numpy as np
@@ -9,12 +7,12 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 
-#: Beyond this many stops an exposure is a slip of the pen.
+#: Largest exposure in stops: beyond it the number is a typing error.
 MAX_STOPS = 64.0
 
 
 def encode_display(image: Floats, *, stops: float = 0.0) -> Floats:
-    """sRGB-encoded values in [0, 1] of linear Rec.709, scaled by 2^stops and clipped.
+    """Return sRGB-encoded values in [0, 1] of linear Rec.709, scaled by 2^stops and clipped.
 
     The transfer function is IEC 61966-2-1's.
     """
@@ -24,11 +22,13 @@ def encode_display(image: Floats, *, stops: float = 0.0) -> Floats:
 
 
 def decode_display(image_display: Floats) -> Floats:
-    """Linear Rec.709 in [0, 1] of sRGB-encoded values in [0, 1]: undoes `encode_display`."""
+    """Return linear Rec.709 in [0, 1] of sRGB-encoded values in [0, 1]: the inverse of
+    `encode_display`.
+    """
     curve = ((image_display + 0.055) / 1.055) ** 2.4
     return np.asarray(np.where(image_display <= 0.04045, image_display / 12.92, curve))
 
 
 def to_8_bit(image_display: Floats) -> npt.NDArray[np.uint8]:
-    """Display values in [0, 1] as 8-bit integers."""
+    """Return display values in [0, 1] as 8-bit integers."""
     return np.asarray(np.round(image_display * 255), dtype=np.uint8)

@@ -1,8 +1,8 @@
 """Ranges of white: the part of Planck's locus between two temperatures, in short straight pieces.
 
-The locus is curved, and the straight line between two whites far apart lies off it, towards pink:
-half way between 2200 K and 9000 K by 0.015 in Duv. Between two that are `STEP` apart nobody sees
-or measures that.
+The locus is curved, and the straight line between two distant whites lies off it, towards pink:
+half way between 2200 K and 9000 K by 0.015 in Duv. Between two whites that are `STEP` apart the
+distance is neither visible nor measurable.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.planckian_locus import uv_of
 from lightpaint.colour.primaries import REC709, rgb_to_xyz
 
-#: Mireds between two neighbours, at most. The chord is less than 3e-5 off the locus, and what
-#: is white at both ends differs by less than two steps that an eye tells apart.
+#: Largest step between neighbouring whites, in mireds. The chord is less than 3e-5 off the locus,
+#: and neighbours differ by less than two just noticeable steps.
 STEP = 8.0
 
 
@@ -25,8 +25,8 @@ STEP = 8.0
 class WhiteRange:
     """The whites between two temperatures.
 
-    low, high: in kelvin. duv: by how much greener than Planck's locus all of them are, in CIE 1960
-    (u, v).
+    low, high: in kelvin. duv: distance of all of them from Planck's locus in CIE 1960 (u, v),
+    positive towards green.
     """
 
     low: float
@@ -35,19 +35,19 @@ class WhiteRange:
 
     @cached_property
     def mireds(self) -> Doubles:
-        """(k,), those of its whites, from the warmest to the coolest; both ends are among them."""
+        """Mireds of the whites, (k,), from the warmest to the coolest, both ends included."""
         warm, cool = 1e6 / self.low, 1e6 / self.high
         return np.linspace(warm, cool, 1 + max(1, ceil((warm - cool) / STEP)))
 
     @cached_property
     def colors(self) -> Doubles:
-        """(k, 3), linear Rec.709 of luminance 1. Below 1901 K without the negative blue."""
+        """Colours of the whites, (k, 3), linear Rec.709 of luminance 1; negative blue becomes 0."""
         kelvin = [self.low, *(1e6 / self.mireds[1:-1]).tolist(), self.high]
         return np.array([kelvin_to_rgb(float(x), self.duv) for x in kelvin])
 
     @property
     def last(self) -> int:
-        """The place of the coolest white."""
+        """Index of the coolest white."""
         return len(self.mireds) - 1
 
     @cached_property
@@ -56,7 +56,7 @@ class WhiteRange:
 
     @cached_property
     def _tristimulus(self) -> Doubles:
-        """(k,), X + 15 Y + 3 Z: by this much mixes of light weigh in (u, v)."""
+        """X + 15 Y + 3 Z of the whites, (k,): their weights in (u, v) of a mix."""
         return np.asarray(self.colors @ rgb_to_xyz(REC709).T @ np.array([1.0, 15.0, 3.0]))
 
     def places(self, rgb: Floats) -> Doubles:
@@ -70,9 +70,9 @@ class WhiteRange:
         way = np.diff(self._uv, axis=0)
         beside = uv[:, None] - self._uv[:-1]
         part = np.clip((beside * way).sum(axis=2) / np.square(way).sum(axis=1), 0, 1)
-        apart = np.square(beside - part[..., None] * way).sum(axis=2)
-        k = np.argmin(apart, axis=1)
-        # From a part of the way in (u, v) to a part of the light.
+        distance = np.square(beside - part[..., None] * way).sum(axis=2)
+        k = np.argmin(distance, axis=1)
+        # Convert the fraction of the way in (u, v) to a fraction of the light.
         t = np.take_along_axis(part, k[:, None], axis=1)[:, 0]
         one, other = (1 - t) / self._tristimulus[k], t / self._tristimulus[k + 1]
         return np.where(lit, k + other / (one + other), self.last / 2)
@@ -88,9 +88,9 @@ class WhiteRange:
         return np.asarray(np.asarray(luminance(rgb))[:, None] * self.at(self.places(rgb)))
 
     def greener(self, rgb: Floats) -> Doubles:
-        """Return by how much colours (n, 3) are greener than the nearest white, (n,), in Duv.
+        """Return the Duv, (n,), by which colours (n, 3) are greener than the nearest white.
 
-        Below 0 they are pinker. What is black is neither.
+        Negative values are pinker; black gives 0.
         """
         rgb = np.asarray(rgb, np.float64)
         lit = rgb.max(axis=1) > 0
@@ -100,8 +100,8 @@ class WhiteRange:
         along = np.diff(self._uv, axis=0)[k]
         across = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
         to_xyz = rgb_to_xyz(REC709).T
-        apart = uv_of(np.where(lit[:, None], rgb, 1.0) @ to_xyz) - uv_of(self.at(places) @ to_xyz)
-        return np.where(lit, (apart * across).sum(axis=1), 0.0)
+        offset = uv_of(np.where(lit[:, None], rgb, 1.0) @ to_xyz) - uv_of(self.at(places) @ to_xyz)
+        return np.where(lit, (offset * across).sum(axis=1), 0.0)
 
     def window(self, place: float, width: int) -> tuple[int, int]:
         """Return the first and last white of `width` pieces about a place, within the range."""
@@ -110,27 +110,27 @@ class WhiteRange:
         return first, first + width
 
     def tangent(self, window: tuple[int, int], reach: float) -> Doubles:
-        """Draw the straight line of a window out by `reach` mireds, within the range.
+        """Return the line of a window extended by `reach` mireds at both ends, within the range.
 
-        Return its ends, (2, 3) linear, of luminance 1 and never negative.
+        The result is its ends, (2, 3) linear, of luminance 1 and never negative.
         """
         first, last = window
         a, b = self.colors[first], self.colors[last]
         per_mired = (b - a) / (self.mireds[first] - self.mireds[last])
         back = min(reach, float(self.mireds[0] - self.mireds[first]))
         ahead = min(reach, float(self.mireds[last] - self.mireds[-1]))
-        return np.stack([_drawn(a, -back * per_mired), _drawn(b, ahead * per_mired)])
+        return np.stack([_moved(a, -back * per_mired), _moved(b, ahead * per_mired)])
 
 
 @lru_cache(64)
 def white_range(low: float, high: float, duv: float = 0.0) -> WhiteRange:
-    """Return the range, whose whites are found once. Raises ColorError as `kelvin_to_rgb` does."""
-    made = WhiteRange(low, high, duv)
-    made.colors.setflags(write=False)
-    return made
+    """Return the range, cached with its whites. Raises ColorError as `kelvin_to_rgb` does."""
+    whites = WhiteRange(low, high, duv)
+    whites.colors.setflags(write=False)
+    return whites
 
 
-def _drawn(color: Doubles, way: Doubles) -> Doubles:
+def _moved(color: Doubles, way: Doubles) -> Doubles:
     """Return a colour (3,) moved by `way`, (3,), or as much of it as leaves no channel below 0."""
     with np.errstate(divide="ignore"):
         room = np.where(way < 0, color / np.where(way < 0, -way, 1), np.inf)

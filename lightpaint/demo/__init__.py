@@ -1,7 +1,6 @@
-"""A room and a painting of it that come with the package, to try it on.
+"""A room and a painting of it, shipped with the package to try it out.
 
-`gallery` and `evening.exr` are links to what stands in `scenes/` and `targets/`; a built package
-has the files.
+`gallery` and `evening.exr` are links into `scenes/` and `targets/`; a built package has the files.
 """
 
 from dataclasses import dataclass
@@ -12,14 +11,14 @@ from lightpaint.errors import OutputError
 from lightpaint.files import write_bytes
 from lightpaint.keywords import keywords
 
-#: What is copied of the scene's folder, and what makes it is not.
+#: Files of the scene's folder that are copied; the scripts that make them are not.
 PATTERNS = ("scene.xml", "meshes/*.ply", "textures/*.png")
 
 
 @keywords()
 @dataclass(frozen=True)
 class Demo:
-    """The demo in a folder of one's own.
+    """A copy of the demo in a folder of the user's.
 
     Attributes:
         scene: Mitsuba XML.
@@ -38,16 +37,16 @@ class Demo:
 
 @keywords()
 def write_demo(folder: str | Path) -> Demo:
-    """Copy the demo into `folder`; what is there and the same is left alone.
+    """Copy the demo into `folder`; equal files that are there already are left alone.
 
     Args:
-        folder: Made if it is not there.
+        folder: Created if it does not exist.
 
     Returns:
-        Where the files are.
+        Paths of the files.
 
     Raises:
-        OutputError: For a file there that differs, and for what cannot be written.
+        OutputError: If a file there differs, or cannot be written.
 
     Examples:
         >>> demo = lp.write_demo("lightpaint-demo")
@@ -60,13 +59,14 @@ def write_demo(folder: str | Path) -> Demo:
         room = [file for x in PATTERNS for file in (shipped / "gallery").glob(x)]
         contents = {file.relative_to(shipped): file.read_bytes() for file in room}
         contents[Path("evening.exr")] = (shipped / "evening.exr").read_bytes()
-    there = {file: data for file, data in contents.items() if (folder / file).exists()}
-    for file, data in there.items():
+    existing = {file: data for file, data in contents.items() if (folder / file).exists()}
+    for file, data in existing.items():
         if not (folder / file).is_file() or (folder / file).read_bytes() != data:
             raise OutputError(
-                f"{folder / file} is not as the demo has it: choose another folder, or move it away"
+                f"{folder / file} differs from the demo's file: choose another folder, or move "
+                "it away"
             )
     for file, data in contents.items():
-        if file not in there:
+        if file not in existing:
             write_bytes(folder / file, data)
     return demo

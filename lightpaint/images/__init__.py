@@ -1,1 +1,1 @@
-"""Pixels at the edge of the program: picture files in and out, and images with their noise."""
+"""Picture files in and out, and images in memory: with their noise, denoised, in blocks."""

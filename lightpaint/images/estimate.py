@@ -1,4 +1,4 @@
-"""An image made by Monte Carlo, with what is known of its noise."""
+"""A Monte Carlo image with an estimate of its noise."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Estimate:
     @classmethod
     @keywords()
     def of_halves(cls, a: Floats, b: Floats) -> "Estimate":
-        """From two independent renders of equal sample count."""
+        """Return the estimate of two independent renders of equal sample count."""
         return cls((a + b) / 2, (a - b) / 2)
 
     @property
@@ -58,20 +58,20 @@ class Estimate:
         return self.image.shape[0], self.image.shape[1]
 
     def reduced(self, factor: int) -> "Estimate":
-        """Of the same picture with a pixel for each block of factor x factor."""
+        """Return the estimate of the picture with a pixel for each block of factor x factor."""
         return Estimate(block_mean(self.image, factor), block_mean(self.half_difference, factor))
 
     def variance(self, *, radius: int = 2) -> Floats:
-        """Variance of each pixel of `image`, (h, w, 3), pooled over its neighbours.
+        """Return the variance of each pixel of `image`, (h, w, 3), pooled over its neighbours.
 
-        One pair of halves gives one squared difference per pixel, far too rough to divide
-        by; the mean over (2 radius + 1)² pixels of a window is used instead.
+        One pair of halves gives one squared difference per pixel, too rough to divide by. The
+        result is its mean over a window of (2 radius + 1)² pixels.
         """
         return box_mean(np.square(self.half_difference, dtype=np.float64), radius)
 
 
 def box_mean(values: Floats, radius: int) -> Floats:
-    """Mean over a square window, cut off at the borders. values: (h, w, …)."""
+    """Return means over a square window, cut off at the borders. values: (h, w, …)."""
     for axis in (0, 1):
         length = values.shape[axis]
         total = np.cumsum(values, axis=axis, dtype=np.float64)
@@ -84,14 +84,14 @@ def box_mean(values: Floats, radius: int) -> Floats:
 
 
 def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -> None:
-    """Write R, G, B and the half difference as a layer of its own, in float32."""
+    """Write R, G, B, and the half difference as a separate layer, in float32."""
     channels = rgb_channels(estimate.image)
     channels |= rgb_channels(estimate.half_difference, HALF_DIFFERENCE)
     write_parts(path, [ExrPart("rgb", channels, attributes)])
 
 
 def read_estimate(path: Path) -> tuple[Estimate, Mapping[str, str]]:
-    """What `write_estimate` wrote, and the text attributes of its header."""
+    """Return an estimate that `write_estimate` wrote, and the text attributes of its header."""
     parts = read_parts(path)
     if len(parts) > 1:
         raise ImageError(
@@ -101,7 +101,7 @@ def read_estimate(path: Path) -> tuple[Estimate, Mapping[str, str]]:
     [part] = parts
     if f"{HALF_DIFFERENCE}.R" not in part.channels:
         raise ImageError(
-            f"{path} carries no {HALF_DIFFERENCE} layer, so its noise is unknown: "
+            f"{path} has no {HALF_DIFFERENCE} layer, so its noise is unknown: "
             "give an image that lightpaint rendered"
         )
     try:

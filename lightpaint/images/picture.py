@@ -1,4 +1,4 @@
-"""A picture from any file that paint programs write, as linear Rec.709 and what is known of it."""
+"""Reading of pictures in any format of paint programs, as linear Rec.709."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -26,10 +26,10 @@ from lightpaint.images.formats.openraster import LAYERED, layered_kind, read_mer
 
 Mask = npt.NDArray[np.bool_]
 
-#: Layer of an EXR, within the painting's own, that is not 0 where brighter is as good.
+#: Sublayer of a painted EXR layer that is > 0 where the light may also be brighter.
 AT_LEAST = "at_least"
 
-#: JPEG's rounding keeps white within so many codes of the top.
+#: JPEG's rounding keeps white within this many codes of the largest.
 JPEG_WHITE = 2
 
 
@@ -39,16 +39,16 @@ class Picture:
 
     kind: `exr`, `png`, `tiff`, `jpeg`, `psd`, `ora` or `kra`.
     image: (h, w, 3) float32, not premultiplied, 0 where it is not finite.
-    finite: (h, w), where the file holds numbers and neither NaN nor Inf.
-    alpha: (h, w) float32, None if there is none or all of an integer file is opaque.
-    weight: (h, w) float32, an EXR's channel W; RGB is then taken as it is.
-    stored: (h, w), where the file has a pixel; None if everywhere.
-    saturated: (h, w, 3), where the light is at least that of `image`: the file cannot say more, or
-    its layer `at_least` says so.
-    transform: what the numbers were decoded by; None if the file holds light.
-    codes: largest integer of the file's numbers; None for floats.
-    lossy: whether compression changed the numbers beyond that rounding.
-    notes: what a person should know, a line each.
+    finite: (h, w), where the file holds neither NaN nor Inf.
+    alpha: (h, w) float32; None if there is none, or if an integer file is opaque everywhere.
+    weight: (h, w) float32, the channel W of an EXR; RGB is then not unpremultiplied.
+    stored: (h, w), where the file has pixels; None if everywhere.
+    saturated: (h, w, 3), where the light is that of `image` or brighter: the file has no larger
+    number, or its layer `at_least` marks it.
+    transform: the transform that decoded the numbers; None if the file holds light.
+    codes: largest possible integer; None for floats.
+    lossy: True if compression changed the numbers.
+    notes: remarks for the user, a line each.
     attributes: texts in the header of an EXR.
     """
 
@@ -78,58 +78,57 @@ def read_picture(
     transform: ViewTransform | TransformChoice | None = None,
     otherwise: ViewTransform | None = None,
 ) -> Picture:
-    """Read a picture of any kind that paint programs write.
+    """Return the picture in a file of any format that paint programs write.
 
-    layer: of an EXR, the layer, part or view to take; needed if there are several. transform: what
-    integers were encoded by; what it leaves open is what a PNG of lightpaint's own says, else
-    `otherwise`, else sRGB. Files of floats hold light, and no transform applies to them.
+    layer: layer, part or view of an EXR; required if it has several. transform: the view transform
+    that encoded integers; its open parts come from lightpaint's own text in a PNG, else from
+    `otherwise`, else from sRGB. Files of floats hold light, and need no transform.
 
-    Raises ImageError, with one line that names the file, for all that cannot be read as what
-    it should be.
+    Raises ImageError, with one line that names the file, if it cannot be read.
     """
     path = Path(path)
     kind = file_kind(path)
     try:
         if kind == "exr":
             parts = read_parts(path)
-            with _naming(f"{path}"):
-                return _of_layer(choose_layer(parts, layer))
-        with _naming(f"{path}"):
+            with _naming_file(f"{path}"):
+                return _picture_of_layer(choose_layer(parts, layer))
+        with _naming_file(f"{path}"):
             if layer is not None:
                 raise ImageError(f"has no layers to choose {layer!r} from: only EXR files have")
-            return _of_bitmap(_bitmap(path, kind), TransformChoice.of(transform), otherwise)
+            return _picture_of_bitmap(_bitmap(path, kind), TransformChoice.of(transform), otherwise)
     except MemoryError:
-        raise ImageError(f"{path} takes more memory than there is") from None
+        raise ImageError(f"{path} needs more memory than there is") from None
     except OSError as error:
         raise ImageError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def read_mask(path: str | Path) -> npt.NDArray[np.float32]:
-    """Importance from a file: (h, w) float32.
+    """Return an importance mask, (h, w) float32.
 
-    Of an EXR the first that there is of the channels Y, W, A and R. Of other files the numbers
-    themselves, from 0 to 1 and not decoded to light: the brightest channel, times alpha.
+    An EXR gives the first of its channels Y, W, A and R. Other files give their numbers, from 0 to
+    1 and not decoded to light: the brightest channel, times alpha.
     """
     path = Path(path)
     kind = file_kind(path)
     try:
         parts = read_parts(path) if kind == "exr" else []
-        with _naming(f"mask {path}"):
+        with _naming_file(f"mask {path}"):
             return _mask_in(parts) if parts else _mask_of(_bitmap(path, kind))
     except MemoryError:
-        raise ImageError(f"{path} takes more memory than there is") from None
+        raise ImageError(f"{path} needs more memory than there is") from None
     except OSError as error:
         raise ImageError(f"cannot read mask {path}: {error.strerror or error}") from error
 
 
 def file_kind(path: Path) -> str:
-    """Which of the kinds of pictures a file is, by how it begins. Raises ImageError if none."""
+    """Return the format of a picture file, from its first bytes. Raises ImageError if unknown."""
     head = head_of(path, 128)
     if kind := kind_of(head):
         return kind if kind != "zip" else layered_kind(path, head)
     name = name_of(head)
     raise ImageError(
-        f"{path} is {f'a {name} file' if name else 'no picture that can be read'}: export it as "
+        f"{path} is {f'a {name} file' if name else 'not a picture that can be read'}: export it as "
         "OpenEXR, or as PNG or TIFF with 16 bits"
     )
 
@@ -138,7 +137,7 @@ def _bitmap(path: Path, kind: str) -> Bitmap:
     return read_merged(path, kind) if kind in LAYERED.values() else read_bitmap(path, kind)
 
 
-def _of_layer(layer: Layer) -> Picture:
+def _picture_of_layer(layer: Layer) -> Picture:
     stored_part = layer.part
     layer = replace(layer, part=stored_part.in_display_window())
     image = layer.rgb()
@@ -148,7 +147,7 @@ def _of_layer(layer: Layer) -> Picture:
         if _looks_straight(image, alpha):
             notes = (
                 "there is colour where alpha is 0: if it is not premultiplied, as OpenEXR "
-                "prescribes, edges of strokes are read too bright",
+                "requires, edges of strokes are read too bright",
             )
         unpremultiply(image, alpha)
     return Picture(
@@ -165,7 +164,7 @@ def _of_layer(layer: Layer) -> Picture:
 
 
 def _at_least(layer: Layer) -> Mask | None:
-    """Where an EXR says so, as a painting of 8 bits does with its largest code."""
+    """Return where an EXR marks light that may be brighter, as the largest code of 8 bits does."""
     inner = replace(layer, prefix=f"{layer.prefix}.{AT_LEAST}" if layer.prefix else AT_LEAST)
     marks = [inner.channel(*names) for names in zip(*RGB_NAMES, strict=True)]
     if all(mark is None for mark in marks):
@@ -175,14 +174,16 @@ def _at_least(layer: Layer) -> Mask | None:
 
 
 def _stored(part: ExrPart) -> Mask | None:
-    """Where in its display window a part has pixels; None if everywhere."""
+    """Return where a part has pixels in its display window; None if everywhere."""
     if part.display in (None, part.size) and part.offset == (0, 0):
         return None
     ones = replace(part, channels={"Y": np.ones(part.size, np.bool_)})
     return ones.in_display_window().channels["Y"]
 
 
-def _of_bitmap(bitmap: Bitmap, asked: TransformChoice, otherwise: ViewTransform | None) -> Picture:
+def _picture_of_bitmap(
+    bitmap: Bitmap, choice: TransformChoice, otherwise: ViewTransform | None
+) -> Picture:
     alpha: Floats | None = None
     if bitmap.alpha is not None:
         alpha = np.asarray(bitmap.alpha / np.float32(bitmap.codes or 1), np.float32)
@@ -193,7 +194,7 @@ def _of_bitmap(bitmap: Bitmap, asked: TransformChoice, otherwise: ViewTransform 
         image = light_of_floats(bitmap, alpha)
         saturated, used = None, None
     else:
-        used = asked.over(None if asked.is_whole else transform_of(bitmap) or otherwise)
+        used = choice.over(None if choice.is_whole else transform_of(bitmap) or otherwise)
         image = light_of_integers(bitmap, alpha, used)
         saturated = _saturated(bitmap)
     return Picture(
@@ -210,7 +211,7 @@ def _of_bitmap(bitmap: Bitmap, asked: TransformChoice, otherwise: ViewTransform 
 
 
 def _saturated(bitmap: Bitmap) -> Mask:
-    """(h, w, 3), where the numbers are the largest that there can be: under alpha, alpha itself."""
+    """Return where the numbers are the largest possible, (h, w, 3): under alpha, alpha itself."""
     assert bitmap.codes is not None
     if bitmap.premultiplied and bitmap.alpha is not None:
         alpha = bitmap.alpha[..., None]
@@ -219,17 +220,17 @@ def _saturated(bitmap: Bitmap) -> Mask:
 
 
 def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """Alpha without what is partly transparent, and a note if there was any.
+    """Return alpha with partly transparent pixels cleared, and a note if there were any.
 
-    Photoshop blends its merged picture with white there and Krita does not; nothing in the file
-    says which, so those colours are not known.
+    Photoshop blends such pixels of its merged picture with white and Krita does not. The file does
+    not say which program wrote it, so their colours are unknown.
     """
     partial = (alpha > 0) & (alpha < 1)
     if not partial.any():
         return alpha, ()
     note = (
-        f"{partial.sum()} partly transparent pixels are left out: Photoshop files do not say what "
-        "colour is there; flatten it, or export a PNG or TIFF"
+        f"{partial.sum()} partly transparent pixels are left out, since a Photoshop file does not "
+        "store their colour: flatten it, or export a PNG or TIFF"
     )
     return np.where(partial, np.float32(0), alpha), (note,)
 
@@ -237,8 +238,8 @@ def _without_partial(alpha: Floats) -> tuple[Floats, tuple[str, ...]]:
 def _mask_in(parts: Sequence[ExrPart]) -> npt.NDArray[np.float32]:
     if len(parts) > 1:
         raise ImageError(
-            f"has {len(parts)} parts ({', '.join(p.name for p in parts)}), and which of them is "
-            "the mask cannot be told: export a single image"
+            f"has {len(parts)} parts ({', '.join(p.name for p in parts)}), and any of them could "
+            "be the mask: export a single image"
         )
     part = parts[0].in_display_window()
     for name in ("Y", "W", "A", "R"):
@@ -256,7 +257,7 @@ def _mask_of(bitmap: Bitmap) -> npt.NDArray[np.float32]:
 
 
 def _only_finite(image: Floats) -> Mask:
-    """Where all channels are finite; elsewhere the image is made 0, in place."""
+    """Return where all channels are finite, and set other pixels of `image` to 0 in place."""
     finite = np.asarray(np.isfinite(image).all(axis=-1))
     if not finite.all():
         image[~finite] = 0
@@ -264,16 +265,16 @@ def _only_finite(image: Floats) -> Mask:
 
 
 def _looks_straight(image: Floats, alpha: Floats) -> bool:
-    """Whether most of what is transparent has a colour, which premultiplied light rarely has."""
+    """Return True if most transparent pixels have a colour: rare in premultiplied light."""
     clear = alpha == 0
     return bool((image.any(axis=-1) & clear).sum() > clear.sum() / 2)
 
 
 @contextmanager
-def _naming(file: str) -> Iterator[None]:
-    """Begin what is said of a file, `is damaged`, with its name.
+def _naming_file(file: str) -> Iterator[None]:
+    """Put the file's name before errors like `is damaged`, and make foreign names in them visible.
 
-    It may say names of the file's own, which may hold what a terminal obeys.
+    Names inside the file may contain control characters for a terminal.
     """
     try:
         yield

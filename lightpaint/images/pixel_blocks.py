@@ -1,7 +1,7 @@
-"""Images of one picture at two sizes: a pixel of the smaller is a block of pixels of the larger.
+"""One picture at two sizes: a pixel of the smaller image is a block of pixels of the larger.
 
-Blocks are squares, laid side by side from the top left corner on. What is left at the right and at
-the bottom, always less than a block, belongs to none. So sizes alone tell which pixel is which.
+Blocks are squares that start at the top left corner. A remainder at the right and at the bottom,
+always narrower than a block, belongs to none. So the two sizes alone determine the blocks.
 """
 
 from typing import Any
@@ -13,44 +13,44 @@ from lightpaint.arrays import Doubles, Floats
 
 Size = tuple[int, int]
 
-#: Sides of blocks up to which adding their pixels one after the other is sooner done than NumPy's
-#: mean, by four times.
-FEW = 8
+#: Largest side of blocks whose pixels are added one after the other, four times as fast as NumPy's
+#: mean.
+MAX_ADDED_SIDE = 8
 
 
 def whole_factor(larger: Size, smaller: Size) -> int | None:
-    """Side of the largest blocks of which `larger` has as many as `smaller` has pixels.
+    """Return the side of the largest blocks of which `larger` has as many as `smaller` has pixels.
 
-    Both are (height, width) or both (width, height). None if no blocks are that many.
+    Both are (height, width) or both (width, height). Returns None if no such blocks exist.
     """
     factor = min(larger[0] // smaller[0], larger[1] // smaller[1])
     return factor if factor >= 1 and blocks_in(larger, factor) == smaller else None
 
 
 def blocks_in(size: Size, factor: int) -> Size:
-    """How many blocks of factor x factor pixels fit into an image of that size, on each side."""
+    """Return the number of blocks of factor x factor pixels in an image of that size, per side."""
     return size[0] // factor, size[1] // factor
 
 
 def left_over(size: Size, factor: int) -> Size:
-    """How many pixels on each side are in no block of factor x factor."""
+    """Return the number of pixels, per side, that are in no block of factor x factor."""
     return size[0] % factor, size[1] % factor
 
 
 def covered(image: Floats, smaller: Size) -> Floats:
-    """What of `image` the pixels of one of the size `smaller` show, a whole number of blocks."""
+    """Return the part of `image` that one of size `smaller` shows, a whole number of blocks."""
     factor = whole_factor(image.shape[:2], smaller) or 1
     return image[: smaller[0] * factor, : smaller[1] * factor]
 
 
 def block_mean(image: Floats, factor: int) -> Floats:
-    """Means over blocks of factor x factor pixels, in the precision of `image`, (h, w, …).
+    """Return means over blocks of factor x factor pixels, in the precision of `image`, (h, w, …).
 
-    A box-filtered render with a pixel for each block estimates just that.
+    A box-filtered render with a pixel for each block estimates the same values.
     """
     if factor == 1:
         return image
-    if factor > FEW:
+    if factor > MAX_ADDED_SIDE:
         blocks = _in_blocks(image, factor)
         return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64).astype(image.dtype))
     whole = covered(image, blocks_in(image.shape[:2], factor))
@@ -63,7 +63,7 @@ def block_mean(image: Floats, factor: int) -> Floats:
 def block_sums(image: npt.NDArray[Any], factor: int) -> Doubles:
     """Return sums over blocks of factor x factor pixels of `image`, (h, w, …), in float64.
 
-    Here what is left at the right and at the bottom makes smaller blocks of its own.
+    Here the remainders at the right and at the bottom form smaller blocks.
     """
     values = np.asarray(image, np.float64)
     if factor == 1:
@@ -73,18 +73,18 @@ def block_sums(image: npt.NDArray[Any], factor: int) -> Doubles:
 
 
 def block_pixels(image: Floats, factor: int) -> Floats:
-    """The pixels of each block apart, (factor², h', w', …), of an image (h, w, …)."""
+    """Return the pixels of each block, (factor², h', w', …), of an image (h, w, …)."""
     blocks = np.moveaxis(_in_blocks(image, factor), (1, 3), (0, 1))
     return blocks.reshape(factor * factor, *blocks.shape[2:])
 
 
 def _in_blocks(image: Floats, factor: int) -> Floats:
-    """(h', factor, w', factor, …), of an image (h, w, …)."""
+    """Return an image (h, w, …) as (h', factor, w', factor, …)."""
     (height, width), rest = blocks_in(image.shape[:2], factor), image.shape[2:]
     whole = image[: height * factor, : width * factor]
     return whole.reshape(height, factor, width, factor, *rest)
 
 
 def enlarged(image: npt.NDArray[Any], factor: int) -> npt.NDArray[Any]:
-    """Every pixel repeated factor x factor times."""
+    """Return an image with every pixel repeated factor x factor times."""
     return image.repeat(factor, axis=0).repeat(factor, axis=1)

@@ -1,4 +1,4 @@
-"""Images of one picture at any two sizes."""
+"""Resampling of images to any size."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from lightpaint.arrays import Floats
 
 
 def resampled(planes: Floats, size: tuple[int, int]) -> Floats:
-    """(h, w, n) float32 at `size`: means over what a pixel covers; where it grows, interpolated.
+    """Return (h, w, n) float32 at `size`: area means where it shrinks, interpolated where it grows.
 
     size: (height, width).
     """
@@ -15,10 +15,10 @@ def resampled(planes: Floats, size: tuple[int, int]) -> Floats:
     height, width = size
     shrinks = width <= planes.shape[1]
     kernel = Image.Resampling.BOX if shrinks else Image.Resampling.BILINEAR
-    made = [
+    resized = [
         Image.fromarray(np.ascontiguousarray(plane, dtype=np.float32)).resize(
             (width, height), kernel
         )
         for plane in np.moveaxis(planes, -1, 0)
     ]
-    return np.dstack([np.asarray(plane) for plane in made])
+    return np.dstack([np.asarray(plane) for plane in resized])

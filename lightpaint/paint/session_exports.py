@@ -12,7 +12,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.errors import OutputError, PaintError
 from lightpaint.files import write_bytes
-from lightpaint.images.denoiser import denoised, how_denoised
+from lightpaint.images.denoiser import denoised, denoiser_text
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
@@ -87,7 +87,7 @@ def answer_png(basis: Basis, lighting: Lighting, transform: ViewTransform) -> by
     weights = lighting.weights_for(basis)
     looks = CleanLooks.clean(basis, weights, basis.mix(weights), None)
     pixels = to_8_bit(transform.encode(looks.predicted))
-    return png_bytes(pixels, texts_of(transform) | how_denoised(basis.features, raw="not kept"))
+    return png_bytes(pixels, texts_of(transform) | denoiser_text(basis.features, raw="not kept"))
 
 
 def _write_report(

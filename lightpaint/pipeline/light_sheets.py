@@ -7,8 +7,8 @@ from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
-from lightpaint.images.denoiser import how_denoised
-from lightpaint.images.formats.png import png_bytes, png_says
+from lightpaint.images.denoiser import denoiser_text
+from lightpaint.images.formats.png import png_bytes, png_has_text
 from lightpaint.progress import Progress, silent
 from lightpaint.report.light_sheet import light_sheet
 from lightpaint.scene.presets import Preset
@@ -33,7 +33,7 @@ def check_sheet(scene: Scene, path: Path, *, force: bool = False) -> None:
         raise OutputError(f"{path} must end in .png, the format that is written")
     check_files([path], scene.read_files)
     check_writable(path.parent)
-    if path.exists() and not force and not (path.is_file() and png_says(path, SHEET_KEY)):
+    if path.exists() and not force and not (path.is_file() and png_has_text(path, SHEET_KEY)):
         raise OutputError(
             f"{path} is there, and no sheet of lights: choose another name with folder=..., or "
             "pass force=True"
@@ -55,7 +55,7 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
         small = scene.reduced(f"1/{Preset(SHEET.spp, pixels).reduction(scene.film)}")
         basis = obtain_basis(small, spp=SHEET.spp, seed=SHEET_SEED, progress=progress)
     title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {len(scene.lights)} lights"
-    texts = how_denoised(basis.features, raw=f"basis of {basis.origin.spp} samples per pixel")
+    texts = denoiser_text(basis.features, raw=f"basis of {basis.origin.spp} samples per pixel")
     image = light_sheet(basis, title=title)
     write_bytes(path, png_bytes(image, {SHEET_KEY: "what each light does alone", **texts}))
     return ""

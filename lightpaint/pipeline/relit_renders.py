@@ -6,7 +6,7 @@ from typing import Any
 
 from lightpaint.basis.render.separate import emitters_seen
 from lightpaint.colour.display.exposure import choose_exposure
-from lightpaint.images.denoiser import denoised, how_denoised
+from lightpaint.images.denoiser import denoised, denoiser_text
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.formats.png import write_png
 from lightpaint.lighting.answer.lighting import Lighting
@@ -67,6 +67,6 @@ def relight_look(
             write_estimate(folder / view / "relit.exr", image, {})
             features = render_features(relit, seed=seed)
             clean = denoised(image.image, features, quality="high")
-            texts = how_denoised(features, raw="relit.exr")
+            texts = denoiser_text(features, raw="relit.exr")
             stops = choose_exposure(clean, emitters_seen(relit))
             write_png(folder / view / "relit.png", clean, stops=stops, texts=texts)

@@ -2,7 +2,7 @@
 
 from lightpaint.basis.render.integrators import remark_on_separate_renders
 from lightpaint.basis.render.render import memory_needed
-from lightpaint.images.denoiser import LACKING, is_there
+from lightpaint.images.denoiser import MISSING_REMARK, oidn_is_installed
 from lightpaint.images.pixel_blocks import Size, left_over, whole_factor
 from lightpaint.pipeline.settings import Settings
 from lightpaint.scene.presets import PRESETS
@@ -71,7 +71,7 @@ def _spoken_rest(rest: tuple[int, int]) -> str:
 
 def remarks_of_pictures() -> list[str]:
     """Says so where pictures are denoised less well than they could be."""
-    return [] if is_there() else [LACKING]
+    return [] if oidn_is_installed() else [MISSING_REMARK]
 
 
 def remarks_of_memory(scene: Scene) -> list[str]:

@@ -11,7 +11,7 @@ from lightpaint.basis.render.render import is_of, render_basis
 from lightpaint.basis.render.separate import emitters_seen
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.denoiser import Features, denoised, how_denoised
+from lightpaint.images.denoiser import Features, denoised, denoiser_text
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
 from lightpaint.pipeline.pipeline import obtain
@@ -84,8 +84,8 @@ def render_template(
         mattes=surfaces.coverage,
         lights=_thumbnails(scene, basis, settings, progress),
         texts={
-            SHOWN: how_denoised(features, raw="template.exr"),
-            LIGHTS: how_denoised(features, raw="the basis of the scene"),
+            SHOWN: denoiser_text(features, raw="template.exr"),
+            LIGHTS: denoiser_text(features, raw="the basis of the scene"),
         },
     )
 
@@ -122,8 +122,8 @@ def template_of_basis(
     factor = max(1, math.isqrt(max(height * width - 1, 0) // (THUMBNAIL.pixels or 1)) + 1)
     texts = {}
     if clean is not None:
-        raw = how_denoised(features, raw="template.exr")
-        texts = {SHOWN: raw, LIGHTS: how_denoised(features, raw="the basis")}
+        raw = denoiser_text(features, raw="template.exr")
+        texts = {SHOWN: raw, LIGHTS: denoiser_text(features, raw="the basis")}
     return write_template(
         Path(folder), template, lights=_small_planes(basis, min(factor, height, width)), texts=texts
     )
@@ -133,7 +133,7 @@ def look_of_basis(basis: Basis, path: Path, *, transform: ViewTransform | None =
     """Write only the look of a basis, as EXR at `path`; returns the PNG beside it."""
     look, clean, features = _look_of_basis(basis)
     shown = transform or ViewTransform("srgb", meter_exposure(look, basis))
-    texts = {} if clean is None else how_denoised(features, raw=path.name)
+    texts = {} if clean is None else denoiser_text(features, raw=path.name)
     return write_look(path, look, shown, clean=clean, texts=texts)
 
 
@@ -163,7 +163,7 @@ def render_look(
     look, features = _look(scene, basis, settings, listen)
     clean = denoised(look, features, quality="high")
     shown = transform or ViewTransform("srgb", _exposure(scene, basis, clean))
-    return write_look(path, look, shown, clean=clean, texts=how_denoised(features, raw=path.name))
+    return write_look(path, look, shown, clean=clean, texts=denoiser_text(features, raw=path.name))
 
 
 def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | None:

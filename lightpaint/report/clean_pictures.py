@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.images.denoiser import DENOISED_KEY, Features, denoised, how_denoised
+from lightpaint.images.denoiser import DENOISED_KEY, Features, denoised, denoiser_text
 from lightpaint.report.basis_memo import cached_clean_planes
 
 #: The most lights whose thumbnails are denoised: for hundreds it would take long, and a thumbnail
@@ -67,7 +67,7 @@ class CleanLooks:
         if verified is not None:
             verified = denoised(verified, larger or features)
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
-        texts = how_denoised(features, raw=raw)
+        texts = denoiser_text(features, raw=raw)
         if (planes := cached_clean_planes(basis)) is None:
             shown = denoised(basis.present_look, features), denoised(predicted, features)
         else:

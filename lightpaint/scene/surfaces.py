@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.images.denoiser import Features
-from lightpaint.images.object_map import NOTHING as NOTHING_SEEN
+from lightpaint.images.object_map import BACKGROUND as NOTHING_SEEN
 from lightpaint.images.object_map import Objects
 from lightpaint.images.pixel_blocks import block_mean, block_pixels
 from lightpaint.progress import Progress, silent
@@ -24,7 +24,7 @@ SAMPLES = 16
 VOTES = 4
 
 #: Depth where there is nothing, as compositing programs have it.
-NOTHING = 1e10
+BACKGROUND = 1e10
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Surfaces:
     albedo: (h, w, 3) float32 in [0, 1], share of light that is reflected diffusely, as the
     materials say it. normal: (h, w, 3), shading normal in world space, of unit length; 0 where
     there is nothing. depth: (h, w), distance from the camera along its axis in scene units, of
-    the nearest sample; NOTHING where there is none. coverage: by name of shape, (h, w) in
+    the nearest sample; BACKGROUND where there is none. coverage: by name of shape, (h, w) in
     [0, 1], how much of the pixel it fills. Shapes out of sight are left out.
     """
 
@@ -147,7 +147,7 @@ def _averaged(
     normal = (samples[..., 3:6] * there[..., None]).sum(axis=0)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     along = samples[..., 6:9] @ to_camera[2, :3] + to_camera[2, 3]
-    depth = np.where(there, along, NOTHING).min(axis=0)
+    depth = np.where(there, along, BACKGROUND).min(axis=0)
     coverage: dict[str, Floats] = {}
     for index in np.unique(indices[there]).tolist():
         name = names.get(index) or f"shape {index}"

@@ -1,1 +1,1 @@
-"""Folders and files of results: published together, and read back with care."""
+"""Folders and files of results: published together, read back strictly."""

@@ -1,4 +1,4 @@
-"""Values from JSON that others wrote: just what was meant to stand there, or refused."""
+"""Strict reading of JSON and TOML that others wrote: values of the expected types, or an error."""
 
 import json
 import math
@@ -10,32 +10,31 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from lightpaint.screen import some_names
 
-#: Longest text that is read, in characters, and most values of a list or an object.
+#: Longest string that is read, in characters, and most values of a list or an object.
 MAX_CHARACTERS, MAX_VALUES = 2**14, 2**17
 
-#: Most dots in a line of TOML, squared and summed over all lines: what the parser takes for a
-#: dotted key goes by the square of its parts, 24 ns each.
+#: Most dots of TOML: the count of each line, squared, summed over all lines. The parser's time for
+#: a dotted key grows with the square of its parts, 24 ns each.
 MAX_DOTS = 10**8
 
 _Record = TypeVar("_Record")
 
 
 def strict_json(text: str) -> Any:
-    """What the JSON in `text` says, and nothing that only Python understands or makes up.
+    """Return the value of the JSON in `text`, without any of Python's extensions of JSON.
 
-    Raises ValueError for what is no JSON, for NaN and Infinity, for numbers beyond float64, for
-    text that is not Unicode (half of a surrogate pair), for a key that stands twice in an object,
-    and for what is nested too deeply.
+    Raises ValueError for invalid JSON, NaN and Infinity, numbers beyond float64, text that is not
+    Unicode (a lone surrogate), a key that is repeated in an object, and values nested too deeply.
     """
     try:
         data = json.loads(
             text,
-            object_pairs_hook=_without_repeats,
-            parse_constant=_no_number,
-            parse_float=_finite,
-            parse_int=_bounded,
+            object_pairs_hook=_unique_keys,
+            parse_constant=_refuse_constant,
+            parse_float=_finite_float,
+            parse_int=_bounded_int,
         )
-        if "\\u" in text:  # the only way by which half a pair gets into decoded text
+        if "\\u" in text:  # only an escape can bring a lone surrogate into decoded text
             json.dumps(data, ensure_ascii=False).encode()
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
@@ -45,9 +44,9 @@ def strict_json(text: str) -> Any:
 
 
 def strict_toml(text: str) -> dict[str, Any]:
-    """What the TOML in `text` says.
+    """Return the content of the TOML in `text`.
 
-    Raises ValueError for what is no TOML, and for lines that would take the parser forever.
+    Raises ValueError for invalid TOML, and for lines that would take the parser forever.
     """
     dots = [line.count(".") for line in text.splitlines()]
     if sum(n * n for n in dots) > MAX_DOTS:
@@ -59,63 +58,62 @@ def strict_toml(text: str) -> dict[str, Any]:
         raise ValueError("it is nested too deeply") from None
 
 
-def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    # JSON itself would silently keep the last of two of one name.
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        raise ValueError(f"a name stands twice among {some_names(key for key, _ in pairs)}")
-    return found
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    # Python's parser would silently keep the last of two equal keys.
+    record = dict(pairs)
+    if len(record) < len(pairs):
+        raise ValueError(f"a key is repeated among {some_names(key for key, _ in pairs)}")
+    return record
 
 
-def _no_number(text: str) -> Any:
-    raise ValueError(f"{text} is no number in JSON")
+def _refuse_constant(text: str) -> Any:
+    raise ValueError(f"{text} is not a number of JSON")
 
 
-def _finite(text: str) -> float:
+def _finite_float(text: str) -> float:
     number = float(text)
     if not math.isfinite(number):
         raise ValueError(f"{text} is too large")
     return number
 
 
-def _bounded(text: str) -> int:
-    _finite(text)
+def _bounded_int(text: str) -> int:
+    _finite_float(text)
     return int(text)
 
 
 def read_record(
     kind: type[_Record], data: Any, *, required: Collection[str] = (), others: bool = False
 ) -> _Record:
-    """The dataclass `kind` from an object of a JSON, its fields by name.
+    """Return the dataclass `kind` from a JSON object, its fields by name.
 
-    Each value must be what the field's annotation says: for int a whole number >= 0, and neither
-    true nor a text for any number. A field may be missing if it has a default and is not
-    `required`. others: whether keys that are no fields are passed over, as in records inside
-    they always are.
+    Each value must match the field's annotation: an int is a whole number >= 0, and neither true
+    nor a string passes for a number. A field may be missing if it has a default and is not
+    `required`. others: whether unknown keys are ignored, as they always are in nested records.
 
-    Raises ValueError, without naming the file, and what `kind` itself raises.
+    Raises ValueError, without naming the file, and the errors of `kind` itself.
     """
     if not isinstance(data, dict):
         raise ValueError(f"{data!r} is not an object")
     kinds, given = get_type_hints(kind), {}
     if not others and (unknown := [key for key in data if key not in kinds]):
-        raise ValueError(f"nothing is called {unknown[0]!r} there")
+        raise ValueError(f"the key {unknown[0]!r} is unknown")
     for field in fields(kind):  # type: ignore[arg-type]
         name = field.name
         if name in data:
             try:
                 given[name] = _read(kinds[name], data[name])
             except TypeError:
-                raise ValueError(f"{name} is {_meant(kinds[name])}, not {data[name]!r}") from None
+                raise ValueError(
+                    f"{name} is {_expected(kinds[name])}, not {data[name]!r}"
+                ) from None
         elif name in required or (field.default is MISSING and field.default_factory is MISSING):
-            raise ValueError(f"it lacks {name}")
+            raise ValueError(f"the key {name} is missing")
     return kind(**given)
 
 
 def fields_of(record: Any, *optional: str) -> dict[str, Any]:
-    """A dataclass for a JSON, its fields by name; those that are `optional` where they say more
-    than by default.
-    """
+    """Return a dataclass's fields for JSON, by name; `optional` ones only if not the default."""
     default = {field.name: field.default for field in fields(record)}
     return {
         name: value
@@ -125,11 +123,11 @@ def fields_of(record: Any, *optional: str) -> dict[str, Any]:
 
 
 def _read(kind: Any, value: Any) -> Any:
-    """`value` as the annotation `kind` has it. Raises TypeError if it is something else."""
+    """Return `value` as the annotation `kind` wants it; raise TypeError if it is something else."""
     outer, inner = get_origin(kind), get_args(kind)
     if kind is Any:
         return value
-    # Types and no isinstance: true would pass for the number 1.
+    # Exact types instead of isinstance, for which true would pass as the number 1.
     if kind is float and type(value) in (int, float):
         return float(value)
     if kind is int and type(value) is int and value >= 0:
@@ -140,10 +138,10 @@ def _read(kind: Any, value: Any) -> Any:
         return value
     if outer is Literal and type(value) is str and value in inner:
         return value
-    if outer is UnionType:  # something, or None
+    if outer is UnionType:  # a type or None
         return None if value is None else _read(inner[0], value)
     if type(value) in (list, dict) and len(value) > MAX_VALUES:
-        raise ValueError(f"it lists {len(value)} values, and at most {MAX_VALUES} are read")
+        raise ValueError(f"it lists {len(value)} values: expected at most {MAX_VALUES}")
     if outer is tuple and type(value) is list:
         kinds = inner[:1] * len(value) if inner[-1] is ... else inner
         if len(kinds) == len(value):
@@ -155,15 +153,15 @@ def _read(kind: Any, value: Any) -> Any:
     raise TypeError
 
 
-def _meant(kind: Any) -> str:
-    """What an annotation asks for, in words."""
+def _expected(kind: Any) -> str:
+    """Return the values that an annotation allows, in words."""
     outer, inner = get_origin(kind), get_args(kind)
     if outer is Literal:
         return ("one of " if inner[1:] else "") + ", ".join(map(repr, inner))
     if outer is UnionType:
-        return _meant(inner[0])
+        return _expected(inner[0])
     if outer is tuple:
         number = "" if inner[-1] is ... else f"{len(inner)} of: "
-        return f"a list ({number}{_meant(inner[0])})"
+        return f"a list ({number}{_expected(inner[0])})"
     words = {str: "a text", bool: "true or false", float: "a number", int: "a whole number >= 0"}
     return words.get(kind, "an object")

@@ -1,1 +1,1 @@
-"""Pictures of light drawn in a browser: what the painter's page, reports and galleries share."""
+"""Pictures of light drawn in a browser, for the painter's page, reports and galleries."""

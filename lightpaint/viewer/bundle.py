@@ -1,11 +1,11 @@
-"""The browser's side of lightpaint: its modules as they ship, several of them as one script.
+"""JavaScript modules of lightpaint, bundled into one script.
 
-Small ES modules import each other by path. A server gives them out as they are; a page that is one
-file, and a notebook, take one script. `bundled` makes it, without a tool: each module becomes a
-function that is called once and whose exports are constants of the script. Nothing is evaluated
-from text and nothing is loaded, so that it runs under the strictest content policy, as `blob:` in
-JupyterLab, VS Code and marimo, and inline in a page from a disk. What this does not understand it
-refuses, and tests bundle every module that ships.
+The modules are small and import each other by path. A server serves them as they are; a page of one
+file, and a notebook, need one script. `bundled` makes it without other tools: each module becomes a
+function that is called once, and its exports become constants of the script. The script evaluates
+no text and loads nothing, so that it runs under the strictest content policy, as `blob:` in
+JupyterLab, VS Code and marimo, and inline in a page from a disk. `bundled` refuses syntax that it
+does not understand, and tests bundle every module that ships.
 """
 
 import posixpath
@@ -17,10 +17,10 @@ _IMPORT = re.compile(
     r"^import\s+(?:(?P<names>[^;'\"]+?)\s+from\s+)?(?P<q>['\"])(?P<path>[^'\"]+)(?P=q);?[ \t]*$",
     re.MULTILINE,
 )
-_DECLARED = re.compile(
+_EXPORT = re.compile(
     r"^export\s+(?=(?:async\s+)?(?:const|class|function\*?)\s+(?P<name>[\w$]+))", re.MULTILINE
 )
-_LISTED = re.compile(
+_EXPORT_LIST = re.compile(
     r"(?<![\w$.])export\s*\{(?P<names>[^}]*)\}"
     r"(?:\s*from\s*(?P<q>['\"])(?P<path>[^'\"]+)(?P=q))?;?"
 )
@@ -30,11 +30,13 @@ _COMMENT = re.compile(
     r"^[ \t]*(?:/\*(?!!)(?:(?!\*/)[\s\S])*\*/[ \t]*(?=\n|\Z)|//[^\n]*(?=\n|\Z))", re.MULTILINE
 )
 _TYPE = re.compile(r"/\*\*\s*@(?:type|param|returns|this|template)\b[\s\S]*?\*/ ?")
-_LEFT = re.compile(r"^\s*(?:import|export)(?:\s+[\w$*]|\s*[{'\"])|\bimport\.meta\b", re.MULTILINE)
+_NOT_UNDERSTOOD = re.compile(
+    r"^\s*(?:import|export)(?:\s+[\w$*]|\s*[{'\"])|\bimport\.meta\b", re.MULTILINE
+)
 
 
 class BundleError(Exception):
-    """A module that is written in a way that `bundled` does not know."""
+    """A module that uses syntax which `bundled` does not understand."""
 
 
 @cache
@@ -45,31 +47,31 @@ def source(path: str) -> str:
 
 @cache
 def _code(path: str) -> str:
-    """What of a module does anything; of what others wrote, all of it, licence and names too."""
+    """Return the code of a module; third-party modules whole, with their licence."""
     text = source(path)
-    return text if "/vendor/" in path else _spare(text)
+    return text if "/vendor/" in path else _minified(text)
 
 
 @cache
 def styles(*paths: str) -> str:
-    """Style sheets, one after the other, without their comments."""
-    return "\n".join(_spare(source(path)) for path in paths)
+    """Return style sheets joined, without their comments."""
+    return "\n".join(_minified(source(path)) for path in paths)
 
 
 @cache
 def bundled(entry: str) -> str:
-    """A module and all that it imports as one ES module, which exports what it exports.
+    """Return a module and all that it imports as one ES module with the same exports.
 
-    entry: its path below the package. The same text wherever it is made. Raises BundleError.
+    entry: its path below the package. The text is the same wherever it is made. Raises BundleError.
     """
     order: list[str] = []
-    _ordered(entry, order, ())
+    _append_in_order(entry, order, ())
     number = {path: k for k, path in enumerate(order)}
-    parts = [_wrapped(path, number) for path in order]
+    parts = [_as_constant(path, number) for path in order]
     names = _exported(entry)
     if any(_DYNAMIC.search(_code(path)) for path in order):
         table = ", ".join(f'"{path}": m{k}' for path, k in number.items())
-        parts.append(f"const modules = {{ {table} }}\n{_AT_RUN_TIME}")
+        parts.append(f"const modules = {{ {table} }}\n{_DYNAMIC_IMPORT}")
     last = "".join(
         f"export {'default' if name == 'default' else f'const {name} ='} m{number[entry]}.{name}\n"
         for name in names
@@ -77,29 +79,29 @@ def bundled(entry: str) -> str:
     return "\n".join(parts) + "\n" + last
 
 
-#: `import(path)`, of a module that the script has.
-_AT_RUN_TIME = """function loaded(from, path) {
+#: The script's own `import(path)`, for modules that are in it.
+_DYNAMIC_IMPORT = """function loaded(from, path) {
   const there = new URL(path, "lightpaint:/" + from).pathname.slice(1)
   return modules[there] ? Promise.resolve(modules[there]) : Promise.reject(new Error(there))
 }"""
 
 
-def _ordered(path: str, order: list[str], above: tuple[str, ...]) -> None:
-    """Put what a module needs before it into `order`, then itself."""
-    if path in above:
-        raise BundleError(f"modules that import each other: {' > '.join((*above, path))}")
+def _append_in_order(path: str, order: list[str], ancestors: tuple[str, ...]) -> None:
+    """Append to `order` all that a module imports, then the module itself."""
+    if path in ancestors:
+        raise BundleError(f"modules that import each other: {' > '.join((*ancestors, path))}")
     if path in order:
         return
-    for needed in _needed(path):
-        _ordered(needed, order, (*above, path))
+    for needed in _imported_paths(path):
+        _append_in_order(needed, order, (*ancestors, path))
     order.append(path)
 
 
-def _needed(path: str) -> list[str]:
-    """Paths of the modules that one imports, in the order that it names them."""
+def _imported_paths(path: str) -> list[str]:
+    """Return the paths of the modules that a module imports, in its order."""
     text = _code(path)
     found = [match["path"] for match in _IMPORT.finditer(text)]
-    found += [match["path"] for match in _LISTED.finditer(text) if match["path"]]
+    found += [match["path"] for match in _EXPORT_LIST.finditer(text) if match["path"]]
     if _DYNAMIC.search(text):
         found += _PATHS.findall(text)
     return [_resolved(path, one) for one in found]
@@ -111,35 +113,37 @@ def _resolved(path: str, named: str) -> str:
     return posixpath.normpath(posixpath.join(posixpath.dirname(path), named))
 
 
-def _wrapped(path: str, number: dict[str, int]) -> str:
-    """A module as a constant of the script: an object with what it exports."""
-    text, made = _code(path), []
+def _as_constant(path: str, number: dict[str, int]) -> str:
+    """Return a module as a constant of the script: an object of its exports."""
+    text, exports = _code(path), []
 
     def imported(match: re.Match[str]) -> str:
         needed = _resolved(path, match["path"])
         return _constants(match["names"], f"m{number[needed]}", path, needed)
 
     def listed(match: re.Match[str]) -> str:
-        its = "" if match["path"] is None else f"m{number[_resolved(path, match['path'])]}."
+        prefix = "" if match["path"] is None else f"m{number[_resolved(path, match['path'])]}."
         for local, name in _pairs(match["names"]):
-            made.append(f"{name}: {its}{local}" if its or local != name else name)
+            exports.append(f"{name}: {prefix}{local}" if prefix or local != name else name)
         return ""
 
     text = _IMPORT.sub(imported, text)
-    text = _LISTED.sub(listed, text)
-    made += [match["name"] for match in _DECLARED.finditer(text)]
-    text = _DECLARED.sub("", text)
+    text = _EXPORT_LIST.sub(listed, text)
+    exports += [match["name"] for match in _EXPORT.finditer(text)]
+    text = _EXPORT.sub("", text)
     text = _DYNAMIC.sub(f'loaded.bind(null, "{path}")(', text)
-    if found := _LEFT.search(text):
+    if found := _NOT_UNDERSTOOD.search(text):
         line = text[found.start() :].strip().splitlines()[0]
-        raise BundleError(f"{path}: what is `{line[:60]}`?")
-    # Where a line begins says nothing, in templates neither, and would be a tenth of a report.
+        raise BundleError(
+            f"{path}: cannot bundle `{line[:60]}`: write it as another import or export"
+        )
+    # Indentation has no meaning, not even in these templates, and would be a tenth of a report.
     body = "\n".join(line.strip() for line in text.splitlines() if line.strip())
-    return f"const m{number[path]} = (() => {{\n{body}\nreturn {{ {', '.join(made)} }}\n}})()"
+    return f"const m{number[path]} = (() => {{\n{body}\nreturn {{ {', '.join(exports)} }}\n}})()"
 
 
 def _constants(names: str | None, module: str, path: str, needed: str) -> str:
-    """What an import statement of `path` names of the module at `needed`, as constants."""
+    """Return the names that an import statement of `path` takes from `needed`, as constants."""
     if names is None:
         return ""
     names = names.strip()
@@ -148,28 +152,28 @@ def _constants(names: str | None, module: str, path: str, needed: str) -> str:
     if not (names.startswith("{") and names.endswith("}")):
         raise BundleError(f"{path}: imports {names!r}; expected {{ names }} or * as a name")
     pairs = [x if x == y else f"{x}: {y}" for x, y in _pairs(names[1:-1])]
-    there = _exported(needed)
-    if missing := [x for x, _ in _pairs(names[1:-1]) if x not in there]:
+    exported = _exported(needed)
+    if missing := [x for x, _ in _pairs(names[1:-1]) if x not in exported]:
         raise BundleError(f"{path} imports {missing[0]!r}, which {needed} does not export")
     return f"const {{ {', '.join(pairs)} }} = {module}"
 
 
 def _pairs(names: str) -> list[tuple[str, str]]:
-    """`a, b as c` as (a, a), (b, c)."""
+    """Return `a, b as c` as (a, a), (b, c)."""
     parts = [x.split(" as ") for x in (" ".join(one.split()) for one in names.split(",")) if x]
     return [(x[0].strip(), x[-1].strip()) for x in parts]
 
 
 @cache
 def _exported(path: str) -> tuple[str, ...]:
-    """Names that a module exports."""
+    """Return the names that a module exports."""
     text = _code(path)
-    names = [match["name"] for match in _DECLARED.finditer(text)]
-    for match in _LISTED.finditer(text):
+    names = [match["name"] for match in _EXPORT.finditer(text)]
+    for match in _EXPORT_LIST.finditer(text):
         names += [name for _, name in _pairs(match["names"])]
     return tuple(names)
 
 
-def _spare(text: str) -> str:
-    """Without types, and comments that have lines of their own; those of others, `/*!`, stay."""
+def _minified(text: str) -> str:
+    """Return code without type comments and whole-line comments; licences, `/*!`, stay."""
     return re.sub(r"\n{2,}", "\n", _TYPE.sub("", _COMMENT.sub("", text))).strip() + "\n"

@@ -16,9 +16,9 @@ from lightpaint.basis.clean import (
     kept_planes,
     scale_of,
 )
-from lightpaint.images.denoiser import denoised, is_there
+from lightpaint.images.denoiser import denoised, oidn_is_installed
 
-pytestmark = pytest.mark.skipif(not is_there(), reason="Open Image Denoise")
+pytestmark = pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
 
 
 @pytest.fixture(autouse=True)

@@ -396,7 +396,7 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
         "bad/negative.exr": "not negative",
         "bad/nan.exr": "NaN or Inf in every pixel",
         "bad/cut.exr": "cut off",
-        "bad/text.exr": "is no picture that can be read",
+        "bad/text.exr": "is not a picture that can be read",
         "bad": "is a folder",
     }.items():
         assert words in refused(here, "solve", basis_file, target)

@@ -9,7 +9,7 @@ from command import refused, run
 from PIL import Image
 from renderer import LIGHTS, write_room
 
-from lightpaint.images.formats.png import png_says
+from lightpaint.images.formats.png import png_has_text
 from lightpaint.pipeline import light_sheets
 from lightpaint.pipeline.light_sheets import SHEET_KEY
 from lightpaint.scene.runtime.variant import use_variant
@@ -29,7 +29,7 @@ def test_the_sheet_is_drawn_and_drawn_anew(room: Path, monkeypatch: pytest.Monke
     lines = first.stdout.splitlines()
     assert [line.split()[0] for line in lines] == ["light", "bulb", "sky", "lights.png:"]
     assert "basis:" in first.stderr
-    assert png_says(sheet, SHEET_KEY)
+    assert png_has_text(sheet, SHEET_KEY)
     with Image.open(sheet) as picture:
         assert picture.info["lightpaint.denoised"]
         assert picture.width > picture.height

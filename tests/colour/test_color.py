@@ -14,8 +14,8 @@ from lightpaint.colour.color import (
     luminance,
     rgb_to_hex,
 )
+from lightpaint.colour.colour_science import colour_science
 from lightpaint.colour.primaries import adaptation
-from lightpaint.colour.science import colour_science
 from lightpaint.errors import ColorError
 
 # Linear Rec.709 from the chromaticities of ITU-R BT.709: columns are the primaries' XYZ.
@@ -165,7 +165,7 @@ def test_far_from_the_locus_there_is_no_temperature(rgb: Any):
     ("kelvin", "duv"), [(999, 0), (100_001, 0), (-1, 0), (np.nan, 0), (3000, 0.06), (3000, np.nan)]
 )
 def test_temperatures_that_there_are_none_of(kelvin: float, duv: float):
-    with pytest.raises(ColorError, match="need"):
+    with pytest.raises(ColorError, match="expected"):
         kelvin_to_rgb(kelvin, duv)
 
 

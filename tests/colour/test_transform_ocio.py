@@ -96,7 +96,7 @@ def test_a_view_without_a_way_back(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     flat = ocio.MatrixTransform([0.0] * 16, [0.5, 0.5, 0.5, 1.0])
     _own(tmp_path / "own.ocio", flat)
     monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
-    with pytest.raises(ViewError, match=r"ocio:Screen/Film/dark cannot be undone"):
+    with pytest.raises(ViewError, match=r"ocio:Screen/Film/dark cannot be inverted"):
         ViewTransform.parse("ocio")
 
 
@@ -104,7 +104,7 @@ def test_a_view_that_forgets_greys(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     clipped = ocio.RangeTransform(0.4, 0.6, 0.4, 0.6)
     _own(tmp_path / "own.ocio", clipped)
     monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
-    with pytest.raises(ViewError, match=r"cannot be undone: a grey comes back 0\.35 off"):
+    with pytest.raises(ViewError, match=r"cannot be inverted: a grey comes back 0\.35 off"):
         ViewTransform.parse("ocio")
 
 
@@ -120,7 +120,7 @@ def test_no_configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, conte
     if content is not None:
         (tmp_path / "own.ocio").write_text(content)
     monkeypatch.setenv("OCIO", str(tmp_path / "own.ocio"))
-    with pytest.raises(ViewError, match=r"own\.ocio is no OpenColorIO configuration"):
+    with pytest.raises(ViewError, match=r"own\.ocio is not an OpenColorIO configuration"):
         ViewTransform.parse("ocio")
 
 

@@ -13,11 +13,11 @@ from renderer import write_room
 from lightpaint.basis.render.render import render_basis
 from lightpaint.images.denoiser import (
     DENOISED_KEY,
-    LACKING,
+    MISSING_REMARK,
     Features,
     denoised,
-    how_denoised,
-    is_there,
+    denoiser_text,
+    oidn_is_installed,
 )
 from lightpaint.scene.scene import load_scene
 from lightpaint.scene.surfaces import render_features, render_surfaces
@@ -30,7 +30,7 @@ def method(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> s
     """Once with the library, once as on machines that have none."""
     if request.param != "Open Image Denoise":
         monkeypatch.setitem(sys.modules, "pyoidn", None)
-    elif not is_there():
+    elif not oidn_is_installed():
         pytest.skip("pyoidn is not installed here")
     return str(request.param)
 
@@ -74,7 +74,7 @@ def test_nothing_comes_of_nothing(method: str, value: float):
 
 def test_borders_are_as_good_as_the_rest():
     """Without a margin Open Image Denoise is off by a third there."""
-    if not is_there():
+    if not oidn_is_installed():
         pytest.skip("pyoidn is not installed here")
     flat = np.full((180, 320, 3), 0.5, np.float32)
     normal = np.broadcast_to(np.float32([0, 0, 1]), flat.shape)
@@ -85,10 +85,10 @@ def test_borders_are_as_good_as_the_rest():
 
 def test_it_says_how(method: str):
     _, _, features = _picture()
-    said = how_denoised(features, raw="a.exr")[DENOISED_KEY]
+    said = denoiser_text(features, raw="a.exr")[DENOISED_KEY]
     assert said.startswith(method)
     assert said.endswith(" with albedo and normals; raw: a.exr")
-    assert "albedo" not in how_denoised(None, raw="a.exr")[DENOISED_KEY]
+    assert "albedo" not in denoiser_text(None, raw="a.exr")[DENOISED_KEY]
 
 
 def test_features_are_what_surfaces_are(tmp_path: Path):
@@ -102,7 +102,7 @@ def test_features_are_what_surfaces_are(tmp_path: Path):
 
 def test_a_render_is_closer_to_one_of_many_samples(tmp_path: Path):
     """Against a render of 64 times the samples, whose own noise is a 64th in energy."""
-    if not is_there():
+    if not oidn_is_installed():
         pytest.skip("pyoidn is not installed here")
     scene = load_scene(write_room(tmp_path), parameters={"width": "96"})
     few, many = (render_basis(scene, spp=spp, seed=seed) for spp, seed in ((8, 0), (512, 1)))
@@ -121,7 +121,7 @@ def test_without_the_library_one_line_says_so(tmp_path: Path, monkeypatch: pytes
     made = run(tmp_path, "template", room, "--spp", 4)
     assert made.returncode == 0
     assert made.stderr.count("Open Image Denoise is not installed") == 1
-    assert LACKING[:40] in made.stderr
+    assert MISSING_REMARK[:40] in made.stderr
     with Image.open(tmp_path / "template" / "template.png") as file:
         assert file.text[DENOISED_KEY].startswith("joint bilateral filter")
     succeed(tmp_path, "solve", room, "template/template.exr", "--no-template", "--spp", 4)

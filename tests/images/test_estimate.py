@@ -93,5 +93,5 @@ def test_there_and_back(tmp_path: Path):
 
 def test_an_image_that_knows_nothing_of_its_noise(tmp_path: Path):
     write_rgb(tmp_path / "a.exr", np.ones((2, 2, 3)))
-    with pytest.raises(ImageError, match=r"a\.exr carries no half_difference layer"):
+    with pytest.raises(ImageError, match=r"a\.exr has no half_difference layer"):
         read_estimate(tmp_path / "a.exr")

@@ -218,7 +218,7 @@ def test_a_light_that_stands_twice_is_refused(tmp_path: Path):
         f'{{"format": "lightpaint-lighting 1", "lights": {{"a": {light}, "a": {light}}}}}',
         encoding="utf-8",
     )
-    with pytest.raises(LightingError, match="twice among a, a"):
+    with pytest.raises(LightingError, match="repeated among a, a"):
         read_lighting(path)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.color import kelvin_to_rgb
-from lightpaint.colour.hue import spoken_hue
+from lightpaint.colour.hue_names import hue_name
 from lightpaint.lighting.analysis.appearance.color_choices import ColorChoice
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solve import solve
@@ -49,7 +49,7 @@ CHOSEN = _choice("gentle", 2.6, is_chosen=True)
 )
 def test_hues_have_the_words_of_people(rgb: Any, word: str):
     for bright in (1e-3, 1, 1e3):
-        assert spoken_hue(bright * np.array(rgb)) == word
+        assert hue_name(bright * np.array(rgb)) == word
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.render.render import render_basis
 from lightpaint.scene.scene import load_scene
-from lightpaint.scene.surfaces import NOTHING, Surfaces, render_first_hits, render_surfaces
+from lightpaint.scene.surfaces import BACKGROUND, Surfaces, render_first_hits, render_surfaces
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def test_coverage_adds_up_to_what_is_not_nothing(seen: Surfaces) -> None:
     assert {"floor", "wall", "ball"} <= set(seen.coverage)
     total = sum(seen.coverage.values())
     # Sixteenths, and exact in binary.
-    np.testing.assert_array_equal(total == 0, seen.depth == np.float32(NOTHING))
+    np.testing.assert_array_equal(total == 0, seen.depth == np.float32(BACKGROUND))
     assert np.max(total) == 1
     assert (np.asarray(total) * 16 % 1 == 0).all()
 
@@ -35,7 +35,7 @@ def test_albedo_is_what_the_materials_say(seen: Surfaces) -> None:
 
 
 def test_normals_are_of_unit_length_and_in_world_space(seen: Surfaces) -> None:
-    there = seen.depth < NOTHING
+    there = seen.depth < BACKGROUND
     np.testing.assert_allclose(np.linalg.norm(seen.normal[there], axis=-1), 1, atol=1e-6)
     assert not seen.normal[~there].any()
     floor, wall = seen.coverage["floor"] == 1, seen.coverage["wall"] == 1
@@ -62,7 +62,7 @@ def test_one_picture_in_every_variant(seen: Surfaces, tmp_path: Path) -> None:
 import numpy as np
 from lightpaint.scene.scene import load_scene
 from lightpaint.basis.render.render import render_basis
-from lightpaint.scene.surfaces import NOTHING, Surfaces, render_first_hits, render_surfaces
+from lightpaint.scene.surfaces import BACKGROUND, Surfaces, render_first_hits, render_surfaces
 seen = render_surfaces(load_scene({str(room)!r}, variant="scalar_rgb"))
 np.savez({str(tmp_path / "seen.npz")!r}, **seen.coverage)
 """

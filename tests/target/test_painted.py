@@ -195,7 +195,7 @@ def test_what_nobody_says_of_a_view_is_srgbs(tmp_path: Path) -> None:
 
 
 def test_what_no_view_has_cannot_be_asked() -> None:
-    with pytest.raises(ViewError, match=r"^no view transform 'srgbb'"):
+    with pytest.raises(ViewError, match=r"^there is no view transform 'srgbb'"):
         TransformChoice(name="srgbb")
     with pytest.raises(ViewError, match="out of range"):
         TransformChoice(stops=1e9)

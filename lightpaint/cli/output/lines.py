@@ -8,7 +8,7 @@ import os
 import sys
 
 from lightpaint.errors import OutputError
-from lightpaint.images.formats.silence import heard
+from lightpaint.images.formats.library_output import unsilenced
 from lightpaint.screen import visible
 
 #: Characters of a line on stderr; what is longer was in no sentence.
@@ -21,7 +21,7 @@ def out(line: str, *, swatch: str | None = None) -> None:
     swatch: a colour like `#ffaa66`, of which a block stands before the line; "" for room for one.
     """
     try:
-        with heard():
+        with unsilenced():
             print(_block(swatch) + visible(line), flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -39,7 +39,7 @@ def _block(color: str | None) -> str:
 
 def err(line: str) -> None:
     """A line of progress, a remark or an error, to stderr."""
-    with heard():
+    with unsilenced():
         print(cut(line), file=sys.stderr, flush=True)
 
 

@@ -15,7 +15,7 @@ from lightpaint.errors import ViewError
 from lightpaint.files import first_line
 from lightpaint.screen import some_names
 
-#: Linear Rec.709 as OpenColorIO's built-in configurations call it, and as others do.
+#: Names of linear Rec.709 in OpenColorIO's built-in configurations and in others.
 LINEAR_REC709 = (
     "Linear Rec.709 (sRGB)",
     "lin_rec709_scene",
@@ -26,22 +26,22 @@ LINEAR_REC709 = (
     "Utility - Linear - sRGB",
 )
 
-#: By how much a grey may miss itself on the way to light and back: the finest of 8 bits.
-LARGEST_MISS = 1 / 255
+#: Largest error of a grey on the way to light and back: one step of 8 bits.
+MAX_ROUND_TRIP_ERROR = 1 / 255
 
 #: Relative step of the numerical derivatives: between the noise of float32 and curvature.
 STEP = 1e-2
 
 
 def default_name() -> str:
-    """Name of the transform that the configuration shows first: `ocio:DISPLAY/VIEW`."""
+    """Return the name of the configuration's default transform: `ocio:DISPLAY/VIEW`."""
     _, config = _library_and_config(os.environ.get("OCIO", ""))
     display = config.getDefaultDisplay()
     return f"ocio:{display}/{config.getDefaultView(display)}"
 
 
 def ocio_encoding(display_and_view: str) -> "OcioEncoding":
-    """The transform `ocio:DISPLAY/VIEW` of the configuration. Raises ViewError."""
+    """Return the transform `ocio:DISPLAY/VIEW` of the configuration. Raises ViewError."""
     return _cached(display_and_view, os.environ.get("OCIO", ""))
 
 
@@ -51,12 +51,12 @@ def _cached(display_and_view: str, source: str) -> "OcioEncoding":
 
 
 class OcioEncoding:
-    """One display and view. Raises ViewError where there is none, or no way back from it."""
+    """A display and view. Raises ViewError if they do not exist, or cannot be inverted."""
 
     def __init__(self, display_and_view: str, source: str) -> None:
         self._name = f"ocio:{display_and_view}"
         ocio, config = _library_and_config(source)
-        display, view = _named(display_and_view, config)
+        display, view = _display_and_view(display_and_view, config)
         try:
             self._to_display = _processors(ocio, config, display, view)
         except (ocio.Exception, ocio.ExceptionMissingFile) as error:
@@ -65,10 +65,10 @@ class OcioEncoding:
             self._to_light = _processors(ocio, config, display, view, inverse=True)
         except (ocio.Exception, ocio.ExceptionMissingFile) as error:
             raise ViewError(
-                f"{self._name} cannot be undone, and reading a painting undoes it: "
+                f"{self._name} cannot be inverted, which reading a painting needs: "
                 f"{first_line(error)}"
             ) from error
-        self._check_way_back()
+        self._check_round_trip()
         self.white = float(self.decode(np.ones((1, 1, 3), np.float32)).max())
 
     def encode(self, image: Floats) -> Floats:
@@ -84,19 +84,19 @@ class OcioEncoding:
         step = np.maximum(np.abs(planes).max(axis=0), 1e-4) * STEP
         columns = []
         for k in range(3):
-            aside = np.zeros((3, 1))
-            aside[k] = 1
-            up = self.encode((planes + step * aside).T)
-            down = self.encode((planes - step * aside).T)
+            direction = np.zeros((3, 1))
+            direction[k] = 1
+            up = self.encode((planes + step * direction).T)
+            down = self.encode((planes - step * direction).T)
             columns.append((up - down).T / (2 * step))
         return self.encode_planes(planes), np.stack(columns, axis=1)
 
-    def _check_way_back(self) -> None:
+    def _check_round_trip(self) -> None:
         greys = np.repeat(np.linspace(0.05, 0.95, 19, dtype=np.float32), 3).reshape(1, 19, 3)
-        miss = np.abs(self.encode(self.decode(greys)) - greys).max()
-        if not miss <= LARGEST_MISS:
+        error = np.abs(self.encode(self.decode(greys)) - greys).max()
+        if not error <= MAX_ROUND_TRIP_ERROR:
             raise ViewError(
-                f"{self._name} cannot be undone: a grey comes back {miss:.2g} off, of display "
+                f"{self._name} cannot be inverted: a grey comes back {error:.2g} off, of display "
                 "values from 0 to 1; choose another view"
             )
 
@@ -109,8 +109,8 @@ def _library_and_config(source: str) -> tuple[Any, Any]:
             "views of OpenColorIO need an extra package: pip install 'lightpaint[ocio]'"
         ) from None
     ocio: Any = PyOpenColorIO
-    # What it would print comes as an error, or is about roles that are not used here.
-    loudness = ocio.GetLoggingLevel()
+    # Its log repeats errors that are raised anyway, or is about roles that are not used here.
+    level = ocio.GetLoggingLevel()
     ocio.SetLoggingLevel(ocio.LOGGING_LEVEL_NONE)
     try:
         if source:
@@ -119,15 +119,15 @@ def _library_and_config(source: str) -> tuple[Any, Any]:
             config = ocio.Config.CreateFromBuiltinConfig("ocio://default")
         config.validate()
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
-        said = first_line(error, path=source or None)
-        named = f"OCIO={source}" if source else "the built-in configuration"
-        raise ViewError(f"{named} is no OpenColorIO configuration: {said}") from error
+        detail = first_line(error, path=source or None)
+        origin = f"OCIO={source}" if source else "the built-in configuration"
+        raise ViewError(f"{origin} is not an OpenColorIO configuration: {detail}") from error
     finally:
-        ocio.SetLoggingLevel(loudness)
+        ocio.SetLoggingLevel(level)
     return ocio, config
 
 
-def _named(display_and_view: str, config: Any) -> tuple[str, str]:
+def _display_and_view(display_and_view: str, config: Any) -> tuple[str, str]:
     displays = list(config.getDisplays())
     for display in displays:
         if display_and_view.startswith(f"{display}/"):
@@ -148,19 +148,19 @@ def _processors(
     ocio: Any, config: Any, display: str, view: str, *, inverse: bool = False
 ) -> list[Any]:
     """Return the steps from linear Rec.709 to the display, in order, or back."""
-    towards = ocio.TRANSFORM_DIR_INVERSE if inverse else ocio.TRANSFORM_DIR_FORWARD
-    own = next((n for n in LINEAR_REC709 if config.getColorSpace(n) is not None), None)
-    source = own or "scene_linear"
-    shown = ocio.DisplayViewTransform(src=source, display=display, view=view)
-    chain = [config.getProcessor(shown, towards)]
-    if own is None:
-        # By way of the interchange spaces that the configuration declares.
-        between = ocio.Config.GetProcessorFromBuiltinColorSpace
+    direction = ocio.TRANSFORM_DIR_INVERSE if inverse else ocio.TRANSFORM_DIR_FORWARD
+    linear = next((n for n in LINEAR_REC709 if config.getColorSpace(n) is not None), None)
+    source = linear or "scene_linear"
+    transform = ocio.DisplayViewTransform(src=source, display=display, view=view)
+    chain = [config.getProcessor(transform, direction)]
+    if linear is None:
+        # Convert through the interchange spaces that the configuration declares.
+        conversion = ocio.Config.GetProcessorFromBuiltinColorSpace
         if inverse:
-            between = ocio.Config.GetProcessorToBuiltinColorSpace
-            chain.append(between(config, source, LINEAR_REC709[0]))
+            conversion = ocio.Config.GetProcessorToBuiltinColorSpace
+            chain.append(conversion(config, source, LINEAR_REC709[0]))
         else:
-            chain.insert(0, between(LINEAR_REC709[0], config, source))
+            chain.insert(0, conversion(LINEAR_REC709[0], config, source))
     return [processor.getDefaultCPUProcessor() for processor in chain]
 
 

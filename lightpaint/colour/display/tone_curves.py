@@ -1,4 +1,4 @@
-"""The curves that displays and tone mappers are built of: sRGB, linear, filmic and AgX's."""
+"""Built-in tone curves: sRGB, linear, filmic and AgX."""
 
 import math
 from collections.abc import Callable
@@ -20,15 +20,15 @@ AGX_INSET = 0.8 * np.eye(3) + 0.2 * np.array([0.211994645, 0.392150825, 0.395854
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve for each channel, after a matrix.
+    """A tone curve: the same curve for each channel, after a matrix.
 
-    forward: display values of light in [0, white]. inverse: light of display values. rising: of
-    light in [0, white], its display values and the derivatives of these.
+    forward: from light in [0, white] to display values. inverse: from display values to light.
+    with_derivative: from light in [0, white] to display values and their derivatives.
     """
 
     forward: Callable[[Floats], Floats]
     inverse: Callable[[Floats], Floats]
-    rising: Callable[[Floats], tuple[Floats, Floats]]
+    with_derivative: Callable[[Floats], tuple[Floats, Floats]]
     white: float = 1.0
     matrix: Floats | None = None
 
@@ -46,12 +46,12 @@ class Curve:
 
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
         light = self._mixed_planes(planes)
-        its = np.minimum(np.maximum(light, 0), self.white)
-        shown, rise = self.rising(its)
-        rise *= its == light
+        clipped = np.minimum(np.maximum(light, 0), self.white)
+        shown, slopes = self.with_derivative(clipped)
+        slopes *= clipped == light
         if self.matrix is None:
-            return shown, rise
-        return shown, rise[:, None] * self.matrix.astype(rise.dtype)[..., None]
+            return shown, slopes
+        return shown, slopes[:, None] * self.matrix.astype(slopes.dtype)[..., None]
 
     def _mixed_planes(self, planes: Floats) -> Floats:
         return planes if self.matrix is None else self.matrix.astype(planes.dtype) @ planes
@@ -60,7 +60,7 @@ class Curve:
         return image if self.matrix is None else image @ self.matrix.T.astype(image.dtype)
 
 
-def _srgb_rising(light: Floats) -> tuple[Floats, Floats]:
+def _srgb_with_derivative(light: Floats) -> tuple[Floats, Floats]:
     power = 1.055 * light ** (1 / 2.4)
     dark = light <= 0.0031308
     slope = power / (2.4 * np.maximum(light, 1e-6))
@@ -70,7 +70,7 @@ def _srgb_rising(light: Floats) -> tuple[Floats, Floats]:
     return power, slope
 
 
-def _linear_rising(light: Floats) -> tuple[Floats, Floats]:
+def _linear_with_derivative(light: Floats) -> tuple[Floats, Floats]:
     return light, np.ones_like(light)
 
 
@@ -90,15 +90,15 @@ def _filmic_inverse(display: Floats) -> Floats:
     # The positive root of (a - c y) x² - (d y - b) x - e y = 0, in the form without cancellation.
     square, linear, constant = _A - _C * y, _D * y - _B, _E * y
     root = np.sqrt(linear**2 + 4 * square * constant)
-    rising = (linear + root) / (2 * square)
+    with_derivative = (linear + root) / (2 * square)
     falling = 2 * constant / np.where(linear < 0, root - linear, 1)
-    return np.asarray(np.where(linear < 0, falling, rising))
+    return np.asarray(np.where(linear < 0, falling, with_derivative))
 
 
-def _filmic_rising(light: Floats) -> tuple[Floats, Floats]:
+def _filmic_with_derivative(light: Floats) -> tuple[Floats, Floats]:
     below = light * (_C * light + _D) + _E
     above = light * (_A * light + _B)
-    shown, slope = _srgb_rising(np.minimum(above / below, 1))
+    shown, slope = _srgb_with_derivative(np.minimum(above / below, 1))
     steep = ((2 * _A * light + _B) * below - above * (2 * _C * light + _D)) / below**2
     return shown, slope * steep
 
@@ -106,9 +106,9 @@ def _filmic_rising(light: Floats) -> tuple[Floats, Floats]:
 class _Sigmoid:
     """AgX's curve: a power of a hyperbola on each side of a pivot, 0 at 0 and 1 at 1.
 
-    Sobotka, AgX (2022), after Siragusano's tunable sigmoid; contrast 2, toe 3, shoulder 3.25.
-    On a side that reaches a and rises to b, with y = h(s v) / s h(u) = u / (1 + u^p)^(1/p),
-    s is such that h's end is met.
+    Sobotka, AgX (2022), after Siragusano's tunable sigmoid; contrast 2, toe 3, shoulder 3.25. On a
+    side of width a and height b the curve is y = h(s v) / s with h(u) = u / (1 + u^p)^(1/p), and s
+    is chosen so that it meets the end point.
     """
 
     pivot = (-AGX_STOPS[0] / (AGX_STOPS[1] - AGX_STOPS[0]), 0.5)
@@ -123,7 +123,7 @@ class _Sigmoid:
         )
 
     def forward(self, x: Floats) -> Floats:
-        return self.rising(x)[0]
+        return self.with_derivative(x)[0]
 
     def inverse(self, y: Floats) -> Floats:
         (start, end), (toe, shoulder) = self.pivot, zip(self.scales, self.powers, strict=True)
@@ -131,11 +131,11 @@ class _Sigmoid:
         above = start + self._run(np.maximum(y - end, 0), *shoulder)
         return np.where(y < end, below, above)
 
-    def rising(self, x: Floats) -> tuple[Floats, Floats]:
-        """`forward` and its derivative."""
+    def with_derivative(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return `forward` and its derivative."""
         below = x < self.pivot[0]
         scale, power = (np.where(below, *each) for each in (self.scales, self.powers))
-        # To float32 as x is, if it is.
+        # Keep float32 if x is float32.
         scale, power = scale.astype(x.dtype), power.astype(x.dtype)
         run = self.contrast * (x - self.pivot[0])
         u = np.abs(run) / scale
@@ -165,22 +165,22 @@ def _agx(light: Floats) -> Floats:
 
 def _agx_inverse(display: Floats) -> Floats:
     light = np.exp2(_SIGMOID.inverse(display) * _AGX_RANGE + _AGX_LOW)
-    # Black is where the range ends, 10 stops below middle grey, and what is painted black is none.
+    # The curve reaches 0 at 10 stops below middle grey, but painted black means no light.
     return np.where(display > 0, light, 0)
 
 
-def _agx_rising(light: Floats) -> tuple[Floats, Floats]:
-    shown, slope = _SIGMOID.rising(_agx_log(light))
+def _agx_with_derivative(light: Floats) -> tuple[Floats, Floats]:
+    shown, slope = _SIGMOID.with_derivative(_agx_log(light))
     above = light >= 2.0**_AGX_LOW
     slope *= above
     slope /= np.where(above, light, 1) * (math.log(2) * _AGX_RANGE)
     return shown, slope
 
 
-#: By the name that a person gives.
+#: The built-in curves by their names.
 BUILT_IN = {
-    "srgb": Curve(encode_display, decode_display, _srgb_rising),
-    "linear": Curve(lambda x: x, lambda x: x, _linear_rising),
-    "filmic": Curve(_filmic, _filmic_inverse, _filmic_rising, _FILMIC_WHITE),
-    "agx": Curve(_agx, _agx_inverse, _agx_rising, 2.0**_AGX_HIGH, AGX_INSET),
+    "srgb": Curve(encode_display, decode_display, _srgb_with_derivative),
+    "linear": Curve(lambda x: x, lambda x: x, _linear_with_derivative),
+    "filmic": Curve(_filmic, _filmic_inverse, _filmic_with_derivative, _FILMIC_WHITE),
+    "agx": Curve(_agx, _agx_inverse, _agx_with_derivative, 2.0**_AGX_HIGH, AGX_INSET),
 }

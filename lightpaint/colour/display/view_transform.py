@@ -1,7 +1,7 @@
-"""View transforms: from linear light to what a display is sent, and back.
+"""View transforms: from linear light to display values, and back.
 
-Every picture that is shown, and every painting of 8 or 16 bits that is read, goes through a
-`ViewTransform`: an exposure and one of
+Every picture on display, and every painting of 8 or 16 bits, goes through a `ViewTransform`: an
+exposure and one of
 
     srgb      the display's own curve, IEC 61966-2-1; white at 1
     linear    no curve: the numbers are light; white at 1
@@ -9,7 +9,7 @@ Every picture that is shown, and every painting of 8 or 16 bits that is read, go
     agx       AgX's base: colours drawn together, 16.5 stops in one sigmoid; white at 16.3
     ocio:DISPLAY/VIEW   of the OpenColorIO configuration (`lightpaint.colour.display.ocio`)
 
-Display values lie in [0, 1]. Encoding clips what the display cannot show: what is brighter than
+Display values lie in [0, 1]. Encoding clips what the display cannot show: light brighter than
 `ViewTransform.white`, and negative light.
 """
 
@@ -27,25 +27,26 @@ from lightpaint.keywords import keywords
 
 
 class Encoding(Protocol):
-    """Linear Rec.709 to display values and back, without exposure. Arrays are (..., 3)."""
+    """An encoding of linear Rec.709 as display values, without exposure. Arrays are (..., 3)."""
 
     @property
     def white(self) -> float:
-        """Light of the grey that is display white."""
+        """Light of the grey that the display shows as white."""
 
     def encode(self, image: Floats) -> Floats:
-        """Display values in [0, 1] of linear light."""
+        """Return display values in [0, 1] of linear light."""
 
     def decode(self, image_display: Floats) -> Floats:
-        """Linear light of display values in [0, 1]."""
+        """Return linear light of display values in [0, 1]."""
 
     def encode_planes(self, planes: Floats) -> Floats:
-        """`encode` of linear light (3, p), a row for each channel."""
+        """Return `encode` of linear light (3, p), a row for each channel."""
 
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        """Of linear light (3, p): display values (3, p), and derivatives (3, 3, p) of display value
-        i by linear channel j, 0 where clipped; (3, p), by its own, where no channel has a say in
-        another.
+        """Return display values (3, p) of linear light (3, p), and their derivatives.
+
+        Derivatives are (3, 3, p), of display value i by linear channel j, 0 where clipped; or
+        (3, p), of each channel by itself, if channels do not mix.
         """
 
 
@@ -59,7 +60,7 @@ class ViewTransform:
         stops: Light is scaled by 2^stops before it is encoded.
 
     Raises:
-        ViewError: For a name that there is none of.
+        ViewError: For an unknown name.
 
     Examples:
         >>> lp.ViewTransform("agx", 1.0).spoken
@@ -82,10 +83,9 @@ class ViewTransform:
     @staticmethod
     @keywords()
     def parse(text: str, stops: float = 0.0) -> "ViewTransform":
-        """The transform that `text` names. `ocio` is the default display and view of the
-        configuration.
+        """Return the transform that `text` names: `ViewTransform.parse(t.name, t.stops) == t`.
 
-        `ViewTransform.parse(t.name, t.stops) == t`.
+        `ocio` is the default display and view of the configuration.
         """
         name = text.strip()
         if name.lower() == "ocio":
@@ -96,34 +96,34 @@ class ViewTransform:
 
     @property
     def spoken(self) -> str:
-        """`srgb`, or with its exposure, `srgb at +1.5 stops`."""
+        """Its name, with the exposure if there is one: `srgb at +1.5 stops`."""
         return f"{self.name} at {self.stops:+.1f} stops" if self.stops else self.name
 
     @property
     def white(self) -> float:
-        """Linear light of the grey at which the display is white: it shows nothing brighter."""
+        """Linear light of the grey that the display shows as white; it shows nothing brighter."""
         return _encoding(self.name).white / float(2.0**self.stops)
 
     @property
     def is_per_channel(self) -> bool:
-        """Whether each display value depends on its own channel alone, by the same curve."""
+        """True if each display value depends on its own channel alone, by the same curve."""
         encoding = _encoding(self.name)
         return isinstance(encoding, Curve) and encoding.matrix is None
 
     def encode(self, image: Floats) -> Floats:
-        """Display values in [0, 1] of a linear Rec.709 image (..., 3)."""
+        """Return display values in [0, 1] of a linear Rec.709 image (..., 3)."""
         return _encoding(self.name).encode(image * 2.0**self.stops)
 
     def decode(self, image_display: Floats) -> Floats:
-        """Linear Rec.709 of display values in [0, 1], (..., 3). Does not undo clipping."""
+        """Return linear Rec.709 of display values in [0, 1], (..., 3). Clipping is not undone."""
         linear = _encoding(self.name).decode(np.clip(image_display, 0, 1))
         return np.asarray(linear / 2.0**self.stops)
 
     def jacobian(self, image: Floats) -> Floats:
-        """Derivatives of `encode` at a linear image (..., 3).
+        """Return the derivatives of `encode` at a linear image (..., 3).
 
-        (..., 3, 3): of display value i by linear channel j. 0 where the display clips. Only
-        `agx` and `ocio:` mix channels.
+        The result is (..., 3, 3): of display value i by linear channel j, 0 where the display
+        clips. Only `agx` and `ocio:` mix channels.
         """
         _, slopes = self.with_slopes(np.reshape(image, (-1, 3)).T)
         if slopes.ndim == 2:
@@ -131,14 +131,14 @@ class ViewTransform:
         return np.asarray(slopes.transpose(2, 0, 1).reshape(*image.shape, 3))
 
     def encode_planes(self, planes: Floats) -> Floats:
-        """Encode pixels whose channels lie apart, (3, p) linear, as `encode` does."""
+        """Return `encode` of channels in planes, (3, p) linear."""
         return _encoding(self.name).encode_planes(planes * 2.0**self.stops)
 
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        """Return `encode` and `jacobian` of pixels whose channels lie apart, at once.
+        """Return `encode` and `jacobian` of channels in planes at once.
 
-        planes: (3, p) linear. Returns display values, (3, p), and derivatives, (3, 3, p) or, where
-        no channel has a say in another, the diagonal of these, (3, p).
+        planes: (3, p) linear. Returns display values, (3, p), and derivatives, (3, 3, p) or, if
+        channels do not mix, their diagonal, (3, p).
         """
         scale = 2.0**self.stops
         shown, slopes = _encoding(self.name).with_slopes(planes * scale)
@@ -148,14 +148,14 @@ class ViewTransform:
 @keywords()
 @dataclass(frozen=True)
 class TransformChoice:
-    """A choice of transform, maybe half of one; a picture says the rest.
+    """A choice of transform that may be partial; the picture's own transform fills the rest.
 
     Attributes:
-        name: As of `ViewTransform.parse`.
-        stops: Of exposure. None for what is left open.
+        name: As in `ViewTransform.parse`; None if left open.
+        stops: Exposure; None if left open.
 
     Raises:
-        ViewError: For what no transform has.
+        ViewError: For an unknown name, or an exposure out of range.
 
     Examples:
         >>> lp.TransformChoice(stops=1.0).over(lp.ViewTransform("agx"))
@@ -171,27 +171,27 @@ class TransformChoice:
     @staticmethod
     @keywords()
     def of(transform: "ViewTransform | TransformChoice | None") -> "TransformChoice":
-        """A whole transform, a choice as it is, or nothing asked."""
+        """Return a whole transform as a choice, a choice as it is, or the open choice for None."""
         if isinstance(transform, ViewTransform):
             return TransformChoice(transform.name, transform.stops)
         return transform or TransformChoice()
 
     @property
     def is_open(self) -> bool:
-        """Whether nothing is asked."""
+        """True if nothing is chosen."""
         return self.name is None and self.stops is None
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing is left open."""
+        """True if nothing is left open."""
         return self.name is not None and self.stops is not None
 
-    def over(self, said: ViewTransform | None) -> ViewTransform:
-        """The one asked for, where that is open the one `said`, where nobody says it sRGB's."""
-        said = said or ViewTransform()
+    def over(self, fallback: ViewTransform | None) -> ViewTransform:
+        """Return the chosen transform, its open parts from `fallback`, or sRGB if that is None."""
+        fallback = fallback or ViewTransform()
         return ViewTransform.parse(
-            said.name if self.name is None else self.name,
-            said.stops if self.stops is None else self.stops,
+            fallback.name if self.name is None else self.name,
+            fallback.stops if self.stops is None else self.stops,
         )
 
 
@@ -202,6 +202,7 @@ def _encoding(name: str) -> Encoding:
         return ocio_encoding(name[len("ocio:") :])
     if name not in BUILT_IN:
         raise ViewError(
-            f"no view transform {name!r}: expected {', '.join(BUILT_IN)}, ocio or ocio:DISPLAY/VIEW"
+            f"there is no view transform {name!r}: expected {', '.join(BUILT_IN)}, ocio or "
+            "ocio:DISPLAY/VIEW"
         )
     return BUILT_IN[name]

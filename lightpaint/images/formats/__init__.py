@@ -1,1 +1,1 @@
-"""Files of pictures: OpenEXR, PNG, TIFF, PSD and layered ones, read and written."""
+"""Picture files: OpenEXR and PNG in and out; JPEG, TIFF, PSD and layered files in."""

@@ -1,8 +1,8 @@
-"""PNG, TIFF, JPEG and PSD: a picture's numbers as they are stored, and what they mean.
+"""PNG, TIFF, JPEG and PSD: the stored numbers of a picture, and their meaning.
 
-Decoding is OpenImageIO's, over the formats' own libraries. It is given no file that declares more
-pixels than MAX_PIXELS. What it would read as something else than it is (CMYK, Lab, several pages,
-a Photoshop file without its merged picture) is refused here.
+OpenImageIO decodes, with the formats' own libraries. It gets no file that declares more than
+MAX_PIXELS. Files that it would misread (CMYK, Lab, several pages, a Photoshop file without its
+merged picture) are refused here.
 """
 
 from dataclasses import dataclass
@@ -15,31 +15,31 @@ import numpy.typing as npt
 from lightpaint.colour.icc import Profile, read_icc
 from lightpaint.errors import ImageError
 from lightpaint.files import first_line
+from lightpaint.images.formats.library_output import silenced
 from lightpaint.images.formats.png import PNG_HEAD, longest_png, read_png_head
 from lightpaint.images.formats.psd import check_psd
-from lightpaint.images.formats.silence import silenced
 from lightpaint.images.formats.tiff import check_tiff
 
-#: Above this many pixels nothing is decoded: 8192x4096, for which decoding takes some 1 GB.
+#: Most pixels that are decoded: 8192x4096, for which decoding takes about 1 GB.
 MAX_PIXELS = 2**25
 
 #: Longest file that is opened, in bytes.
 MAX_FILE = 2**31
 
-#: TIFF's PhotometricInterpretation: what its numbers may be, and what else they are called.
+#: TIFF's PhotometricInterpretation: those that are read, and names of those that are not.
 TIFF_COLOURS = {0: "grey", 1: "grey", 2: "RGB", 3: "palette", 6: "YCbCr"}
 TIFF_OTHERS = {4: "a mask", 5: "CMYK", 8: "Lab", 9: "Lab", 10: "Lab", 32844: "LogLuv"}
 
 
 @dataclass(frozen=True)
 class Bitmap:
-    """A picture of numbers.
+    """A picture as stored numbers.
 
     kind: `png`, `tiff`, `jpeg` or `psd`. values: (h, w, 3) uint8, uint16, float16 or float32;
     grey is repeated. alpha: (h, w) of the same type, None if there is none or all is opaque.
-    premultiplied: whether `values` are multiplied by it. codes: largest integer there can be;
-    None for floats. profile: what the numbers mean; None is sRGB. lossy: whether compression
-    changed them. shown: the view transform that the file says it was made with, as `name stops`.
+    premultiplied: True if `values` are multiplied by it. codes: largest possible integer; None for
+    floats. profile: meaning of the numbers; None is sRGB. lossy: True if compression changed them.
+    shown: the view transform that the file declares, as `name stops`.
     """
 
     kind: str
@@ -53,7 +53,9 @@ class Bitmap:
 
 
 def read_bitmap(path: Path, kind: str) -> Bitmap:
-    """The picture in a file of this kind, upright. Raises ImageError, without naming the file."""
+    """Return the picture in a file of this kind, upright. Raises ImageError without the file's
+    name.
+    """
     if path.stat().st_size > MAX_FILE:
         raise ImageError("is too long to be a picture")
     shown: str | None = None
@@ -64,12 +66,12 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
             longest = longest_png(file.read(PNG_HEAD))
         if path.stat().st_size > longest:
             raise ImageError(
-                f"is {path.stat().st_size} bytes long, and no PNG of its size has more than "
+                f"is {path.stat().st_size} bytes long, and a PNG of its size has at most "
                 f"{longest}: save it again"
             )
         shown, profile = read_png_head(path)
     elif kind == "psd":
-        transparency = check_psd(path, most=MAX_PIXELS)
+        transparency = check_psd(path, max_pixels=MAX_PIXELS)
     elif kind == "tiff":
         check_tiff(path)
     with silenced():
@@ -85,7 +87,7 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
     alpha = _alpha(spec, pixels)
     if alpha is not None and not transparency:
         raise ImageError(
-            "has a channel beside its colours that is not transparency: delete it, or export a PNG"
+            "has an extra channel that is not transparency: delete it, or export a PNG"
         )
     integer = np.issubdtype(pixels.dtype, np.integer)
     return Bitmap(
@@ -105,15 +107,15 @@ def read_bitmap(path: Path, kind: str) -> Bitmap:
 def _decoded(path: Path, kind: str) -> tuple[Any, npt.NDArray[Any]]:
     import OpenImageIO
 
-    OpenImageIO.geterror()  # what is left of an earlier one
+    OpenImageIO.geterror()  # clears the error of an earlier file
     plain = OpenImageIO.ImageSpec()
-    plain["oiio:UnassociatedAlpha"] = 1  # or it multiplies display values by alpha
+    plain["oiio:UnassociatedAlpha"] = 1  # else OpenImageIO multiplies display values by alpha
     file = OpenImageIO.ImageInput.open(str(path), plain)
     if file is None:
         raise ImageError(f"is damaged: {first_line(OpenImageIO.geterror(), path=path)}")
     try:
         if file.format_name() != kind:
-            raise ImageError(f"is damaged: it begins like {kind.upper()} and is none")
+            raise ImageError(f"is damaged: it begins like {kind.upper()} but is not")
         spec = file.spec()
         _check_size(spec)
         pixels = file.read_image(0, 0, 0, spec.nchannels, spec.format)
@@ -140,7 +142,7 @@ def _check_size(spec: Any) -> None:
 
 
 def _check_pages(file: Any, first: Any) -> None:
-    """Refuse a second page of the same size: a layer, which must not be lost in silence."""
+    """Refuse a second page of the same size: it is a layer, which would be lost silently."""
     size = first.width, first.height
     for page in range(1, 64):
         if not file.seek_subimage(page, 0):
@@ -180,7 +182,7 @@ def _largest(dtype: np.dtype[Any]) -> int:
 
 
 def _upright(pixels: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
-    """Turned and mirrored as EXIF's Orientation says."""
+    """Return pixels turned and mirrored as EXIF's Orientation says."""
     if orientation in (5, 6, 7, 8):
         pixels = pixels.swapaxes(0, 1)
     if orientation in (3, 4, 7, 8):

@@ -1,4 +1,4 @@
-"""From the numbers of a bitmap to linear Rec.709, through its profile and a view transform."""
+"""Decoding of a bitmap's numbers to linear Rec.709, through its profile and a view transform."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,12 +14,12 @@ from lightpaint.colour.srgb import encode_display
 from lightpaint.errors import ImageError
 from lightpaint.images.formats.bitmap import Bitmap
 
-#: Pixels that are converted at once.
-STRIP = 2**18
+#: Pixels that are converted at a time.
+STRIP_PIXELS = 2**18
 
 
 def transform_of(bitmap: Bitmap) -> ViewTransform | None:
-    """The view transform that a file says it was made with."""
+    """Return the view transform that a file declares, None if it declares none."""
     if bitmap.shown is None:
         return None
     name, _, stops = bitmap.shown.rpartition(" ")
@@ -27,12 +27,12 @@ def transform_of(bitmap: Bitmap) -> ViewTransform | None:
         return ViewTransform(name, float(stops))
     except ValueError:
         raise ImageError(
-            f"says that it was shown through {bitmap.shown!r}, no view transform"
+            f"declares that it was shown through {bitmap.shown!r}, which is not a view transform"
         ) from None
 
 
 def light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
-    """Linear Rec.709 of floats, (h, w, 3) float32, not premultiplied."""
+    """Return linear Rec.709 of floats, (h, w, 3) float32, not premultiplied."""
     image = np.array(bitmap.values, np.float32)
     if bitmap.profile is not None:
         if not bitmap.profile.is_linear:
@@ -47,13 +47,13 @@ def light_of_floats(bitmap: Bitmap, alpha: Floats | None) -> Floats:
 
 
 def light_of_integers(bitmap: Bitmap, alpha: Floats | None, transform: ViewTransform) -> Floats:
-    """Linear Rec.709 of the integers, strip by strip."""
+    """Return linear Rec.709 of integers, converted strip by strip."""
     assert bitmap.codes is not None
     profile = bitmap.profile
     if profile is not None and profile.is_srgb:
         profile = None
     image = np.empty(bitmap.values.shape, np.float32)
-    rows = max(1, STRIP // bitmap.values.shape[1])
+    rows = max(1, STRIP_PIXELS // bitmap.values.shape[1])
     decode = _decoder(bitmap.codes, profile, transform, by_table=not bitmap.premultiplied)
     for top in range(0, len(image), rows):
         strip = slice(top, top + rows)
@@ -69,12 +69,15 @@ def light_of_integers(bitmap: Bitmap, alpha: Floats | None, transform: ViewTrans
 def _decoder(
     codes: int, profile: Profile | None, transform: ViewTransform, *, by_table: bool
 ) -> Callable[[npt.NDArray[Any]], Floats]:
-    """From numbers (h, w, 3) to light: from integers by table, else from values in [0, 1]."""
+    """Return the function from numbers (h, w, 3) to light.
+
+    by_table: True to decode integers with a table; otherwise it takes values in [0, 1].
+    """
 
     def curve(of: Callable[[Floats], Floats]) -> Callable[[npt.NDArray[Any]], Floats]:
         if not by_table:
             return of
-        # The same numbers come again and again.
+        # The same numbers occur again and again.
         table = np.asarray(of(np.arange(codes + 1) / codes), np.float32)
         return lambda values: table[values]
 
@@ -94,17 +97,20 @@ def _decoder(
 
 
 def _through(transform: ViewTransform, shown: Floats, *, is_linear: bool, name: str) -> Floats:
-    """Scene light of what a display is to show, in linear Rec.709."""
+    """Return scene light, linear Rec.709, of the light that a display is to show."""
     scale = np.float32(2.0**transform.stops)
     if transform.name == "srgb" or (transform.name == "linear" and is_linear):
-        return shown / scale  # Beyond Rec.709 as well, for which display values have no room.
+        return shown / scale  # Colours beyond Rec.709 survive, which display values could not hold.
     if transform.name == "linear":
-        raise ImageError(f"has the colour profile {name!r}, but its numbers are said to be linear")
+        raise ImageError(
+            f"has the colour profile {name!r}, but the view transform is linear: choose another "
+            "one, or export it without profile"
+        )
     return transform.decode(encode_display(shown))
 
 
 def unpremultiply(image: Floats, alpha: Floats) -> None:
-    """Divide by alpha, in place, where there is some."""
-    # Over next to no alpha a colour may become infinite, and is then counted as such.
+    """Divide by alpha in place, where it is > 0."""
+    # Division by a tiny alpha may give Inf, which the caller counts as such.
     with np.errstate(over="ignore", invalid="ignore"):
         image /= np.where(alpha > 0, alpha, np.float32(1))[..., None]

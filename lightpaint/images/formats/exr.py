@@ -1,8 +1,7 @@
-"""OpenEXR files in and out, over the OpenEXR project's own module.
+"""OpenEXR files in and out, with the OpenEXR project's own module.
 
-A file is a list of `ExrPart`s; a part is a set of named channels of one size. What the
-reference library lets pass silently (a cut-off file, missing parts, deep pixels) is an
-ImageError here.
+A file is a list of `ExrPart`s; a part is a set of named channels of one size. Faults that the
+reference library ignores (a cut-off file, missing parts, deep pixels) raise ImageError here.
 """
 
 import re
@@ -20,27 +19,27 @@ from lightpaint.arrays import Floats
 from lightpaint.errors import ImageError, OutputError
 from lightpaint.files import first_line, replacing
 from lightpaint.images.formats.file_kinds import head_of, kind_of, name_of
-from lightpaint.images.formats.silence import silenced
+from lightpaint.images.formats.library_output import silenced
 from lightpaint.screen import some_names
 from lightpaint.version import __version__
 
-#: How the names of lightpaint's own text attributes begin, and the one that every file of its has.
+#: Prefix of lightpaint's own text attributes, and the one that all its files have.
 OWN = "lightpaint."
 VERSION_KEY = f"{OWN}version"
 
-#: A file that declares more bytes of pixels than this, and more than 64 for each of its own bytes,
-#: is refused before any is decoded. Pictures compress to less only where they are empty.
+#: A file that declares more bytes of pixels than this, and more than 64 times its own length, is
+#: refused before decoding. Only empty pictures compress better than that.
 MAX_BYTES = 2**29
 MAX_COMPRESSION = 64
 
-#: Every so-many-th line, and their bytes from which on they tell how well a part packs; and the
-#: share of them that may be left for it to be worth the time.
-SAMPLED, TELLING, SAVED = 16, 2**16, 0.6
+#: Compression is tried on every 16th line if these have at least so many bytes, and used if they
+#: shrink below this share.
+SAMPLE_STEP, MIN_SAMPLE_BYTES, MAX_PACKED_SHARE = 16, 2**16, 0.6
 
-#: Pixels (height, width) by the name of their channel.
+#: Pixels (height, width) by channel name.
 Channels = Mapping[str, npt.NDArray[Any]]
 
-#: OpenEXR's filter between two samples of chroma: weights of the nearest, the next, … on each side.
+#: OpenEXR's filter between two samples of chroma: weights of the nearest, the next, … per side.
 CHROMA_FILTER = (0.627123, -0.186077, 0.087929, -0.043159, 0.019597, -0.007540, 0.002128)
 
 
@@ -51,7 +50,7 @@ class ExrPart:
     channels: name → (height, width) array, float16 or float32 (uint32 when read so).
     attributes: text attributes of the header.
     display: (height, width) of the display window, the picture; None if it is `size`.
-    offset: (y, x) of the first stored pixel in it: programs crop what is empty or keep a margin.
+    offset: (y, x) of the first stored pixel in it: programs crop empty borders or keep a margin.
     primaries: CIE xy of red, green, blue and white, if the header declares `chromaticities`.
     views: names of the views whose channels the part holds, the one without prefix first.
     """
@@ -71,7 +70,7 @@ class ExrPart:
         return height, width
 
     def in_display_window(self) -> "ExrPart":
-        """The part cut or filled with zeros to its display window."""
+        """Return the part cut or padded with zeros to its display window."""
         height, width = self.display or self.size
         if (height, width) == self.size and self.offset == (0, 0):
             return self
@@ -86,7 +85,7 @@ class ExrPart:
         return replace(self, channels=placed, display=None, offset=(0, 0))
 
     def rgb(self, layer: str = "") -> Floats:
-        """The R, G and B channels of `layer` as (height, width, 3) float32."""
+        """Return the R, G and B channels of `layer` as (height, width, 3) float32."""
         prefix = f"{layer}." if layer else ""
         names = [prefix + c for c in "RGB"]
         missing = [n for n in names if n not in self.channels]
@@ -99,33 +98,33 @@ class ExrPart:
 
 
 def read_headers(path: Path) -> tuple[list[dict[str, str]], tuple[int, int]]:
-    """Text attributes of each part of an EXR file, and its (height, width), without pixels."""
-    head_of(path, 16)  # OpenEXR itself would wait for ever at what never answers
+    """Return the text attributes of each part of an EXR file, and its (height, width)."""
+    head_of(path, 16)  # OpenEXR itself would wait forever for a file that never answers
     with silenced():
         headers = [header for _, header in _declared(path)]
         return [_texts(header) for header in headers], _windows(headers[0])[0]
 
 
 def read_channels(path: Path) -> set[str]:
-    """Names of the channels of all parts of an EXR file, without pixels. Raises ImageError."""
+    """Return the names of all channels in an EXR file, without pixels. Raises ImageError."""
     with silenced():
         declared = _declared(path)
         return {channel.name for _, header in declared for channel in header["channels"]}
 
 
 def read_parts(path: Path) -> list[ExrPart]:
-    """All parts of the EXR file at `path`.
+    """Return all parts of the EXR file at `path`.
 
-    Channels that are stored at a part of the resolution, as chroma is, are interpolated. Of
-    mip maps the largest is read. Raises ImageError if the file is missing, no EXR, cut off,
-    deep, or declares more pixels than its length makes likely.
+    Channels stored at lower resolution, like chroma, are interpolated. Of mip maps the largest is
+    read. Raises ImageError if the file is missing, not an EXR, cut off, deep, or declares many more
+    pixels than its length makes likely.
     """
     path = Path(path)
     head = head_of(path, 16)
     if kind_of(head) != "exr":
         name = name_of(head)
-        is_a = f"is a {name} file" if name else "is no OpenEXR file"
-        raise ImageError(f"{path} {is_a}: export it as linear OpenEXR")
+        description = f"is a {name} file" if name else "is not an OpenEXR file"
+        raise ImageError(f"{path} {description}: export it as linear OpenEXR")
     with silenced():
         declared = _declared(path)
         _check_headers(path, declared)
@@ -142,7 +141,7 @@ def read_parts(path: Path) -> list[ExrPart]:
 
 
 def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
-    """Name and header of each part, without its pixels. Raises ImageError."""
+    """Return the name and header of each part, without its pixels. Raises ImageError."""
     try:
         header = OpenEXR.File(str(path), header_only=True)
         declared = [(part.name(), dict(part.header)) for part in header.parts]
@@ -153,22 +152,22 @@ def _declared(path: Path) -> list[tuple[str | None, dict[str, Any]]]:
 
 
 def _why_unreadable(path: Path, reason: str) -> str:
-    """What is wrong with a file whose header cannot be read. reason: the library's."""
+    """Return the error for a file with an unreadable header. reason: the library's."""
     if kind_of(head_of(path, 16)) != "exr":
         return f"{path} is not a readable OpenEXR file: {reason}"
-    # The library names the file again, and says of one that ends too soon no more than that.
-    said = re.sub(r"(^Unable|\s*when attempting) to open .*", "", reason)
-    which = f" ({said})" if said else ""
-    return f"{path} is cut off or damaged in its header{which}: export it again"
+    # The library repeats the file's name, and says no more about one that is cut off.
+    detail = re.sub(r"(^Unable|\s*when attempting) to open .*", "", reason)
+    suffix = f" ({detail})" if detail else ""
+    return f"{path} is cut off or damaged in its header{suffix}: export it again"
 
 
 def _texts(header: Mapping[str, Any]) -> dict[str, str]:
-    """The text attributes of a header."""
+    """Return the text attributes of a header."""
     return {key: value for key, value in header.items() if isinstance(value, str)}
 
 
 def _part(path: Path, part: Any) -> ExrPart:
-    """What is kept of a part as the library reads it."""
+    """Return a part in our own terms from the library's."""
     if not part.channels:
         raise ImageError(f"{path} has a part without channels")
     (x0, y0), (x1, y1) = ((int(x), int(y)) for x, y in part.header["dataWindow"])
@@ -195,18 +194,18 @@ def _part(path: Path, part: Any) -> ExrPart:
 
 
 def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, int]) -> Floats:
-    """A channel stored for every so-manieth pixel, at all of them.
+    """Return a subsampled channel at full resolution.
 
-    Of every other pixel, as chroma is stored, by the filter that OpenEXR reads it with; else
-    linearly. Beyond the last it is constant.
+    Chroma, stored for every other pixel, is interpolated with OpenEXR's own filter; other steps
+    linearly. Beyond the last sample it is constant.
     """
     result = pixels.astype(np.float32)
     for axis, (length, step) in enumerate(zip(size, sampling, strict=True)):
         result = np.moveaxis(result, axis, 0)
         last = len(result) - 1
-        at = np.minimum(np.arange(length) / step, last)
-        below = at.astype(int)
-        share = (at - below).astype(np.float32)[:, None]
+        position = np.minimum(np.arange(length) / step, last)
+        below = position.astype(int)
+        share = (position - below).astype(np.float32)[:, None]
         between = np.zeros_like(result[below])
         for k, weight in enumerate(CHROMA_FILTER if step == 2 else (0.5,)):
             left, right = np.maximum(below - k, 0), np.minimum(below + 1 + k, last)
@@ -220,11 +219,10 @@ def _interpolated(pixels: Floats, size: tuple[int, int], sampling: tuple[int, in
 
 
 def write_parts(path: Path, parts: Sequence[ExrPart]) -> None:
-    """Write a multi-part EXR without loss, by ZIP where that helps, whole or not at all.
+    """Write a multi-part EXR without loss, with ZIP where that helps, all of it or nothing.
 
-    The first part says which version of lightpaint wrote it, so that nobody takes it for a render
-    of another program. All parts must have one display window; its size is that of the part where
-    it says none.
+    The first part records the version of lightpaint, so that nobody takes it for the render of
+    another program. All parts must have the same display window, by default their own size.
     """
     exr_parts = []
     for k, part in enumerate(parts):
@@ -245,27 +243,29 @@ def write_parts(path: Path, parts: Sequence[ExrPart]) -> None:
             header["dataWindow"] = (np.array(first, np.int32), np.array(last, np.int32))
         channels = {n: np.ascontiguousarray(c) for n, c in part.channels.items()}
         exr_parts.append(OpenEXR.Part(header, channels, part.name))
-    with replacing(path) as beside:
+    with replacing(path) as temporary:
         try:
-            OpenEXR.File(exr_parts).write(str(beside))
-        except RuntimeError as error:  # the library's word for a full disk and the like
-            raise OutputError(f"cannot write {path}: {first_line(error, path=beside)}") from error
+            OpenEXR.File(exr_parts).write(str(temporary))
+        except RuntimeError as error:  # raised for a full disk and the like
+            raise OutputError(
+                f"cannot write {path}: {first_line(error, path=temporary)}"
+            ) from error
 
 
 def is_worth_packing(channels: Channels) -> bool:
-    """Return whether ZIP saves much: noise in floats it hardly packs, and takes long to unpack."""
-    lines = [pixels[::SAMPLED] for pixels in channels.values()]
-    if sum(x.nbytes for x in lines) < TELLING:
+    """Return True if ZIP saves much. Noisy floats hardly shrink and take long to unpack."""
+    lines = [pixels[::SAMPLE_STEP] for pixels in channels.values()]
+    if sum(x.nbytes for x in lines) < MIN_SAMPLE_BYTES:
         return True
-    # As ZIP does it: bytes of one rank together.
+    # As in EXR's ZIP: bytes of equal significance together.
     data = b"".join(
         np.ascontiguousarray(x).view(np.uint8).reshape(-1, x.itemsize).T.tobytes() for x in lines
     )
-    return len(zlib.compress(data, 1)) < SAVED * len(data)
+    return len(zlib.compress(data, 1)) < MAX_PACKED_SHARE * len(data)
 
 
 def rgb_channels(image: Floats, layer: str = "") -> dict[str, Floats]:
-    """(height, width, 3) pixels as the float32 channels R, G, B of `layer`."""
+    """Return (height, width, 3) pixels as the float32 channels R, G, B of `layer`."""
     prefix = f"{layer}." if layer else ""
     image = image.astype(np.float32, copy=False)
     return {f"{prefix}{c}": image[..., k] for k, c in enumerate("RGB")}
@@ -277,14 +277,14 @@ def write_rgb(path: Path, image: Floats, *, attributes: Mapping[str, str] | None
 
 
 def _windows(header: Mapping[str, Any]) -> tuple[tuple[int, int], tuple[int, int]]:
-    """(height, width) of the display window and the data window's (y, x) in it."""
+    """Return (height, width) of the display window and the data window's (y, x) in it."""
     (x0, y0), (x1, y1) = ((int(x), int(y)) for x, y in header["displayWindow"])
     x, y = (int(v) for v in header["dataWindow"][0])
     return (y1 - y0 + 1, x1 - x0 + 1), (y - y0, x - x0)
 
 
 def _primaries(header: Mapping[str, Any]) -> tuple[float, ...] | None:
-    """x and y of red, green, blue and white. An attribute of that name and another type is none."""
+    """Return x and y of red, green, blue and white; None if missing or of another type."""
     declared = header.get("chromaticities")
     if not isinstance(declared, tuple) or len(declared) != 8:
         return None
@@ -305,7 +305,7 @@ def _check_headers(path: Path, declared: list[tuple[str | None, dict[str, Any]]]
             raise ImageError(f"{path} declares an empty image of {width}x{height} pixels")
         (height_shown, width_shown), _ = _windows(header)
         pixels = max(width * height, width_shown * height_shown)
-        # Half is read as half; what is made of it later, in float32, is counted here.
+        # Half floats become float32 later, so that four bytes are counted.
         size += pixels * 4 * max(len(header.get("channels", ())), 1)
     if size > max(MAX_BYTES, MAX_COMPRESSION * path.stat().st_size):
         raise ImageError(

@@ -1,4 +1,4 @@
-"""The colour layers of an EXR file, whatever they are made of, as linear Rec.709."""
+"""The colour layers of an EXR file, in any representation, as linear Rec.709."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -20,23 +20,23 @@ from lightpaint.errors import ImageError
 from lightpaint.images.formats.exr import ExrPart
 from lightpaint.screen import some_names
 
-#: Attribute by which Krita keeps its layers apart in an EXR, which has then no merged picture.
+#: Attribute of an EXR with separate layers of Krita, which has no merged picture.
 KRITA_LAYERS = "krita_layers_info"
 
-#: What programs call the channels of a colour, and alpha, in any case.
+#: Names of colour channels and alpha in various programs, in lower case.
 RGB_NAMES = (("r", "g", "b"), ("red", "green", "blue"))
 ALPHA_NAMES = ("a", "alpha")
 
-#: Text attribute in which Blender and others name the colour space, and what says nothing.
+#: Text attribute in which Blender and others name the colour space, and its values without meaning.
 COLOR_SPACE = "colorInteropID"
-UNSAID = ("", "data", "unknown")
+UNSPECIFIED = ("", "data", "unknown")
 
 
 @dataclass(frozen=True)
 class Layer:
     """A colour image in a part: its channels are those with this prefix.
 
-    name: what a person calls it by; "" if it is the only one in its file without a name.
+    name: its name for people; "" if it is the only layer in its file and has none.
     """
 
     name: str
@@ -44,33 +44,33 @@ class Layer:
     prefix: str
 
     def rgb(self) -> Floats:
-        """(h, w, 3) float32, linear Rec.709, a copy. See `linear_rgb`."""
+        """Return a copy as (h, w, 3) float32, linear Rec.709. See `linear_rgb`."""
         return linear_rgb(self.part, self.prefix)
 
     def channel(self, *names: str) -> npt.NDArray[np.float32] | None:
-        """The first of these channels that the layer has, (h, w) float32."""
+        """Return the first of these channels that the layer has, (h, w) float32."""
         name = channel_named(self.part.channels, self.prefix, *names)
         return None if name is None else self.part.channels[name].astype(np.float32, copy=False)
 
 
 def colour_channels(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
-    """Layer (prefix) → its channels of red, green and blue, of layers that have all three."""
-    found = {}
-    for layer, here in _by_layer(names).items():
+    """Return layer (prefix) → its red, green and blue channels, for layers with all three."""
+    layers = {}
+    for layer, channels in _by_layer(names).items():
         for r, g, b in RGB_NAMES:
-            if layer not in found and r in here and g in here and b in here:
-                found[layer] = (here[r], here[g], here[b])
-    return found
+            if layer not in layers and r in channels and g in channels and b in channels:
+                layers[layer] = (channels[r], channels[g], channels[b])
+    return layers
 
 
 def channel_named(names: Iterable[str], layer: str, *lasts: str) -> str | None:
-    """The channel of `layer`, a prefix, whose name ends in the first of `lasts` that there is."""
-    here = _by_layer(names).get(layer, {})
-    return next((here[x] for x in map(str.casefold, lasts) if x in here), None)
+    """Return the channel of `layer`, a prefix, whose name ends in the first match of `lasts`."""
+    channels = _by_layer(names).get(layer, {})
+    return next((channels[x] for x in map(str.casefold, lasts) if x in channels), None)
 
 
 def _by_layer(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Layer → last part of a name, in lower case → the channel, the first if there are two."""
+    """Return layer → last part of a name, in lower case → the channel, the first of duplicates."""
     layers: dict[str, dict[str, str]] = {}
     for name in names:
         layer, _, last = name.rpartition(".")
@@ -79,11 +79,11 @@ def _by_layer(names: Iterable[str]) -> dict[str, dict[str, str]]:
 
 
 def linear_rgb(part: ExrPart, layer: str = "") -> Floats:
-    """The colour of `layer`, a prefix of channels in `part`, as (h, w, 3) float32 Rec.709.
+    """Return the colour of `layer`, a prefix of channels in `part`, as (h, w, 3) float32 Rec.709.
 
-    Its channels are R, G, B; or Y, which is grey; or Y, RY and BY, luminance and chroma.
-    Other primaries that the header declares are converted. Raises ImageError, listing what
-    is there, if it has none of these, or if its colours are of a space that is not known.
+    Its channels are R, G, B; or Y, which is grey; or Y, RY and BY, luminance and chroma. Other
+    primaries that the header declares are converted. Raises ImageError, listing the channels, if it
+    has none of these, or if its colour space is unknown.
     """
     primaries = primaries_of(part)
     if (names := colour_channels(part.channels).get(layer)) is not None:
@@ -100,14 +100,14 @@ def linear_rgb(part: ExrPart, layer: str = "") -> Floats:
     luminance = luminance.astype(np.float32, copy=False)
     chroma = [part.channels.get(_joined(layer, name)) for name in ("RY", "BY")]
     if chroma[0] is None or chroma[1] is None:
-        # A grey has the colour of white, and white is adapted.
+        # Grey needs no conversion: it has the colour of white, which is adapted.
         return np.repeat(luminance[..., None], 3, axis=-1)
     image = _from_chroma(luminance, chroma[0], chroma[1], primaries or REC709)
     return _in_rec709(image, primaries)
 
 
 def colour_layers(parts: Sequence[ExrPart]) -> list[Layer]:
-    """Every layer of a file that holds a colour, in the file's order, the unnamed one first."""
+    """Return every layer of a file that holds a colour, in the file's order, the unnamed first."""
     layers = []
     for part in parts:
         prefixes = dict.fromkeys(name.rpartition(".")[0] for name in part.channels)
@@ -116,12 +116,12 @@ def colour_layers(parts: Sequence[ExrPart]) -> list[Layer]:
     return layers
 
 
-def choose_layer(parts: Sequence[ExrPart], wanted: str | None = None) -> Layer:
-    """The layer called `wanted`: its name, that of its part or view, or its prefix.
+def choose_layer(parts: Sequence[ExrPart], requested: str | None = None) -> Layer:
+    """Return the layer called `requested`: by its name, its part's or view's name, or its prefix.
 
-    Without one, the only layer, or the only one without a prefix, unless Krita wrote it: there
-    it is the background alone. Raises ImageError, listing the layers, where there is none or more
-    than one.
+    Without a request it returns the only layer, or the only one without a prefix, unless Krita
+    wrote the file: there that layer is only the background. Raises ImageError, listing the layers,
+    if there is none or more than one.
     """
     layers = colour_layers(parts)
     if not layers:
@@ -129,7 +129,7 @@ def choose_layer(parts: Sequence[ExrPart], wanted: str | None = None) -> Layer:
         raise ImageError(
             f"is not an RGB image: no channels R, G, B or Y; it has {some_names(channels)}"
         )
-    if wanted is None:
+    if requested is None:
         if len(layers) > 1 and any(KRITA_LAYERS in part.attributes for part in parts):
             raise ImageError(
                 f"has {len(layers)} layers of Krita ({_names(layers)}) and no merged picture: "
@@ -138,18 +138,18 @@ def choose_layer(parts: Sequence[ExrPart], wanted: str | None = None) -> Layer:
         plain = [layer for layer in layers if not layer.prefix] or layers
         if len(plain) > 1:
             raise ImageError(
-                f"has {len(plain)} layers ({_names(plain)}), and which of them is meant cannot be "
-                "told: name it with layer=..., or export a single image"
+                f"has {len(plain)} layers ({_names(plain)}), and any of them could be meant: "
+                "name one with layer=..., or export a single image"
             )
         return plain[0]
-    for named in (
-        [layer for layer in layers if layer.name == wanted],
-        [layer for layer in layers if wanted in _views(layer)],
-        [layer for layer in layers if layer.prefix == wanted],
+    for matches in (
+        [layer for layer in layers if layer.name == requested],
+        [layer for layer in layers if requested in _views(layer)],
+        [layer for layer in layers if layer.prefix == requested],
     ):
-        if len(named) == 1:
-            return named[0]
-    raise ImageError(f"has no layer {wanted!r}: it has {_names(layers)}")
+        if len(matches) == 1:
+            return matches[0]
+    raise ImageError(f"has no layer {requested!r}: it has {_names(layers)}")
 
 
 def _names(layers: Sequence[Layer]) -> str:
@@ -163,7 +163,9 @@ def _layer_name(part: ExrPart, prefix: str, *, several: bool) -> str:
 
 
 def _views(layer: Layer) -> list[str]:
-    """Names of the view that the layer is: the part's, or the first of several in one part."""
+    """Return the names of the view that the layer is: the part's, or the first in a multi-view
+    part.
+    """
     if layer.prefix:
         return []
     return [v for v in (layer.part.attributes.get("view"), *layer.part.views[:1]) if v]
@@ -171,13 +173,13 @@ def _views(layer: Layer) -> list[str]:
 
 def _is_colour(part: ExrPart, prefix: str) -> bool:
     if _joined(prefix, "Y") in part.channels:
-        # Beside X it is no luminance but a direction or a place.
+        # With an X, this Y is a coordinate, not luminance.
         return _joined(prefix, "X") not in part.channels
     return prefix in colour_channels(part.channels)
 
 
 def _from_chroma(y: Floats, ry: Floats, by: Floats, primaries: tuple[float, ...]) -> Floats:
-    """RGB of luminance and RY = (R − Y)/Y, BY = (B − Y)/Y, as OpenEXR defines them."""
+    """Return RGB of luminance and RY = (R − Y)/Y, BY = (B − Y)/Y, as OpenEXR defines them."""
     red, green, blue = rgb_to_xyz(primaries)[1]
     image = np.empty((*y.shape, 3), np.float32)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -192,14 +194,14 @@ def _in_rec709(image: Floats, primaries: tuple[float, ...] | None) -> Floats:
 
 
 def primaries_of(part: ExrPart) -> tuple[float, ...] | None:
-    """Those that a part of an EXR declares, by numbers or by name; None for Rec.709's.
+    """Return the primaries that a part declares, by numbers or by name; None for Rec.709's.
 
-    Raises ImageError, without naming the file, for colours of a name that is not known as linear.
+    Raises ImageError, without naming the file, if the name is not that of a known linear space.
     """
     if part.primaries is not None:
         return None if is_rec709(part.primaries) else part.primaries
     space = part.attributes.get(COLOR_SPACE, "")
-    if space in UNSAID or space.startswith(("lin_rec709", "lin_srgb")):
+    if space in UNSPECIFIED or space.startswith(("lin_rec709", "lin_srgb")):
         return None
     if space not in SPACES:
         raise ImageError(

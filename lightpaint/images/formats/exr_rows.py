@@ -1,8 +1,8 @@
-"""Rows of a multi-part OpenEXR file, read when they are asked for.
+"""Reading single rows of a multi-part OpenEXR file.
 
-The OpenEXR project's own module reads whole files. What is needed to find rows in one is little:
-headers, tables of offsets, and lines without compression or by ZIP. Whatever else a file holds is
-left to that module.
+The OpenEXR project's own module reads whole files. Finding rows needs little: headers, tables of
+offsets, and lines that are uncompressed or compressed by ZIP. All other files are left to that
+module.
 """
 
 import os
@@ -23,34 +23,34 @@ from lightpaint.errors import ImageError
 
 MAGIC, MULTI_PART = 20000630, 0x1000
 
-#: Other kinds of parts, by the flags of the version: tiles, deep pixels.
-OTHERS = 0x200 | 0x800
+#: Version flags of parts that are not read here: tiles, deep pixels.
+UNSUPPORTED = 0x200 | 0x800
 
-#: Lines of a chunk by how they are compressed: not at all, each by ZIP, 16 by ZIP.
+#: Lines of a chunk by compression: none, ZIP of single lines, ZIP of 16 lines.
 LINES = {0: 1, 2: 1, 3: 16}
 
 TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 
-#: Bytes in which most headers are, and the longest that is looked at.
-FIRST_LOOK, MAX_HEADER = 2**18, 2**26
+#: Bytes that contain most headers, and the longest header that is read.
+FIRST_READ, MAX_HEADER = 2**18, 2**26
 
-#: Bytes of a part that are read at a time where all of it is.
-AT_A_TIME = 2**23
+#: Bytes that are read at a time when a whole part is read.
+READ_BYTES = 2**23
 
-#: Bytes before the pixels of a chunk: its part, its first line, how many bytes follow.
+#: Header of a chunk: its part, its first line, the number of bytes that follow.
 HEAD = struct.Struct("<iii")
 
 
-class NotByRowsError(Exception):
-    """A file of another kind than is read here."""
+class RowsUnsupportedError(Exception):
+    """A file of a kind that is not read here."""
 
 
 @dataclass(frozen=True)
 class PartLayout:
-    """Where the pixels of a part lie.
+    """The layout of a part's pixels in its file.
 
     display: (height, width) of the picture. channels: names and types in the order of the file.
-    texts: its text attributes. lines: rows of a chunk. offsets: (chunks,), of each in the file.
+    texts: its text attributes. lines: rows of a chunk. offsets: (chunks,), positions in the file.
     """
 
     number: int
@@ -69,9 +69,9 @@ class PartLayout:
 
 
 class RowFile:
-    """An open file whose rows are read when they are asked for; as it was when it was opened.
+    """An open file whose rows are read on request; later replacements do not affect it.
 
-    Raises NotByRowsError for a file that is not read so, and OSError.
+    Raises NotByRowsError for a file of another kind, and OSError.
     """
 
     def __init__(self, path: Path) -> None:
@@ -83,7 +83,7 @@ class RowFile:
         try:
             self.parts = self._all_layouts()
         except (IndexError, KeyError, ValueError, OverflowError, struct.error) as error:
-            raise NotByRowsError(str(error)) from error
+            raise RowsUnsupportedError(str(error)) from error
 
     def _read(self, start: int, count: int) -> bytes:
         if hasattr(os, "pread"):
@@ -97,29 +97,29 @@ class RowFile:
             return file.read(count)
 
     def _all_layouts(self) -> tuple[PartLayout, ...]:
-        """Return where all parts lie, from as much of the beginning as that takes."""
-        most = min(MAX_HEADER, self.length)
-        for length in (FIRST_LOOK, most):
+        """Return the layouts of all parts, reading as much of the beginning as needed."""
+        limit = min(MAX_HEADER, self.length)
+        for length in (FIRST_READ, limit):
             try:
-                return self._layouts(self._read(0, min(length, most)))
+                return self._layouts(self._read(0, min(length, limit)))
             except (IndexError, ValueError, struct.error):
-                if length >= most:
+                if length >= limit:
                     raise
-        raise NotByRowsError("no header")
+        raise RowsUnsupportedError("no header")
 
     def _layouts(self, head: bytes) -> tuple[PartLayout, ...]:
         magic, version = struct.unpack_from("<iI", head)
-        if magic != MAGIC or not version & MULTI_PART or version & OTHERS:
-            raise NotByRowsError("no file of several parts of lines")
-        at, headers = 8, []
-        while head[at]:
-            attributes, at = _attributes(head, at)
+        if magic != MAGIC or not version & MULTI_PART or version & UNSUPPORTED:
+            raise RowsUnsupportedError("not a multi-part file of scan lines")
+        position, headers = 8, []
+        while head[position]:
+            attributes, position = _attributes(head, position)
             headers.append(attributes)
-        at += 1
+        position += 1
         parts = []
         for number, attributes in enumerate(headers):
-            parts.append(_layout(number, attributes, head, at))
-            at += 8 * len(parts[-1].offsets)
+            parts.append(_layout(number, attributes, head, position))
+            position += 8 * len(parts[-1].offsets)
         return tuple(parts)
 
     def read_rows(
@@ -132,36 +132,38 @@ class RowFile:
         starts = dict(zip(part.channels, _starts(part), strict=True))
         first = top // part.lines
         for lines, begin in self._lines(part, first, -(-bottom // part.lines)):
-            its = slice(max(top, begin), min(bottom, begin + len(lines)))
-            inner = lines[its.start - begin : its.stop - begin]
-            for made, name in zip(into, names, strict=True):
-                made[its.start - top : its.stop - top] = _values(part, inner, starts, name)
+            rows = slice(max(top, begin), min(bottom, begin + len(lines)))
+            inner = lines[rows.start - begin : rows.stop - begin]
+            for target, name in zip(into, names, strict=True):
+                target[rows.start - top : rows.stop - top] = _values(part, inner, starts, name)
 
     def channels(self, part: PartLayout) -> dict[str, npt.NDArray[Any]]:
         """Read all channels of a part as they are stored, (h, w) each."""
         starts = dict(zip(part.channels, _starts(part), strict=True))
-        made = {name: np.empty(part.size, kind) for name, kind in part.channels.items()}
-        step = max(1, AT_A_TIME // (part.line_bytes * part.lines))
+        channels = {name: np.empty(part.size, kind) for name, kind in part.channels.items()}
+        step = max(1, READ_BYTES // (part.line_bytes * part.lines))
         for first in range(0, len(part.offsets), step):
             for lines, begin in self._lines(part, first, first + step):
-                for name, its in made.items():
-                    its[begin : begin + len(lines)] = _values(part, lines, starts, name)
-        return made
+                for name, pixels in channels.items():
+                    pixels[begin : begin + len(lines)] = _values(part, lines, starts, name)
+        return channels
 
     def _lines(
         self, part: PartLayout, first: int, last: int
     ) -> Sequence[tuple[npt.NDArray[np.uint8], int]]:
-        """Bytes of the rows of some chunks, (rows, line_bytes) each, and the row they begin at."""
+        """Return the bytes of the rows of some chunks, (rows, line_bytes) each, with their first
+        row.
+        """
         offsets, size = part.offsets[first:last], part.line_bytes
         if not part.is_packed and len(offsets):
             stride = HEAD.size + size
-            if (np.diff(offsets) == stride).all():  # one behind the other
+            if (np.diff(offsets) == stride).all():  # contiguous
                 data = self._read(int(offsets[0]), stride * len(offsets))
                 if len(data) != stride * len(offsets):
                     raise self._damaged()
                 lines = np.frombuffer(data, np.uint8).reshape(-1, stride)[:, HEAD.size :]
                 return [(lines, first)]
-        made = []
+        blocks = []
         for k, offset in enumerate(offsets.tolist(), first):
             begin = k * part.lines
             rows = min(part.lines, part.size[0] - begin)
@@ -176,43 +178,43 @@ class RowFile:
                 data = _unpacked(data, rows * size)
             if len(data) != rows * size:
                 raise self._damaged()
-            made.append((np.frombuffer(data, np.uint8).reshape(rows, size), begin))
-        return made
+            blocks.append((np.frombuffer(data, np.uint8).reshape(rows, size), begin))
+        return blocks
 
     def _damaged(self) -> ImageError:
         return ImageError(f"{self.path} is cut off or damaged: make it again")
 
 
-def _attributes(head: bytes, at: int) -> tuple[dict[str, tuple[str, bytes]], int]:
-    """Name → type and value of the attributes of the header at `at`, and where it ends."""
-    found = {}
-    while head[at]:
-        name, at = _text(head, at)
-        kind, at = _text(head, at)
-        (size,) = struct.unpack_from("<i", head, at)
-        if not 0 <= size <= len(head) - at - 4:
+def _attributes(head: bytes, position: int) -> tuple[dict[str, tuple[str, bytes]], int]:
+    """Return name → type and value of the attributes of the header at `position`, and its end."""
+    attributes = {}
+    while head[position]:
+        name, position = _text(head, position)
+        kind, position = _text(head, position)
+        (size,) = struct.unpack_from("<i", head, position)
+        if not 0 <= size <= len(head) - position - 4:
             raise ValueError("an attribute is longer than the file")
-        found[name] = kind, head[at + 4 : at + 4 + size]
-        at += 4 + size
-    return found, at + 1
+        attributes[name] = kind, head[position + 4 : position + 4 + size]
+        position += 4 + size
+    return attributes, position + 1
 
 
-def _text(head: bytes, at: int) -> tuple[str, int]:
-    end = head.index(b"\0", at)
-    return head[at:end].decode(), end + 1
+def _text(head: bytes, position: int) -> tuple[str, int]:
+    end = head.index(b"\0", position)
+    return head[position:end].decode(), end + 1
 
 
 def _layout(
-    number: int, attributes: Mapping[str, tuple[str, bytes]], head: bytes, at: int
+    number: int, attributes: Mapping[str, tuple[str, bytes]], head: bytes, position: int
 ) -> PartLayout:
     values = {name: value for name, (_, value) in attributes.items()}
     if values["type"] != b"scanlineimage" or values["compression"][0] not in LINES:
-        raise NotByRowsError("tiles, or another compression")
+        raise RowsUnsupportedError("tiles, or another compression")
     windows = [struct.unpack("<4i", values[name]) for name in ("dataWindow", "displayWindow")]
     left, top, right, bottom = windows[0]
     size = bottom - top + 1, right - left + 1
     if (left, top) != windows[1][:2] or min(size) < 1:
-        raise NotByRowsError("a crop, or a margin")
+        raise RowsUnsupportedError("a crop, or a margin")
     channels: dict[str, np.dtype[Any]] = {}
     end = 0
     table = values["channels"]
@@ -220,13 +222,13 @@ def _layout(
         name, end = _text(table, end)
         kind, _, wide, high = struct.unpack_from("<iIii", table, end)
         if (wide, high) != (1, 1):
-            raise NotByRowsError("chroma of lower resolution")
+            raise RowsUnsupportedError("chroma of lower resolution")
         channels[name], end = TYPES[kind], end + 16
     lines = LINES[values["compression"][0]]
     chunks = -(-size[0] // lines)
-    offsets = np.frombuffer(head, "<i8", chunks, at)
+    offsets = np.frombuffer(head, "<i8", chunks, position)
     if values["lineOrder"][0] > 1:
-        raise NotByRowsError("lines in any order")
+        raise RowsUnsupportedError("lines in any order")
     texts = {name: value.decode() for name, (kind, value) in attributes.items() if kind == "string"}
     is_packed = values["compression"] != b"\0"
     shown = windows[1][3] - windows[1][1] + 1, windows[1][2] - windows[1][0] + 1
@@ -237,38 +239,38 @@ def _layout(
 def _values(
     part: PartLayout, lines: npt.NDArray[np.uint8], starts: Mapping[str, int], name: str
 ) -> npt.NDArray[Any]:
-    """Return the numbers of a channel in the bytes of some rows, (rows, w)."""
+    """Return the values of a channel, (rows, w), in the bytes of some rows."""
     kind, start = part.channels[name], starts[name]
     return np.ascontiguousarray(lines[:, start : start + part.size[1] * kind.itemsize]).view(kind)
 
 
 def _starts(part: PartLayout) -> list[int]:
-    """Where the channels begin in the bytes of a row."""
+    """Return the positions of the channels in the bytes of a row."""
     sizes = [part.size[1] * kind.itemsize for kind in part.channels.values()]
     return [sum(sizes[:k]) for k in range(len(sizes))]
 
 
 def zip_filtered(data: bytes) -> bytes:
-    """Return bytes as ZIP packs them best: as differences, every other byte before the rest."""
+    """Return bytes filtered for ZIP: differences, every other byte before the rest."""
     values = np.frombuffer(data, np.uint8)
-    apart = np.concatenate([values[0::2], values[1::2]])
-    steps = np.empty_like(apart)
-    steps[:1] = apart[:1]
-    np.subtract(apart[1:], apart[:-1], out=steps[1:])
+    separated = np.concatenate([values[0::2], values[1::2]])
+    steps = np.empty_like(separated)
+    steps[:1] = separated[:1]
+    np.subtract(separated[1:], separated[:-1], out=steps[1:])
     steps[1:] += np.uint8(128)
     return steps.tobytes()
 
 
-def _unpacked(data: bytes, size: int) -> bytes:
-    """Return bytes that ZIP has packed, as they were before `zip_filtered`."""
+def _unpacked(compressed: bytes, size: int) -> bytes:
+    """Return ZIP-compressed bytes as they were before `zip_filtered`."""
     try:
-        packed = np.frombuffer(zlib.decompress(data, bufsize=size), np.uint8)
+        packed = np.frombuffer(zlib.decompress(compressed, bufsize=size), np.uint8)
     except zlib.error:
         return b""
     steps = packed - np.uint8(128)
     steps[:1] = packed[:1]
     values = np.cumsum(steps, dtype=np.uint8)
-    made = np.empty_like(values)
+    unfiltered = np.empty_like(values)
     half = -(-values.size // 2)
-    made[0::2], made[1::2] = values[:half], values[half:]
-    return made.tobytes()
+    unfiltered[0::2], unfiltered[1::2] = values[:half], values[half:]
+    return unfiltered.tobytes()

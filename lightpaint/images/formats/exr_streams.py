@@ -1,7 +1,7 @@
-"""Writing a multi-part OpenEXR file one part after the other, of which one is in memory at a time.
+"""Writing a multi-part OpenEXR file part by part, with only one part in memory.
 
-The OpenEXR project's own module takes all pixels of a file at once. What is needed to write scan
-lines is little: headers, tables of offsets, and lines as they are or packed by ZIP.
+The OpenEXR project's own module takes all pixels of a file at once. Writing scan lines needs
+little: headers, tables of offsets, and lines that are uncompressed or compressed by ZIP.
 """
 
 import struct
@@ -19,19 +19,19 @@ from lightpaint.images.formats.exr import VERSION_KEY, Channels, is_worth_packin
 from lightpaint.images.formats.exr_rows import HEAD, LINES, MAGIC, MULTI_PART, TYPES, zip_filtered
 from lightpaint.version import __version__
 
-#: Flags of a file: its version, and that a name is longer than 31 characters.
+#: Version number of a file, flag for names longer than 31 characters, and that length.
 VERSION, LONG_NAMES, LONGEST_NAME = 2, 0x400, 31
 
-#: OpenEXR's numbers for lines as they are, and 16 of them packed by ZIP; and how hard it packs.
+#: OpenEXR's numbers for no compression and for ZIP of 16 lines; and the level of ZIP.
 PLAIN, ZIPPED, LEVEL = 0, 3, 4
 
 
 @dataclass(frozen=True)
 class PartHead:
-    """A part without its pixels.
+    """The header of a part.
 
     size: (height, width). channels: name → type of its pixels. texts: its text attributes.
-    display: (height, width) of the picture, `size` for None. is_packed: whether ZIP packs it.
+    display: (height, width) of the picture; None for `size`. is_packed: True to compress by ZIP.
     """
 
     name: str
@@ -50,9 +50,9 @@ class PartHead:
         *,
         display: tuple[int, int] | None = None,
     ) -> "PartHead":
-        """Return the head of a part that is to have these pixels, packed where that helps."""
+        """Return the header of a part with these pixels, compressed where that helps."""
         height, width = next(iter(channels.values())).shape
-        kinds = {its: pixels.dtype for its, pixels in channels.items()}
+        kinds = {channel: pixels.dtype for channel, pixels in channels.items()}
         packed = is_worth_packing(channels)
         return cls(name, (height, width), kinds, texts or {}, display, packed)
 
@@ -63,11 +63,11 @@ class PartHead:
 
     @property
     def chunks(self) -> int:
-        """How many chunks its pixels are."""
+        """Number of chunks of its pixels."""
         return -(-self.size[0] // self.lines)
 
     def encoded(self) -> bytes:
-        """Return the attributes as they stand in the file."""
+        """Return the header's attributes as bytes of the file."""
         height, width = self.size
         shown = self.display or self.size
         window = struct.pack("<4i", 0, 0, width - 1, height - 1)
@@ -92,21 +92,23 @@ class PartHead:
         )
 
     def _table(self) -> bytes:
-        """Names and types of the channels, in the order in which a line has them."""
+        """Return names and types of the channels, in their order in a line."""
         kinds = {kind: number for number, kind in TYPES.items()}
-        made = [
+        entries = [
             name.encode() + b"\0" + struct.pack("<iIii", kinds[self.channels[name]], 0, 1, 1)
             for name in sorted(self.channels)
         ]
-        return b"".join([*made, b"\0"])
+        return b"".join([*entries, b"\0"])
 
     def packed(self, channels: Channels) -> Iterator[tuple[int, bytes]]:
         """Yield the first line and the bytes of each chunk of the pixels."""
         for first in range(0, self.size[0], self.lines):
-            its = slice(first, first + self.lines)
-            # A line has its channels one behind the other.
+            rows = slice(first, first + self.lines)
+            # A line holds its channels one after the other.
             parts = [
-                np.ascontiguousarray(channels[name][its]).view(np.uint8).reshape(-1, self._bytes(n))
+                np.ascontiguousarray(channels[name][rows])
+                .view(np.uint8)
+                .reshape(-1, self._bytes(n))
                 for name, n in ((name, self.channels[name].itemsize) for name in sorted(channels))
             ]
             data = np.concatenate(parts, axis=1).tobytes()
@@ -122,15 +124,15 @@ class PartHead:
 def write_streamed(
     path: Path, heads: Sequence[PartHead], pixels: Iterable[Mapping[str, npt.NDArray[Any]]]
 ) -> None:
-    """Write a multi-part EXR, whole or not at all.
+    """Write a multi-part EXR, all of it or nothing.
 
-    pixels: of each part in the order of `heads`, its channels of the types and the size that its
-    head says. All parts must have one display window. The first says which version of lightpaint
-    wrote it. Raises OutputError for whatever the system refuses.
+    pixels: the channels of each part, in the order of `heads`, of the types and size in its head.
+    All parts must have the same display window. The first records the version of lightpaint. Raises
+    OutputError for every refusal of the system.
     """
     texts = {VERSION_KEY: __version__, **heads[0].texts}
     heads = [replace(heads[0], texts=texts), *heads[1:]]
-    with replacing(path) as beside, beside.open("wb") as file:
+    with replacing(path) as temporary, temporary.open("wb") as file:
         _write(file, heads, pixels)
 
 
@@ -144,7 +146,7 @@ def _write(
         file.write(head.encoded())
     file.write(b"\0")
     table = file.tell()
-    # Where chunks lie is known when they have been written.
+    # The positions of chunks are known only after writing them.
     file.write(bytes(8 * sum(head.chunks for head in heads)))
     offsets = []
     for number, (head, channels) in enumerate(zip(heads, pixels, strict=True)):

@@ -1,4 +1,4 @@
-"""Which kind of picture a file is, by how it begins: its name says nothing."""
+"""The format of a picture file, from its first bytes instead of its name."""
 
 import sys
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 from lightpaint.errors import ImageError
 from lightpaint.files import file_length, is_utf_8, one_line
 
-#: How files begin, what people call them, and the kind as which they are read; "" if they are not.
-BEGINNINGS = (
+#: First bytes of files, their usual name, and the kind that reads them; "" if they are not read.
+SIGNATURES = (
     (b"\x76\x2f\x31\x01", "OpenEXR", "exr"),
     (b"\x89PNG\r\n\x1a\n", "PNG", "png"),
     (b"\xff\xd8\xff", "JPEG", "jpeg"),
@@ -28,9 +28,9 @@ BEGINNINGS = (
 
 
 def head_of(path: Path, length: int) -> bytes:
-    """How an image file begins. Raises ImageError if there is none that can be read."""
-    if not is_utf_8(path):  # as all libraries want it that read pixels
-        raise ImageError(f"{one_line(str(path))} is not a name in UTF-8: rename the file")
+    """Return the first bytes of an image file. Raises ImageError if it cannot be read."""
+    if not is_utf_8(path):  # which the libraries that read pixels require
+        raise ImageError(f"{one_line(str(path))} is a name that is not UTF-8: rename the file")
     file_length(path, "image file", ImageError, limit=sys.maxsize)
     try:
         with path.open("rb") as file:
@@ -40,10 +40,10 @@ def head_of(path: Path, length: int) -> bytes:
 
 
 def kind_of(head: bytes) -> str:
-    """`exr`, `png`, `jpeg`, `tiff`, `psd` or `zip`; "" for what is not read."""
-    return next((kind for mark, _, kind in BEGINNINGS if head.startswith(mark)), "")
+    """Return `exr`, `png`, `jpeg`, `tiff`, `psd` or `zip`; "" for files that are not read."""
+    return next((kind for mark, _, kind in SIGNATURES if head.startswith(mark)), "")
 
 
 def name_of(head: bytes) -> str:
-    """What people call such a file; "" if nobody knows."""
-    return next((name for mark, name, _ in BEGINNINGS if head.startswith(mark)), "")
+    """Return the usual name of the format of such a file; "" if it is unknown."""
+    return next((name for mark, name, _ in SIGNATURES if head.startswith(mark)), "")

@@ -1,4 +1,4 @@
-"""OpenRaster's and Krita's layered files: zip archives with a merged picture in them, a PNG."""
+"""Layered files of OpenRaster and Krita: zip archives that contain a merged picture, a PNG."""
 
 import struct
 import tempfile
@@ -13,14 +13,14 @@ from lightpaint.images.formats.bitmap import Bitmap, read_bitmap
 from lightpaint.images.formats.file_kinds import kind_of
 from lightpaint.images.formats.png import PNG_HEAD, longest_png
 
-#: What a layered zip says it is, and where its merged picture lies.
+#: Media types of layered zip archives, and the name of their merged picture.
 LAYERED = {b"image/openraster": "ora", b"application/x-krita": "kra"}
 MERGED = "mergedimage.png"
 
 #: Longest merged picture that is unpacked, in bytes.
 MAX_MERGED = 2**30
 
-#: What reading a damaged archive raises: its places and lengths may be any numbers.
+#: Errors of reading a damaged archive, whose offsets and lengths may be any numbers.
 DAMAGES = (
     zipfile.BadZipFile,
     NotImplementedError,
@@ -34,17 +34,19 @@ DAMAGES = (
 
 
 def layered_kind(path: Path, head: bytes) -> str:
-    """OpenRaster and Krita name themselves in their first member, which is not compressed."""
+    """Return `ora` or `kra`, from the archive's first member, which is not compressed."""
     length = int.from_bytes(head[26:28], "little") + int.from_bytes(head[28:30], "little")
-    said = head[30 + length :]
+    media_type = head[30 + length :]
     for mark, kind in LAYERED.items():
-        if said.startswith(mark):
+        if media_type.startswith(mark):
             return kind
-    raise ImageError(f"{path} is a zip archive, but neither OpenRaster's nor Krita's")
+    raise ImageError(
+        f"{path} is a zip archive, but not one of OpenRaster or Krita: export it as PNG or OpenEXR"
+    )
 
 
 def read_merged(path: Path, kind: str) -> Bitmap:
-    """The merged picture of such a file. Raises ImageError, without naming the file."""
+    """Return the merged picture of such a file. Raises ImageError without the file's name."""
     try:
         with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
             member = archive.getinfo(MERGED)
@@ -54,7 +56,7 @@ def read_merged(path: Path, kind: str) -> Bitmap:
             with archive.open(member) as packed, merged.open("wb") as unpacked:
                 head = packed.read(PNG_HEAD)
                 if kind_of(head) != "png":
-                    raise ImageError("has a merged picture that is no PNG")
+                    raise ImageError("has a merged picture that is not a PNG: save it again")
                 if member.file_size > longest_png(head):
                     raise ImageError("is damaged: its merged picture is longer than it can be")
                 unpacked.write(head)
@@ -63,12 +65,12 @@ def read_merged(path: Path, kind: str) -> Bitmap:
     except KeyError:
         raise ImageError(f"has no merged picture ({MERGED}): save it again") from None
     except DAMAGES as error:
-        # The archive's own names stand in the message, and may be anything.
+        # The message contains names from the archive, which may be anything.
         raise ImageError(f"is damaged: {ascii(str(error))[1:-1][:200]}") from error
 
 
 def _copy(source: IO[bytes], target: IO[bytes], length: int) -> None:
-    """Copy what the archive declares, and see that it is no more."""
+    """Copy as much as the archive declares; refuse more."""
     copied = 0
     while chunk := source.read(2**20):
         copied += len(chunk)

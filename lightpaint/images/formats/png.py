@@ -1,4 +1,4 @@
-"""PNG files: of 8 bits to look at, of 16 to paint on and read back, and what one says of itself."""
+"""PNG files: 8 bits to look at, 16 bits to paint on and read back, and their metadata."""
 
 import io
 import struct
@@ -24,25 +24,25 @@ from lightpaint.keywords import keywords
 #: Longest chunk before a PNG's pixels, in bytes: profiles of printers have a few million.
 MAX_CHUNK = 2**24
 
-#: Bytes of a PNG that say its size.
+#: Length in bytes of a PNG's head, which declares its size.
 PNG_HEAD = 26
 
-#: Bytes of a PNG in which its texts stand.
+#: Bytes at the start of a PNG in which its texts are searched.
 MAX_TEXTS = 2**12
 
-#: Effort of compression: renders come out no larger than at 6, the usual, in a third of the time.
-EFFORT = 3
+#: Level of compression: renders come out no larger than at the usual 6, in a third of the time.
+COMPRESSION_LEVEL = 3
 
-#: Text in a PNG that names the view transform it was shown through.
+#: Key of the text in a PNG that names its view transform.
 TRANSFORM_KEY = "lightpaint.view"
 
 
 def write_png_16(
     path: Path, image_display: Floats, *, texts: Mapping[str, str] | None = None
 ) -> None:
-    """Write display values in [0, 1], (h, w) or (h, w, 3), as a 16-bit PNG, whole or not at all.
+    """Write display values in [0, 1], (h, w) or (h, w, 3), as a 16-bit PNG, all of it or nothing.
 
-    texts: Latin-1, kept in the file.
+    texts: Latin-1, stored in the file.
     """
     import OpenImageIO
 
@@ -51,26 +51,28 @@ def write_png_16(
     spec = OpenImageIO.ImageSpec(width, height, 1 if values.ndim == 2 else 3, "uint16")
     for key, text in (texts or {}).items():
         spec.attribute(key, text)
-    with replacing(path) as beside:
+    with replacing(path) as temporary:
         output = OpenImageIO.ImageOutput.create("png")
-        assert output is not None  # which formats there are is decided when it is built
-        done = output.open(str(beside), spec) and output.write_image(np.ascontiguousarray(values))
+        assert output is not None  # OpenImageIO is always built with PNG
+        done = output.open(str(temporary), spec) and output.write_image(
+            np.ascontiguousarray(values)
+        )
         if not (output.close() and done):
             raise OutputError(f"cannot write {path}: {output.geterror() or 'no reason given'}")
 
 
 def png_bytes(image_8_bit: npt.NDArray[Any], texts: Mapping[str, str] | None = None) -> bytes:
-    """An (h, w, 3) or (h, w, 4) uint8 image as a PNG file, with these Latin-1 texts in it."""
-    said = PngInfo()
+    """Return an (h, w, 3) or (h, w, 4) uint8 image as a PNG file with these Latin-1 texts."""
+    info = PngInfo()
     for key, text in (texts or {}).items():
-        said.add_text(key, text)
+        info.add_text(key, text)
     buffer = io.BytesIO()
-    Image.fromarray(image_8_bit).save(buffer, "PNG", pnginfo=said, compress_level=EFFORT)
+    Image.fromarray(image_8_bit).save(buffer, "PNG", pnginfo=info, compress_level=COMPRESSION_LEVEL)
     return buffer.getvalue()
 
 
-def png_says(path: Path, key: str) -> bool:
-    """Whether the file at `path` is a PNG that `png_bytes` wrote with a text of that key."""
+def png_has_text(path: Path, key: str) -> bool:
+    """Return True if the file at `path` is a PNG of `png_bytes` with a text of that key."""
     with path.open("rb") as file:
         head = file.read(MAX_TEXTS)
     return head.startswith(b"\x89PNG") and b"tEXt" + key.encode() + b"\0" in head
@@ -78,7 +80,7 @@ def png_says(path: Path, key: str) -> bool:
 
 @keywords()
 def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1) -> Image.Image:
-    """A linear image as a picture that a notebook shows.
+    """Return a linear image as a picture that notebooks show.
 
     Args:
         image: (h, w, 3) linear.
@@ -97,29 +99,29 @@ def display_picture(image: Floats, *, stops: float | None = None, zoom: int = 1)
 def write_png(
     path: Path, image: Floats, *, stops: float = 0.0, texts: Mapping[str, str] | None = None
 ) -> None:
-    """Write a linear image display-encoded as 8-bit sRGB PNG, whole or not at all."""
+    """Write a linear image, display-encoded, as 8-bit sRGB PNG, all of it or nothing."""
     write_bytes(path, png_bytes(to_8_bit(encode_display(image, stops=stops)), texts))
 
 
 def longest_png(head: bytes) -> int:
-    """Return the most bytes that a PNG which begins like `head` has any use for.
+    """Return the largest plausible size in bytes of a PNG that begins like `head`.
 
-    That is what its pixels take without compression, and room for profiles, texts and a thumbnail.
-    Raises ImageError, without naming the file, for what does not begin like one.
+    That is the size of its pixels without compression, plus space for profiles, texts and a
+    thumbnail. Raises ImageError, without naming the file, if it does not begin like a PNG.
     """
     if len(head) < PNG_HEAD or not head.startswith(b"\x89PNG\r\n\x1a\n"):
         raise ImageError("is damaged: it does not begin like a PNG")
     width, height, bits, colour = struct.unpack_from(">IIBB", head, 16)
     channels = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(colour, 4)
-    # Adam7 has seven pictures, each with a byte for each of its rows.
+    # Adam7 interlacing has seven pictures, each with one extra byte per row.
     row = -(-width * channels * bits // 8) + 1
     return int(2 * MAX_CHUNK + 8 * height + row * height * 1001 // 1000)
 
 
 def read_png_head(path: Path) -> tuple[str | None, Profile | None]:
-    """What the small chunks of a PNG say: the transform it was made with, and its colours.
+    """Return the view transform that a PNG declares in its small chunks, and its colour profile.
 
-    The order is the standard's: cICP, iCCP, sRGB, then gAMA and cHRM.
+    The precedence is the standard's: cICP, iCCP, sRGB, then gAMA and cHRM.
     """
     chunks = dict(_chunks(path))
     text = chunks.get(b"tEXt", b"")
@@ -135,17 +137,17 @@ def read_png_head(path: Path) -> tuple[str | None, Profile | None]:
         primaries = (*rgb, wx, wy)
     encoding = int.from_bytes(gamma, "big") / 1e5
     if not encoding or (abs(encoding - 1 / 2.2) < 1e-3 and is_rec709(primaries)):
-        return shown, None  # how sRGB is written in these chunks
+        return shown, None  # these chunks describe sRGB
     try:
         return shown, gamma_profile(1 / encoding, primaries)
     except ValueError as error:
-        raise ImageError(f"declares colours that make no sense: {error}") from error
+        raise ImageError(f"declares impossible colours: {error}") from error
 
 
 def _chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
-    """Type and content of the chunks before the pixels, of which only ours of the texts.
+    """Yield type and content of the chunks before the pixels; of texts, only our own.
 
-    Raises ImageError where a checksum is wrong: the library would do without that chunk.
+    Raises ImageError if a checksum is wrong: the library would ignore that chunk.
     """
     with path.open("rb") as file:
         file.seek(8)
@@ -161,7 +163,7 @@ def _chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _of_cicp(content: bytes) -> Profile | None:
-    """Coding-independent code points (ITU-T H.273): sRGB and Display P3."""
+    """Return the profile of coding-independent code points (ITU-T H.273): sRGB, Display P3."""
     srgb, display_p3 = b"\x01\x0d", b"\x0c\x0d"
     if content[:2] == srgb:
         return None

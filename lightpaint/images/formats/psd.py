@@ -1,4 +1,4 @@
-"""Whether a Photoshop file holds what can be read of it: its merged picture, in grey or RGB."""
+"""Checks that a Photoshop file has a merged picture in grey or RGB, which is all that is read."""
 
 import struct
 from collections.abc import Iterator
@@ -9,16 +9,16 @@ import numpy as np
 
 from lightpaint.errors import ImageError
 
-#: Its colour modes: what may be read, and what else they are called.
+#: Colour modes that are read, and names of those that are not.
 PSD_COLOURS = {1: "grey", 3: "RGB"}
 PSD_OTHERS = {0: "black and white", 2: "indexed colours", 4: "CMYK", 7: "multichannel", 9: "Lab"}
 
 
-def check_psd(path: Path, *, most: int) -> bool:
-    """Refuse Photoshop files of other colours, and those without the merged picture.
+def check_psd(path: Path, *, max_pixels: int) -> bool:
+    """Refuse Photoshop files of other colour modes, and those without a merged picture.
 
-    most: pixels that are read. Returns whether a channel beside the colours is transparency, and
-    not a saved selection.
+    max_pixels: most pixels that are read. Returns True if an extra channel is transparency, and not
+    a saved selection.
     """
     with path.open("rb") as file:
         head = file.read(26)
@@ -29,7 +29,7 @@ def check_psd(path: Path, *, most: int) -> bool:
             named = PSD_OTHERS.get(mode, f"colours of kind {mode}")
             raise ImageError(f"holds {named}: convert it to RGB and save it again")
         height, width = struct.unpack(">II", head[14:22])
-        if height * width > most:
+        if height * width > max_pixels:
             raise ImageError(f"declares {width}x{height} pixels: too many to read")
         file.seek(int.from_bytes(file.read(4), "big"), 1)
         length = int.from_bytes(file.read(4), "big")
@@ -40,17 +40,17 @@ def check_psd(path: Path, *, most: int) -> bool:
         file.seek(length - len(layers), 1)
         _check_packed_rows(file, head)
     for ident, data in _resources(resources):
-        # VersionInfo: a version, then whether the merged picture is there.
+        # VersionInfo: a version, then a flag for the merged picture.
         if ident == 1057 and len(data) >= 5 and not data[4]:
             raise ImageError(
                 "has no merged picture: save it with maximised compatibility, or export a PNG"
             )
-    # The number of layers is negative then.
+    # With transparency the number of layers is negative.
     return len(layers) == 6 and layers[4] >= 0x80
 
 
 def _check_packed_rows(file: BinaryIO, head: bytes) -> None:
-    """Refuse rows that are too short for their pixels: the library leaves them out in silence."""
+    """Refuse rows that are too short for their pixels, which the library skips silently."""
     if file.read(2) != b"\0\1":
         return
     channels, height, width, depth = struct.unpack(">HIIH", head[12:24])
@@ -62,11 +62,11 @@ def _check_packed_rows(file: BinaryIO, head: bytes) -> None:
 
 
 def _resources(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """(number, content) of each image resource block of a Photoshop file."""
-    at = 0
-    while data[at : at + 4] == b"8BIM" and at + 12 <= len(data):
-        ident = int.from_bytes(data[at + 4 : at + 6], "big")
-        at += 6 + (data[at + 6] // 2 + 1) * 2  # a name, padded to an even length
-        length = int.from_bytes(data[at : at + 4], "big")
-        yield ident, data[at + 4 : at + 4 + length]
-        at += 4 + length + length % 2
+    """Yield number and content of each image resource block of a Photoshop file."""
+    position = 0
+    while data[position : position + 4] == b"8BIM" and position + 12 <= len(data):
+        ident = int.from_bytes(data[position + 4 : position + 6], "big")
+        position += 6 + (data[position + 6] // 2 + 1) * 2  # a name, padded to an even length
+        length = int.from_bytes(data[position : position + 4], "big")
+        yield ident, data[position + 4 : position + 4 + length]
+        position += 4 + length + length % 2

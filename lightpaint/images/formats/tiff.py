@@ -1,7 +1,7 @@
-"""Whether the numbers in a TIFF's head agree with each other and with the file.
+"""Checks that the numbers in a TIFF's header agree with each other and with the file.
 
-The library fills what is missing by rules of its own, in silence: a head that has lost a field, or
-names fewer strips than the picture needs, would be read as another picture.
+The library silently fills in missing fields by rules of its own: a header that has lost a field, or
+lists fewer strips than the picture needs, would be read as another picture.
 """
 
 import struct
@@ -17,23 +17,23 @@ TILES = (324, 325)
 ROWS_PER_STRIP, TILE_WIDTH, TILE_HEIGHT = 278, 322, 323
 TYPES = {1: ("B", 1), 3: ("H", 2), 4: ("I", 4), 16: ("Q", 8)}
 
-#: More values than a field of these has in any picture that is read.
+#: Largest count of a field: pictures that are read have fewer values in each.
 MAX_COUNT = 2**22
 
 Fields = dict[int, tuple[int, ...]]
 
 
 def check_tiff(path: Path) -> None:
-    """Raise ImageError unless the first picture of a TIFF is all there, as its head says."""
+    """Raise ImageError unless the first picture of a TIFF is complete."""
     size = path.stat().st_size
     try:
         with path.open("rb") as file:
             fields = _first_directory(file)
     except (struct.error, ValueError, OverflowError, OSError):
-        # Too short, or a place that no file has.
+        # Too short, or an impossible offset.
         raise ImageError("is cut off or damaged") from None
     if not {WIDTH, HEIGHT, BITS} <= fields.keys():
-        raise ImageError("is damaged: its head does not give width, height and bits")
+        raise ImageError("is damaged: its header lacks width, height or bits: export it again")
     width, height = _one(fields, WIDTH), _one(fields, HEIGHT)
     samples, planar = _one(fields, SAMPLES, 1), _one(fields, PLANAR, 1)
     bits = fields[BITS]
@@ -47,7 +47,7 @@ def check_tiff(path: Path) -> None:
 def _check_chunks(
     fields: Fields, image: tuple[int, int], samples: int, planar: int, bits: int, size: int
 ) -> None:
-    """All strips or tiles are there, within the file, and as long as their pixels need."""
+    """Check that all strips or tiles exist, lie in the file, and hold all their pixels."""
     height, width = image
     if TILE_WIDTH in fields:
         chunk = _one(fields, TILE_HEIGHT), _one(fields, TILE_WIDTH)
@@ -56,12 +56,12 @@ def _check_chunks(
         chunk = min(_one(fields, ROWS_PER_STRIP, height), height), width
         names = STRIPS
     if min(*chunk, width, height, samples) < 1 or planar not in (1, 2):
-        raise ImageError("is damaged: its head makes no sense")
+        raise ImageError("is damaged: the numbers in its header are impossible")
     count = -(-height // chunk[0]) * -(-width // chunk[1]) * (samples if planar == 2 else 1)
     offsets, lengths = (fields.get(name, ()) for name in names)
     if not len(offsets) == len(lengths) == count:
         raise ImageError(
-            f"is damaged: it needs {count} strips or tiles, and names {len(offsets)} places and "
+            f"is damaged: it needs {count} strips or tiles, but lists {len(offsets)} offsets and "
             f"{len(lengths)} lengths"
         )
     if any(start + length > size for start, length in zip(offsets, lengths, strict=True)):
@@ -86,8 +86,8 @@ def _first_directory(file: BinaryIO) -> Fields:
     head = file.read(16)
     order = {b"II": "<", b"MM": ">"}[head[:2]]
     big = struct.unpack(order + "H", head[2:4]) == (43,)
-    place = struct.unpack(order + ("Q" if big else "I"), head[8:16] if big else head[4:8])[0]
-    file.seek(place)
+    offset = struct.unpack(order + ("Q" if big else "I"), head[8:16] if big else head[4:8])[0]
+    file.seek(offset)
     entry, inline = (20, 8) if big else (12, 4)
     (count,) = struct.unpack(order + ("Q" if big else "H"), file.read(8 if big else 2))
     if count > 4096:
@@ -102,8 +102,8 @@ def _first_directory(file: BinaryIO) -> Fields:
         letter, width = TYPES[kind]
         value = entries[(k + 1) * entry - inline : (k + 1) * entry]
         if length * width > inline:
-            (place,) = struct.unpack(order + ("Q" if big else "I"), value)
-            file.seek(place)
+            (offset,) = struct.unpack(order + ("Q" if big else "I"), value)
+            file.seek(offset)
             value = file.read(length * width)
         if length and name not in fields:
             fields[name] = struct.unpack_from(f"{order}{length}{letter}", value)

@@ -5,7 +5,7 @@ from html import escape
 import numpy as np
 
 from lightpaint.colour.color import cct_and_duv
-from lightpaint.colour.hue import spoken_hue
+from lightpaint.colour.hue_names import hue_name
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.fit import Colors
 from lightpaint.report.page.html import row, table
@@ -41,7 +41,7 @@ def spoken_turn(choice: ColorChoice) -> str:
     if not choice.light:
         return ""
     before, after = (np.array(x) for x in (choice.before, choice.color))
-    words = [spoken_hue(x) for x in (before, after)]
+    words = [hue_name(x) for x in (before, after)]
     whites = [cct_and_duv(x) for x in (before, after)]
     if words[0] != words[1]:
         how = words[1]

@@ -22,7 +22,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.photometry import photometry
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.denoiser import denoised
-from lightpaint.images.page_picture import Compact, compact
+from lightpaint.images.packed_picture import PackedPicture, pack_picture
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.light_setting import ALL_REACHED
 from lightpaint.lighting.answer.lighting import Lighting
@@ -216,7 +216,7 @@ def transform_data(transform: ViewTransform) -> dict[str, Any]:
         curve = [round(float(x), 5) for x in curve_of(plain, CURVE, LOW, HIGH)]
     elif transform.name != "srgb":
         table = lattice_of(plain, SIDE, LOW, HIGH).reshape(SIDE * SIDE, SIDE, 3)
-        lattice = _plane_data(compact(table, dropped=1))
+        lattice = _plane_data(pack_picture(table, dropped=1))
     return {**about, "curve": curve, "lattice": lattice}
 
 
@@ -227,10 +227,10 @@ def _painting(painting: Floats, basis: Basis, count: int) -> str:
 
 def plane_data(picture: Floats) -> dict[str, Any]:
     """Return a picture of light, (h, w, 3), for the page."""
-    return _plane_data(compact(picture))
+    return _plane_data(pack_picture(picture))
 
 
-def _plane_data(its: Compact) -> dict[str, Any]:
+def _plane_data(its: PackedPicture) -> dict[str, Any]:
     data = "data:;base64," + base64.b64encode(its.data).decode("ascii")
     return {"data": data, "scale": its.scale, "dropped": its.dropped, "size": list(its.size)}
 

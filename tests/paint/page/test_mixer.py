@@ -14,7 +14,7 @@ import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.transform_table import curve_of, lattice_of
 from lightpaint.colour.srgb import to_8_bit
-from lightpaint.images.page_picture import BRIGHTEST, DROPPED, compact, expanded
+from lightpaint.images.packed_picture import BRIGHTEST, DROPPED_BITS, pack_picture, unpack_picture
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.page.html import SHOWN
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
@@ -307,14 +307,14 @@ def test_twelve_lights_of_noise_can_be_mailed(make_basis: Any) -> None:
     assert len(page) + len(mixer_assets()) < 6_000_000
 
 
-@pytest.mark.parametrize("dropped", [0, DROPPED])
+@pytest.mark.parametrize("dropped", [0, DROPPED_BITS])
 def test_a_compact_picture_is_the_picture(dropped: int) -> None:
     rng = np.random.default_rng(0)
     image = np.exp2(rng.uniform(-12, 9, (7, 11, 3))).astype(np.float32)
     image[2, 3], image[4] = 0, [0, 5, 1e-9]
-    its = compact(image, dropped=dropped)
+    its = pack_picture(image, dropped=dropped)
     assert its.scale * BRIGHTEST >= image.max()
-    made = expanded(its)
+    made = unpack_picture(its)
     # Rounded to the 11 bits of halves, then to those that are left; and there is a least value.
     rtol = 2.0**-11 + (2.0 ** (dropped - 11) if dropped else 0)
     np.testing.assert_allclose(made, image, rtol=rtol, atol=its.scale * 2.0**-20)

@@ -1,4 +1,4 @@
-"""What Linux knows of names, and Python does not say."""
+"""Mount points of Linux that Python does not report."""
 
 import os
 from contextlib import suppress
@@ -6,11 +6,11 @@ from pathlib import Path
 
 
 def is_mounted(folder: Path) -> bool:
-    """Whether something is mounted at `folder`, a real path, or is the root of a disk."""
+    """Return True if something is mounted at `folder`, a real path, or it is the root of a disk."""
     if os.path.ismount(folder):
         return True
     with suppress(OSError):
-        # Bound from the same disk, only this tells it. Blanks are written as \040 there.
+        # Only this file shows a bind mount from the same disk. It writes blanks as \040.
         for line in Path("/proc/self/mountinfo").read_text("utf-8", "surrogateescape").splitlines():
             if line.split()[4].replace("\\040", " ") == str(folder):
                 return True

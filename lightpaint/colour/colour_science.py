@@ -1,4 +1,4 @@
-"""The library colour-science. It takes a second to import, and only who needs it waits."""
+"""Import of the library colour-science, which takes a second, on first use."""
 
 import warnings
 from functools import cache
@@ -10,10 +10,10 @@ from lightpaint.signals import interruptible_between_pieces
 
 @cache
 def colour_science() -> ModuleType:
-    """The module `colour`."""
-    # Interrupted in the middle, what it has begun complains when the process ends.
+    """Return the module `colour`."""
+    # An interrupt in the middle of the import would cause complaints when the process ends.
     with interruptible_between_pieces(), warnings.catch_warnings():
-        # It warns about plotting libraries that nothing here needs.
+        # It warns about missing plotting libraries, which are not needed here.
         warnings.simplefilter("ignore")
         import colour
     return cast("ModuleType", colour)

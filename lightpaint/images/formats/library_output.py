@@ -1,4 +1,4 @@
-"""Libraries that talk to the terminal of their own accord, made to keep quiet."""
+"""Silencing of libraries that print to the terminal on their own."""
 
 import errno
 import fcntl
@@ -9,14 +9,14 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 
-#: The descriptors belong to the whole process: two threads would put back each other's.
-_silencing = threading.RLock()
+#: Descriptors belong to the whole process: two threads would restore each other's.
+_silence_lock = threading.RLock()
 
 
 @contextmanager
-def heard() -> Iterator[None]:
-    """Say something meanwhile that is not lost because another thread keeps a library quiet."""
-    with _silencing:
+def unsilenced() -> Iterator[None]:
+    """Print in this block without being silenced by another thread's library call."""
+    with _silence_lock:
         yield
 
 
@@ -24,11 +24,11 @@ def heard() -> Iterator[None]:
 def silenced() -> Iterator[None]:
     """Keep what libraries in C and C++ print about damaged files off the user's terminal.
 
-    They write to the process's own descriptors and, by way of Python, to `sys.stdout`, which
-    is another place in a notebook. The same news comes as an ImageError. A descriptor that
-    the process was started without stays closed.
+    They write to the process's own descriptors and, through Python, to `sys.stdout`, which is
+    another place in a notebook. An ImageError reports the same faults. A descriptor that was closed
+    when the process started stays closed.
     """
-    with _silencing:
+    with _silence_lock:
         _flush_standard_streams()
         nowhere = os.open(os.devnull, os.O_WRONLY)
         saved = [(fd, _copy_if_open(fd)) for fd in (1, 2) if fd != nowhere]
@@ -50,13 +50,13 @@ def silenced() -> Iterator[None]:
 
 def _flush_standard_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None:  # which is how Python shows that it is closed
+        if stream is not None:  # None if the process started with it closed
             stream.flush()
 
 
 def _copy_if_open(fd: int) -> int | None:
     try:
-        # Above the standard ones, of which another may be closed and would be taken for it.
+        # At least 3: a closed standard descriptor must not be reused for the copy.
         return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 3)
     except OSError as error:
         if error.errno != errno.EBADF:

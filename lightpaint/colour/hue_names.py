@@ -1,0 +1,46 @@
+"""Everyday names for colours of light."""
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.colour.color import cct_and_duv
+from lightpaint.colour.color_difference import lab
+
+#: Largest distance from Planck's locus, and lowest temperature, of light that is called white.
+WHITE_DUV, WARMEST = 0.015, 2100.0
+
+#: White is warm below the first temperature and cool above the second, in kelvin.
+WARM, COOL = 3700.0, 7500.0
+
+#: Largest hue angle of CIE L*a*b*, in degrees, of each name.
+HUES = (
+    (20.0, "pink"),
+    (55.0, "red"),
+    (80.0, "orange"),
+    (112.0, "yellow"),
+    (170.0, "green"),
+    (235.0, "turquoise"),
+    (308.0, "blue"),
+    (340.0, "purple"),
+    (360.0, "pink"),
+)
+
+
+def hue_name(rgb: Floats) -> str:
+    """Return the everyday name of a colour of light: `warm white`, `green`.
+
+    rgb: (3,) linear Rec.709, of any brightness but black.
+    """
+    shown = np.asarray(rgb, np.float64) / np.max(rgb)
+    temperature = cct_and_duv(shown)
+    if temperature is not None and abs(temperature[1]) <= WHITE_DUV and temperature[0] >= WARMEST:
+        return (
+            "warm white"
+            if temperature[0] < WARM
+            else "cool white"
+            if temperature[0] > COOL
+            else "white"
+        )
+    _, a, b = lab(shown)
+    angle = float(np.degrees(np.arctan2(b, a))) % 360
+    return next(word for end, word in HUES if angle <= end)
