@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightingError, LightpaintError, SceneError, TargetError
-from lightpaint.files import MAX_TEXT
+from lightpaint.file_reading import MAX_TEXT
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.answer.lighting import Certificate, Lighting, LightSetting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting

@@ -33,7 +33,8 @@ from lightpaint.basis.half_floats import encodings_of
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
-from lightpaint.files import file_length, one_line
+from lightpaint.file_reading import file_length
+from lightpaint.files import one_line
 from lightpaint.images.formats.exr import (
     Channels,
     ExrPart,

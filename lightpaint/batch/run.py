@@ -1,16 +1,11 @@
 """A run of a plan: bases first, then the looks that share each, then final renders."""
 
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
-from lightpaint.basis import cache
-from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import write_basis
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.folder_lock import lock_folder
 from lightpaint.batch.gallery.gallery import write_gallery
@@ -20,21 +15,17 @@ from lightpaint.batch.plan.cost_estimate import look_seconds
 from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
 from lightpaint.batch.run_options import BatchOutcome, RunOptions
-from lightpaint.batch.work.basis_parts import PartwiseRender
+from lightpaint.batch.task_bases import has_basis, obtain_bases, save_bases
 from lightpaint.batch.work.distributed_render import distributed_renderer
 from lightpaint.batch.work.distributed_sums import solve_by_sums
 from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.processes import Processes
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import attempt, final_render, is_disk_full, job_fields
-from lightpaint.batch.work.work_items import ItemResult, SceneFilm
+from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
-from lightpaint.pipeline.pipeline import obtain
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import Interrupted, Listener, Progress, listener, silent
-from lightpaint.scene.presets import on_film, samples
 
 
 def run_batch(
@@ -115,7 +106,7 @@ class _Run:
         self._listen("steps", 0, self._total, "steps")
         self._engine = self._start_engine(stack)
         answers = [step for step in left if step.task.kind == "answer"]
-        by_sums = [x for x in answers if x.task.is_by_sums and not self._has_basis(x.task)]
+        by_sums = [x for x in answers if x.task.is_by_sums and not has_basis(x.task, self._cache)]
         answers = [step for step in answers if step not in by_sums]
         for keys in dict.fromkeys(step.task.bases for step in by_sums):
             self._solve_by_sums([step for step in by_sums if step.task.bases == keys])
@@ -140,22 +131,6 @@ class _Run:
             return stack.enter_context(Processes(options.workers, self._listen))
         return self._engine
 
-    def _has_basis(self, task: Task) -> bool:
-        """Return whether the basis of a task is saved or cached, so that nothing is to be
-        rendered.
-        """
-        fields = job_fields(task, self._cache)
-        if fields["basis"] is not None:
-            return True
-        settings: Settings = fields["settings"]
-        [scene] = fields["scenes"]
-        film = on_film(scene.content, settings.quality, settings.resolution)
-        asked = samples(settings.quality, spp=settings.spp, time_s=None)
-        sensor = film.sensor_names[film.sensor]
-        kept = cache.spp_of(film.identity, sensor, settings.seed, film.size)
-        exact = settings.exact_spp or not settings.use_cache
-        return not exact and kept >= (film.spp if asked is None else asked)
-
     def _solve_by_sums(self, steps: Sequence[PlanStep]) -> None:
         """Solve looks that share a basis which nobody keeps."""
         by_look = {step.task.look: step for step in steps if self._can_begin(step)}
@@ -174,12 +149,12 @@ class _Run:
         with ExitStack() as stack:
             files = task.files
             try:
-                obtained = self._obtain_bases(task)
+                obtained = obtain_bases(task, self._engine, self._cache, self._listen)
                 if not all(step.task.is_by_sums for step in steps):
                     write_task_planes(self._plan.folder, task, obtained, self._cache)
                 if self._engine.is_apart:
                     # Workers read what this process rendered, and is done with.
-                    files = _save_bases(obtained, stack) if obtained else files
+                    files = save_bases(obtained, stack) if obtained else files
                     self._cache.keep_only(())
             except LightpaintError as error:
                 if is_disk_full(error):
@@ -192,26 +167,6 @@ class _Run:
                 self._run_steps(given)
                 if self._is_stopped():
                     return
-
-    def _obtain_bases(self, task: Task) -> list[Basis]:
-        """Return the bases of a task that are no files already: cached or rendered, once for all
-        looks.
-        """
-        fields = job_fields(task, self._cache)
-        if fields["basis"] is not None:
-            return []
-        settings: Settings = fields["settings"]
-        bases = []
-        for key, scene in zip(task.bases, fields["scenes"], strict=True):
-            film = on_film(scene.content, settings.quality, settings.resolution)
-            basis = self._cache.basis(key)
-            if basis is None:
-                its = SceneFilm(scene, settings.quality, settings.resolution, _scene_files(scene))
-                render = PartwiseRender(self._engine, its)
-                basis = obtain(film, settings, self._listen, render=render)
-                self._cache.put(key, basis)
-            bases.append(basis)
-        return bases
 
     def _run_steps(self, steps: Sequence[PlanStep]) -> None:
         """Run steps that do not wait for each other, and retry those that failed and may be
@@ -306,20 +261,6 @@ class _Run:
             return None
         spent_s = time.monotonic() - self._start_s
         return spent_s / self._finished * (self._total - self._finished)
-
-
-def _scene_files(scene: SceneFile) -> tuple[str, ...]:
-    """Return all files of a scene."""
-    return tuple(map(str, scene.content.read_files))
-
-
-def _save_bases(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
-    """Save these bases to files, as long as `stack` is open."""
-    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lightpaint-")))
-    files = [folder / f"{k}.basis.exr" for k in range(len(bases))]
-    for file, basis in zip(files, bases, strict=True):
-        write_basis(file, basis)
-    return tuple(map(str, files))
 
 
 def _close_after(done: Iterator[ItemResult]) -> Iterator[ItemResult]:

@@ -9,7 +9,8 @@ from lightpaint.basis.lightgroups.read import LightGroups
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.files import file_length, scene_name
+from lightpaint.file_reading import file_length
+from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to

@@ -16,7 +16,7 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
-from lightpaint.files import file_length
+from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.legacy import words_for_old_scenes
 from lightpaint.scene.checks.xml import MAX_XML

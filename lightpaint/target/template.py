@@ -14,7 +14,8 @@ from lightpaint.arrays import Floats
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.errors import LightpaintError, TargetError
-from lightpaint.files import one_line, read_text, write_bytes, write_text
+from lightpaint.file_reading import read_text
+from lightpaint.files import one_line, write_bytes, write_text
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
 from lightpaint.images.formats.png import TRANSFORM_KEY, png_bytes, write_png_16
 from lightpaint.storage.json_records import fields_of, read_record, strict_json

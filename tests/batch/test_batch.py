@@ -17,12 +17,11 @@ import pytest
 from batches import LOOKS, NAMES, contents, killed, run_all, small_basis, write_batch
 from command import run, succeed
 
-from lightpaint.batch import run as run_module
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
 from lightpaint.batch.plan.planner import plan
-from lightpaint.batch.run import run_batch
+from lightpaint.batch.run import _Run, run_batch
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.batch.work import engine as engines
 from lightpaint.batch.work import work
@@ -291,7 +290,7 @@ def test_workers_that_are_all_gone_are_no_look_s_failure(
         return Gone(run._cache, run._listen)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_module._Run, "_start_engine", begun)
+        patch.setattr(_Run, "_start_engine", begun)
         with pytest.raises(BatchError, match="the scheduler is gone"):
             run_item(here)
     [line] = (here / "out" / "journal.jsonl").read_text().splitlines()

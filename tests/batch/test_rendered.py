@@ -9,7 +9,7 @@ import pytest
 from command import run, succeed
 from renderer import LIGHTS, write_room
 
-from lightpaint.batch import run as run_module
+from lightpaint.batch import task_bases
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
@@ -73,14 +73,14 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def done(here: Path) -> dict[str, Any]:
     """What the batch says of itself; and how often a basis was asked for."""
     asked: list[str] = []
-    obtain = run_module.obtain
+    obtain = task_bases.obtain
 
     def counting(scene: Any, *others: Any, **how: Any) -> Any:
         asked.append(scene.sensor_names[scene.sensor])
         return obtain(scene, *others, **how)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_module, "obtain", counting)
+        patch.setattr(task_bases, "obtain", counting)
         told = json.loads(succeed(here, "batch", "looks.toml", "-o", "out", "--json", "-q"))
     return {**told, "asked": asked}
 

@@ -18,7 +18,8 @@ from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import job_fields
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
-from lightpaint.files import read_text, write_text
+from lightpaint.file_reading import read_text
+from lightpaint.files import write_text
 from lightpaint.pipeline.sources import content
 from lightpaint.report.page.mixer import light_data, planes_for_page
 from lightpaint.storage.json_records import strict_json

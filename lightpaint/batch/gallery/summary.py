@@ -22,7 +22,8 @@ from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.errors import LightpaintError
-from lightpaint.files import read_text, replacing
+from lightpaint.file_reading import read_text
+from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.pixel_blocks import block_mean

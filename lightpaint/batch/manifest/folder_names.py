@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from lightpaint.errors import LightpaintError, OutputError
-from lightpaint.files import read_text
+from lightpaint.file_reading import read_text
 from lightpaint.storage.json_records import strict_json
 
 #: The summary for programs, and the format that it names.

@@ -14,7 +14,8 @@ from lightpaint.batch.manifest.keys import (
     Mistakes,
 )
 from lightpaint.errors import BatchError
-from lightpaint.files import one_line, read_text
+from lightpaint.file_reading import read_text
+from lightpaint.files import one_line
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import Check, a
 

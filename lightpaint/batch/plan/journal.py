@@ -16,7 +16,8 @@ from typing import Literal
 from lightpaint.batch.manifest.folder_names import JOURNAL, JOURNAL_PART
 from lightpaint.batch.work.task import Kind
 from lightpaint.errors import BatchError, LightpaintError, OutputError
-from lightpaint.files import read_bytes, write_text
+from lightpaint.file_reading import read_bytes
+from lightpaint.files import write_text
 from lightpaint.storage.json_records import read_record, strict_json
 
 #: Longest that is read, in bytes.

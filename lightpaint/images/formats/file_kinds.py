@@ -4,7 +4,8 @@ import sys
 from pathlib import Path
 
 from lightpaint.errors import ImageError
-from lightpaint.files import file_length, is_utf_8, one_line
+from lightpaint.file_reading import file_length
+from lightpaint.files import is_utf_8, one_line
 
 #: First bytes of files, their usual name, and the kind that reads them; "" if they are not read.
 SIGNATURES = (

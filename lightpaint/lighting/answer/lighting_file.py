@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import LightingError
-from lightpaint.files import one_line, read_text, write_text
+from lightpaint.file_reading import read_text
+from lightpaint.files import one_line, write_text
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import ImageError, SceneError
-from lightpaint.files import file_length, one_line
+from lightpaint.file_reading import file_length
+from lightpaint.files import one_line
 from lightpaint.images.formats.exr import read_parts
 from lightpaint.scene.checks.mesh import MeshError, check_ply, check_serialized
 

@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lightpaint.errors import SceneError
-from lightpaint.files import one_line, read_bytes
+from lightpaint.file_reading import read_bytes
+from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import attributes, markup
 
 #: Elements that are a parameter; a `<default>` may be called as people like.

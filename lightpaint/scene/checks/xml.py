@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from lightpaint.errors import SceneError
-from lightpaint.files import file_length, one_line, read_bytes
+from lightpaint.file_reading import file_length, read_bytes
+from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import attributes, encoding_of, line_of, markup
 
 #: Bytes of XML in all, a file that is included twice counting twice.

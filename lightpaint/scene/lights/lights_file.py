@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.errors import SceneError
-from lightpaint.files import one_line, read_text
+from lightpaint.file_reading import read_text
+from lightpaint.files import one_line
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
