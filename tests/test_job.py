@@ -179,6 +179,14 @@ def test_what_is_no_job_is_refused_in_one_line():
         json.dumps({**good, "basis": {"BasisFile": {}}}),
         json.dumps({**good, "targets": 5}),
         json.dumps({**good, "more": 1}),
+        json.dumps({**good, "targets": [{"path": 5}]}),
+        json.dumps({**good, "targets": [{"path": "p.exr", "paint": "air"}]}),
+        json.dumps({**good, "scenes": [{"path": "x.xml", "sensor": True}]}),
+        json.dumps({**good, "basis": {"BasisFile": {"path": "b", "pattern": "*"}}}),
+        json.dumps({**good, "basis": {"Path": {}}}),
+        json.dumps({**good, "settings": {**good["settings"], "speed": 1}}),
+        json.dumps({**good, "settings": {**good["settings"], "refine": "1"}}),
+        json.dumps({**good, "by_sensor": 1}),
     ):
         with pytest.raises(LightpaintError, match="this is no job: ") as refused:
             Job.from_json(bad)

@@ -1,7 +1,7 @@
 """Records: a JSON object becomes a dataclass of just the kinds it says, or is refused."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -31,6 +31,9 @@ class Whole:
     sums: Mapping[str, str] | None = None
     flux: tuple[float, float, float] | None = None
     parts: tuple[Part, ...] = ()
+    place: int | str | None = None
+    groups: Mapping[str, Sequence[str]] | None = None
+    mode: Literal["a", "b"] | None = None
 
 
 GOOD: dict[str, Any] = {
@@ -133,3 +136,26 @@ def test_json_that_nobody_should_write(text: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         strict_json(text)
     assert strict_json(r'{"a": ["😀", 1e308, 2]}') == {"a": ["😀", 1e308, 2]}
+
+
+def test_a_value_may_be_of_several_kinds() -> None:
+    for place in (None, 2, "left"):
+        assert read_record(Whole, {**GOOD, "place": place}).place == place
+    whole = read_record(Whole, {**GOOD, "groups": {"row": ["a", "b"]}, "mode": "b"})
+    assert (whole.groups, whole.mode) == ({"row": ("a", "b")}, "b")
+    for wrong, says in (
+        ({"place": 1.5}, "place is a whole number >= 0 or a text, not 1.5"),
+        ({"place": True}, "place is a whole number >= 0 or a text, not True"),
+        ({"groups": {"row": "ab"}}, "groups is an object"),
+        ({"mode": "c"}, "mode is one of 'a', 'b', not 'c'"),
+    ):
+        with pytest.raises(ValueError, match=says):
+            read_record(Whole, {**GOOD, **wrong})
+
+
+def test_an_exact_reading_refuses_unknown_keys_of_nested_records() -> None:
+    newer = {**GOOD, "parts": [{"name": "a", "weight": 1}]}
+    assert read_record(Whole, newer).parts == (Part("a"),)
+    with pytest.raises(ValueError, match="the key 'weight' is unknown"):
+        read_record(Whole, newer, is_exact=True)
+    assert read_record(Whole, GOOD, is_exact=True) == read_record(Whole, GOOD)

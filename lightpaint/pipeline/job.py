@@ -22,6 +22,7 @@ from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.pipeline.answer_folder import answer_files
+from lightpaint.pipeline.job_record import decode_job, encode_job
 from lightpaint.pipeline.remarks import (
     remarks_of_film,
     remarks_of_memory,
@@ -39,8 +40,6 @@ from lightpaint.pipeline.sources import (
     SceneFile,
     check_nothing_idle,
     content,
-    from_json,
-    to_json,
 )
 from lightpaint.placement.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
@@ -160,7 +159,7 @@ class Job:
 
         Raises LightpaintError for a job of objects in memory.
         """
-        return to_json(
+        return encode_job(
             self.scenes,
             self.targets,
             self.basis,
@@ -177,7 +176,7 @@ class Job:
 
         Raises LightpaintError for what is no job, and for one that cannot be done here.
         """
-        return Job(**from_json(text))
+        return Job(**decode_job(text))
 
     def __eq__(self, other: object) -> bool:
         """Whether the same is asked of the same files. Jobs in memory equal only themselves."""

@@ -3,9 +3,8 @@
 Each is plain values that can be sent, and is read once, when it is first asked for.
 """
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -14,19 +13,13 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
-from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
-from lightpaint.errors import BasisError, LightpaintError
+from lightpaint.colour.display.view_transform import TransformChoice
+from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.constraints import Constraints, Tie
 from lightpaint.pipeline.settings import Settings
 from lightpaint.scene.scene import Scene, load_scene
-from lightpaint.screen import some_names
-from lightpaint.storage.json_records import strict_json
 from lightpaint.target.target import Target
 from lightpaint.target.target_reader import Paint, read_over_look, read_target
-
-FORMAT = "lightpaint-job 1"
-FIELDS = ("scenes", "targets", "basis", "constraints", "settings", "folder", "by_sensor")
 
 #: Settings that only change what is rendered, and those that light groups know nothing of.
 SAMPLED = ("spp", "exact_spp", "time_s", "quality", "resolution")
@@ -202,78 +195,3 @@ def check_nothing_idle(settings: Settings, basis: Any) -> None:
     default = Settings()
     idle = [name for name in names if getattr(settings, name) != getattr(default, name)]
     check_needed(idle, basis)
-
-
-def to_json(
-    scenes: Sequence[Any],
-    targets: Sequence[Any],
-    basis: Any,
-    constraints: Constraints,
-    settings: Settings,
-    **others: Any,
-) -> str:
-    """A job's fields as text. Raises LightpaintError for what is in memory."""
-    named = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
-    for what, given in named:
-        if not all(isinstance(one, File) for one in given):
-            raise LightpaintError(
-                f"this job cannot be sent: its {what} is in memory; give the path of a file"
-            )
-    data = {
-        "format": FORMAT,
-        "scenes": list(map(asdict, scenes)),
-        "targets": list(map(asdict, targets)),
-        "basis": basis and {type(basis).__name__: asdict(basis)},
-        "constraints": asdict(constraints),
-        "settings": asdict(settings),
-        **others,
-    }
-    # NumPy's numbers are as good as Python's.
-    return json.dumps(data, indent=1, default=lambda number: number.item())
-
-
-def from_json(text: str) -> dict[str, Any]:
-    """The fields that `to_json` wrote. Raises LightpaintError for what is no job."""
-    try:
-        data = strict_json(text)
-        if (form := data.pop("format")) != FORMAT:
-            raise ValueError(f"its format is {form!r}, not {FORMAT!r}")
-        if unknown := set(data) - set(FIELDS):
-            raise ValueError(f"it has the keys {some_names(sorted(unknown))}")
-        settings, constraints = data["settings"], data["constraints"]
-        transform = settings["transform"] and ViewTransform(**settings["transform"])
-        return {
-            "folder": Path(data["folder"]),
-            "by_sensor": bool(data["by_sensor"]),
-            "scenes": tuple(SceneFile(**one) for one in data["scenes"]),
-            "targets": tuple(
-                Painting(**{**one, "transform": TransformChoice(**one["transform"])})
-                for one in data["targets"]
-            ),
-            "basis": _made(data["basis"]),
-            "constraints": Constraints(
-                **{
-                    **constraints,
-                    "lights": tuple(tuple(one) for one in constraints["lights"]),
-                    "ties": tuple(_tie(**one) for one in constraints["ties"]),
-                }
-            ),
-            "settings": Settings(**{**settings, "transform": transform}),
-        }
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        said = " ".join(str(error).split())
-        raise LightpaintError(f"this is no job: {said}; make one with Job.to_json") from None
-
-
-def _made(given: Any) -> BasisFile | GroupsFile | None:
-    """A basis or light groups, by the name of their kind."""
-    if given is None:
-        return None
-    [(kind, values)] = given.items()
-    if kind == "GroupsFile":
-        values["leave_out"] = tuple(values.get("leave_out", ()))
-    return GroupsFile(**values) if kind == "GroupsFile" else BasisFile(**values)
-
-
-def _tie(lights: Sequence[str], color: Any, where: str) -> Tie:
-    return Tie(tuple(lights), color and tuple(color), where)

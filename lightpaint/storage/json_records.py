@@ -3,10 +3,11 @@
 import json
 import math
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, asdict, fields, is_dataclass
-from types import UnionType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from lightpaint.screen import some_names
 
@@ -16,6 +17,9 @@ MAX_CHARACTERS, MAX_VALUES = 2**14, 2**17
 #: Most dots of TOML: the count of each line, squared, summed over all lines. The parser's time for
 #: a dotted key grows with the square of its parts, 24 ns each.
 MAX_DOTS = 10**8
+
+#: Origins of annotations like `int | None`; a Literal in one makes it the second.
+UNIONS = (UnionType, Union)
 
 _Record = TypeVar("_Record")
 
@@ -83,26 +87,34 @@ def _bounded_int(text: str) -> int:
 
 
 def read_record(
-    kind: type[_Record], data: Any, *, required: Collection[str] = (), others: bool = False
+    kind: type[_Record],
+    data: Any,
+    *,
+    required: Collection[str] = (),
+    others: bool = False,
+    is_exact: bool = False,
 ) -> _Record:
     """Return the dataclass `kind` from a JSON object, its fields by name.
 
     Each value must match the field's annotation: an int is a whole number >= 0, and neither true
     nor a string passes for a number. A field may be missing if it has a default and is not
-    `required`. others: whether unknown keys are ignored, as they always are in nested records.
+    `required`. others: whether unknown keys are ignored, as they are in nested records unless the
+    reading is exact.
 
     Raises ValueError, without naming the file, and the errors of `kind` itself.
     """
     if not isinstance(data, dict):
         raise ValueError(f"{data!r} is not an object")
     kinds, given = get_type_hints(kind), {}
-    if not others and (unknown := [key for key in data if key not in kinds]):
+    known = fields(kind)  # type: ignore[arg-type]
+    names = {field.name for field in known}
+    if not others and (unknown := [key for key in data if key not in names]):
         raise ValueError(f"the key {unknown[0]!r} is unknown")
-    for field in fields(kind):  # type: ignore[arg-type]
+    for field in known:
         name = field.name
         if name in data:
             try:
-                given[name] = _read(kinds[name], data[name])
+                given[name] = _read(kinds[name], data[name], is_exact)
             except TypeError:
                 raise ValueError(
                     f"{name} is {_expected(kinds[name])}, not {data[name]!r}"
@@ -122,7 +134,7 @@ def fields_of(record: Any, *optional: str) -> dict[str, Any]:
     }
 
 
-def _read(kind: Any, value: Any) -> Any:
+def _read(kind: Any, value: Any, is_exact: bool) -> Any:
     """Return `value` as the annotation `kind` wants it; raise TypeError if it is something else."""
     outer, inner = get_origin(kind), get_args(kind)
     if kind is Any:
@@ -138,18 +150,29 @@ def _read(kind: Any, value: Any) -> Any:
         return value
     if outer is Literal and type(value) is str and value in inner:
         return value
-    if outer is UnionType:  # a type or None
-        return None if value is None else _read(inner[0], value)
+    if outer in UNIONS:
+        return _read_one_of(inner, value, is_exact)
     if type(value) in (list, dict) and len(value) > MAX_VALUES:
         raise ValueError(f"it lists {len(value)} values: expected at most {MAX_VALUES}")
-    if outer is tuple and type(value) is list:
-        kinds = inner[:1] * len(value) if inner[-1] is ... else inner
+    if outer in (tuple, Sequence) and type(value) is list:
+        is_open = outer is Sequence or inner[-1] is ...
+        kinds = inner[:1] * len(value) if is_open else inner
         if len(kinds) == len(value):
-            return tuple(map(_read, kinds, value))
+            return tuple(_read(*its, is_exact) for its in zip(kinds, value, strict=True))
     if outer is Mapping and type(value) is dict:
-        return {key: _read(inner[1], one) for key, one in value.items()}
+        return {key: _read(inner[1], one, is_exact) for key, one in value.items()}
     if isinstance(kind, type) and is_dataclass(kind):
-        return read_record(kind, value, others=True)
+        return read_record(kind, value, others=not is_exact, is_exact=is_exact)
+    raise TypeError
+
+
+def _read_one_of(kinds: tuple[Any, ...], value: Any, is_exact: bool) -> Any:
+    """Return `value` as the first of several annotations that it is of; None is the last."""
+    if value is None and NoneType in kinds:
+        return None
+    for kind in kinds:
+        with suppress(TypeError):
+            return _read(kind, value, is_exact)
     raise TypeError
 
 
@@ -158,10 +181,10 @@ def _expected(kind: Any) -> str:
     outer, inner = get_origin(kind), get_args(kind)
     if outer is Literal:
         return ("one of " if inner[1:] else "") + ", ".join(map(repr, inner))
-    if outer is UnionType:
-        return _expected(inner[0])
-    if outer is tuple:
-        number = "" if inner[-1] is ... else f"{len(inner)} of: "
+    if outer in UNIONS:
+        return " or ".join(_expected(one) for one in inner if one is not NoneType)
+    if outer in (tuple, Sequence):
+        number = "" if outer is Sequence or inner[-1] is ... else f"{len(inner)} of: "
         return f"a list ({number}{_expected(inner[0])})"
     words = {str: "a text", bool: "true or false", float: "a number", int: "a whole number >= 0"}
     return words.get(kind, "an object")

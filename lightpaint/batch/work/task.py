@@ -11,8 +11,9 @@ from lightpaint.batch.manifest.keys import Final, Handover, Space
 from lightpaint.batch.manifest.variations import SHIFTED_WORDS
 from lightpaint.batch.work.work_items import PathMap
 from lightpaint.errors import BatchError
+from lightpaint.pipeline.job_record import encode_job
 from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile, to_json
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
@@ -127,7 +128,7 @@ def answer_task(
     return Task(
         entry.name,
         "answer",
-        to_json(
+        encode_job(
             entry.scenes,
             entry.paintings,
             entry.basis,

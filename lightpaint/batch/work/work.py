@@ -31,12 +31,13 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.job_record import decode_job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.relit_renders import relight_look, relit_folder
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.pipeline.results import view_names
 from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, content, from_json
+from lightpaint.pipeline.sources import BasisFile, GroupsFile, content
 from lightpaint.progress import Listener
 from lightpaint.relit.export_forms import Source, names_of_forms, writers_of
 from lightpaint.scene.scene import Scene
@@ -106,7 +107,7 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 def job_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
     """Return the fields of the task's job, with scenes and basis shared."""
-    fields = from_json(task.job)
+    fields = decode_job(task.job)
     fields["scenes"] = tuple(map(cache.scene, fields["scenes"]))
     if isinstance(fields["basis"], BasisFile | GroupsFile):
         fields["basis"] = cache.source(fields["basis"])

@@ -1,0 +1,89 @@
+"""A job as JSON, to be sent to another machine: files by their paths, and plain values."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from lightpaint.errors import LightpaintError
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.sources import BasisFile, File, GroupsFile, Painting, SceneFile
+from lightpaint.storage.json_records import read_record, strict_json
+
+FORMAT = "lightpaint-job 1"
+
+#: Files that a basis may be of, by the name that stands before their fields.
+BASIS_KINDS: Mapping[str, type[BasisFile] | type[GroupsFile]] = {
+    "BasisFile": BasisFile,
+    "GroupsFile": GroupsFile,
+}
+
+
+@dataclass(frozen=True)
+class JobRecord:
+    """The fields of a job in JSON. basis: fields by the name of its kind."""
+
+    scenes: tuple[SceneFile, ...]
+    targets: tuple[Painting, ...]
+    basis: Mapping[str, Mapping[str, Any]] | None
+    constraints: Constraints
+    settings: Settings
+    folder: str
+    by_sensor: bool
+
+
+def encode_job(
+    scenes: Sequence[Any],
+    targets: Sequence[Any],
+    basis: Any,
+    constraints: Constraints,
+    settings: Settings,
+    *,
+    folder: str,
+    by_sensor: bool,
+) -> str:
+    """Return a job's fields as text. Raises LightpaintError for what is in memory."""
+    named = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
+    for what, given in named:
+        if not all(isinstance(one, File) for one in given):
+            raise LightpaintError(
+                f"this job cannot be sent: its {what} is in memory; give the path of a file"
+            )
+    of_basis = {type(basis).__name__: asdict(basis)} if basis else None
+    record = JobRecord(
+        tuple(scenes), tuple(targets), of_basis, constraints, settings, folder, by_sensor
+    )
+    # NumPy's numbers are as good as Python's.
+    data = {"format": FORMAT, **asdict(record)}
+    return json.dumps(data, indent=1, default=lambda number: number.item())
+
+
+def decode_job(text: str) -> dict[str, Any]:
+    """Return the fields that `encode_job` wrote. Raises LightpaintError for what is no job."""
+    try:
+        data = strict_json(text)
+        if (form := data.pop("format")) != FORMAT:
+            raise ValueError(f"its format is {form!r}, not {FORMAT!r}")
+        # A command line may be longer than a text of a record; `Settings` checks that it is one.
+        command = data["settings"].pop("command", "")
+        record = read_record(JobRecord, data, is_exact=True)
+        fields = {name: getattr(record, name) for name in JobRecord.__dataclass_fields__}
+        return {
+            **fields,
+            "basis": _decode_basis(record.basis),
+            "settings": replace(record.settings, command=command),
+            "folder": Path(record.folder),
+        }
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        said = " ".join(str(error).split())
+        raise LightpaintError(f"this is no job: {said}; make one with Job.to_json") from None
+
+
+def _decode_basis(given: Mapping[str, Any] | None) -> BasisFile | GroupsFile | None:
+    """Return the file of a basis or of light groups."""
+    if given is None:
+        return None
+    [(kind, values)] = given.items()
+    return read_record(BASIS_KINDS[kind], dict(values), is_exact=True)
