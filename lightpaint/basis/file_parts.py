@@ -9,7 +9,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, free_name
 from lightpaint.basis.checksums import Checksums, checksum
-from lightpaint.basis.half_floats import Encoding
+from lightpaint.basis.half_floats import PlaneEncoding
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import BasisError
 from lightpaint.files import one_line
@@ -34,7 +34,9 @@ NAMES = {*IMAGE, *NOISE}
 LEAST_SCALE, LARGEST_SCALE = 2.0**-126, 2.0**126
 
 
-def light_texts(light: BasisLight, encodings: tuple[Encoding, Encoding]) -> dict[str, str]:
+def light_texts(
+    light: BasisLight, encodings: tuple[PlaneEncoding, PlaneEncoding]
+) -> dict[str, str]:
     """Return the attributes of the part of a light."""
     data = fields_of(light, "is_fixed", "unit_flux")
     if light.members == (light.name,):
@@ -45,7 +47,9 @@ def light_texts(light: BasisLight, encodings: tuple[Encoding, Encoding]) -> dict
     return texts
 
 
-def light_channels(image: Floats, half: Floats, encodings: tuple[Encoding, Encoding]) -> Channels:
+def light_channels(
+    image: Floats, half: Floats, encodings: tuple[PlaneEncoding, PlaneEncoding]
+) -> Channels:
     """Return the channels of a light as they are stored."""
     made: dict[str, Any] = {}
     for plane, encoding, names in zip((image, half), encodings, (IMAGE, NOISE), strict=True):

@@ -25,7 +25,7 @@ BRIGHTEST = 14
 
 
 @dataclass(frozen=True)
-class Encoding:
+class PlaneEncoding:
     """How a plane is stored. kind: type of its numbers. scale: what they are to be multiplied by, a
     power of two.
     """
@@ -49,17 +49,17 @@ class Encoding:
         return self.decoded(self.encoded(plane))
 
 
-def encodings_of(image: Floats, noise: Floats) -> tuple[Encoding, Encoding]:
+def encodings_of(image: Floats, noise: Floats) -> tuple[PlaneEncoding, PlaneEncoding]:
     """Return how the image of a light and its half difference, (h, w, 3), are best stored."""
     hidden = HIDDEN**2 * _power(noise)
     found = []
     for plane in (image, noise):
-        halves = (Encoding(HALF, scale) for scale in dict.fromkeys((1.0, _scale_of(plane))))
-        found.append(next((x for x in halves if _is_hidden(plane, x, hidden)), Encoding()))
+        halves = (PlaneEncoding(HALF, scale) for scale in dict.fromkeys((1.0, _scale_of(plane))))
+        found.append(next((x for x in halves if _is_hidden(plane, x, hidden)), PlaneEncoding()))
     return found[0], found[1]
 
 
-def _is_hidden(plane: Floats, encoding: Encoding, hidden: Doubles) -> bool:
+def _is_hidden(plane: Floats, encoding: PlaneEncoding, hidden: Doubles) -> bool:
     """Return whether rounding has no more power than `hidden` in any tile, channel by channel."""
     with np.errstate(over="ignore", invalid="ignore"):
         return all(
@@ -82,7 +82,7 @@ def _power(plane: Floats) -> Doubles:
     return np.array(list(_powers(plane, None)))
 
 
-def _powers(plane: Floats, encoding: Encoding | None) -> Iterator[Doubles]:
+def _powers(plane: Floats, encoding: PlaneEncoding | None) -> Iterator[Doubles]:
     """Yield Σ x² of a row of tiles after the other, (columns, 3), of what rounding changes.
 
     encoding: None for the plane itself.

@@ -28,7 +28,7 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import name_in_view
 from lightpaint.paint.subject import Subject, painting_path
 from lightpaint.progress import Progress, cancellable
@@ -49,7 +49,7 @@ class JobHost(Protocol):
         """Number that grows with every change of the paintings and requests."""
 
     def snapshot_and_lighting(
-        self, requests: LightRequests | None = None
+        self, requests: SessionRequests | None = None
     ) -> tuple[SessionSnapshot, Lighting]:
         """Return the paintings and requests as they are now, and the last answer.
 
@@ -117,7 +117,7 @@ class BackgroundJobs:
         self._threads.start_low_priority(lambda: work(message), what)
         return [TaskStarted(what=what)]
 
-    def start_preview(self, message: protocol.Preview, requests: LightRequests) -> list[Message]:
+    def start_preview(self, message: protocol.Preview, requests: SessionRequests) -> list[Message]:
         """Start to compute what a change would do. Raises PaintError for a view that does not
         exist.
 
@@ -128,7 +128,7 @@ class BackgroundJobs:
         self._threads.start_low_priority(lambda: self._run_preview(message, requests), "preview")
         return [TaskStarted(what="preview")]
 
-    def solve_command(self, sensors: Sequence[str], requests: LightRequests) -> str:
+    def solve_command(self, sensors: Sequence[str], requests: SessionRequests) -> str:
         """Return the command that finds the same answer from exported paintings; "" where there is
         none.
         """
@@ -238,7 +238,7 @@ class BackgroundJobs:
         self._verifications[view] = snapshot.version, result
         self._host.publish(result)
 
-    def _run_preview(self, request: protocol.Preview, requests: LightRequests) -> None:
+    def _run_preview(self, request: protocol.Preview, requests: SessionRequests) -> None:
         def check() -> None:
             if self._preview_number != request.number:
                 raise StoppedError

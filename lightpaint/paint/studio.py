@@ -51,7 +51,7 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.session.view_pictures import offer_transforms, offer_view, view_info
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
@@ -226,7 +226,7 @@ class Studio:
             return self.session.snapshot()
 
     def snapshot_and_lighting(
-        self, requests: LightRequests | None = None
+        self, requests: SessionRequests | None = None
     ) -> tuple[SessionSnapshot, Lighting]:
         """Return the same with the last answer. requests: taken instead of the session's."""
         with self._lock:
@@ -236,7 +236,7 @@ class Studio:
         return snapshot, Lighting.of_weights(snapshot.bases[0], weights)
 
     def load(
-        self, paintings: Mapping[int, Pixels], requests: LightRequests, label: str
+        self, paintings: Mapping[int, Pixels], requests: SessionRequests, label: str
     ) -> list[Message]:
         """Replace the paintings, by view, and the requests: one step. Returns the `patch` messages.
 

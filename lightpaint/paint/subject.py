@@ -14,7 +14,7 @@ from lightpaint.colour.display.view_transform import TransformChoice, ViewTransf
 from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.lazy_scene import LazyScene
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.presets import samples
@@ -44,7 +44,7 @@ class Subject:
     settings: Settings = field(default_factory=Settings)
     constraints: Constraints = field(default_factory=Constraints)
     choice: TransformChoice = field(default_factory=TransformChoice)
-    command: Callable[[Mapping[str, str], LightRequests], str] = lambda paintings, requests: ""
+    command: Callable[[Mapping[str, str], SessionRequests], str] = lambda paintings, requests: ""
     view_count: int = 1
 
     @property

@@ -17,7 +17,7 @@ from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.views import check_same_lights
 from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.session_file import check_view_names, session_identity
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import (
@@ -64,7 +64,7 @@ def make_subject(
     settings: Settings | None = None,
     constraints: Constraints | None = None,
     choice: TransformChoice | None = None,
-    command: Callable[[Mapping[str, str], LightRequests], str] = lambda paintings, requests: "",
+    command: Callable[[Mapping[str, str], SessionRequests], str] = lambda paintings, requests: "",
     view_count: int = 1,
 ) -> Subject:
     """Return one view to be painted, checked as far as that needs no renderer.

@@ -11,7 +11,7 @@ import lightpaint as lp
 from lightpaint.basis.file import FORMAT_KEY, as_stored, read_basis, write_basis
 from lightpaint.basis.file_parts import SCALE_KEY
 from lightpaint.basis.file_planes import RowPlanes
-from lightpaint.basis.half_floats import FLOAT, HALF, HIDDEN, TILE, Encoding, encodings_of
+from lightpaint.basis.half_floats import FLOAT, HALF, HIDDEN, TILE, PlaneEncoding, encodings_of
 from lightpaint.basis.planes import as_planes
 from lightpaint.errors import BasisError
 from lightpaint.images.formats.exr import read_parts, write_parts
@@ -28,7 +28,7 @@ def plane(noise: float, *, seed: int = 1, light: float = 1.0) -> tuple[np.ndarra
     return (smooth + grain[0]).astype(np.float32), grain[1].astype(np.float32)
 
 
-def relative(image: np.ndarray, encoding: Encoding) -> float:
+def relative(image: np.ndarray, encoding: PlaneEncoding) -> float:
     return float((np.abs(encoding.rounded(image) - image) / np.abs(image)).max())
 
 
@@ -72,7 +72,7 @@ def test_a_range_beyond_half_floats_is_float() -> None:
     for its in (image, half):
         its[:TILE] *= np.float32(1e-12)  # a shadow that counts beside lamps in view
     assert [its.kind for its in encodings_of(image, half)] == [FLOAT, FLOAT]
-    assert encodings_of(np.zeros_like(image), np.zeros_like(half)) == (Encoding(HALF),) * 2
+    assert encodings_of(np.zeros_like(image), np.zeros_like(half)) == (PlaneEncoding(HALF),) * 2
 
 
 @pytest.fixture

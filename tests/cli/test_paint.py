@@ -35,7 +35,7 @@ from lightpaint.cli.options.source_options import painted_of
 from lightpaint.paint.background_threads import BackgroundThreads
 from lightpaint.paint.frames import from_frame, to_frame
 from lightpaint.paint.protocol import VERSION
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Identity, Step
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject_factory import make_subject, make_subjects
@@ -105,7 +105,7 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     ]
     assert values["options"] == ("--spp=8",)
     paintings = {"a": "x/painting-a.exr", "b c": "x/painting-b c.exr"}
-    command = solve_command("scene.xml", paintings, values["options"], LightRequests())
+    command = solve_command("scene.xml", paintings, values["options"], SessionRequests())
     words = shlex.split(command)[1:]
     options = command_parser().parse_args(words)
     assert options.views == list(paintings.items())

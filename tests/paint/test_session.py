@@ -21,7 +21,12 @@ from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.paint import protocol
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.light_requests import ALL_LIGHTS_KEYS, FIT_KEYS, TITLES, LightRequests
+from lightpaint.paint.store.session_requests import (
+    ALL_LIGHTS_KEYS,
+    FIT_KEYS,
+    TITLES,
+    SessionRequests,
+)
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.pipeline.settings import Settings
@@ -266,7 +271,7 @@ def test_any_sequence_equals_a_rebuild(actions: list[Any]):
                 case "load":
                     pixels = Pixels(np.full((*SIZE, 3), its[0]), np.ones(SIZE))
                     session.load(
-                        {0: pixels}, LightRequests({"lamp 0": its[1]} if its[1] else {}), "look"
+                        {0: pixels}, SessionRequests({"lamp 0": its[1]} if its[1] else {}), "look"
                     )
                 case "leave":
                     session.client_left(with_stroke=its[0])
@@ -333,7 +338,7 @@ SLIDING = protocol.Ask(0, {"lock": [2.0, 2.0, 2.0]}, done=False)
 OTHERS: list[tuple[str, Callable[[Session], object]]] = [
     ("set", lambda session: session.handle(protocol.Set({"colors": "free"}), {})),
     ("tie", lambda session: session.handle(protocol.TieLights((("lamp 0", "lamp 1"),)), {})),
-    ("load", lambda session: session.load({}, LightRequests({"lamp 1": {"off": True}}), "look")),
+    ("load", lambda session: session.load({}, SessionRequests({"lamp 1": {"off": True}}), "look")),
     ("undo", lambda session: session.handle(protocol.Undo(), {})),
     (
         "refused",

@@ -20,7 +20,7 @@ from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
     from lightpaint.paint.server.server import Server
-    from lightpaint.paint.store.light_requests import LightRequests
+    from lightpaint.paint.store.session_requests import SessionRequests
 
 #: What it means that others can.
 RISK = (
@@ -59,7 +59,7 @@ def paint(
     from lightpaint.cli.commands.session_options import solve_command
     from lightpaint.cli.output.vocabulary import from_any_folder
 
-    def command(paintings: Mapping[str, str], requests: "LightRequests") -> str:
+    def command(paintings: Mapping[str, str], requests: "SessionRequests") -> str:
         return from_any_folder(solve_command(sources[0].path, paintings, options, requests))
 
     subjects = make_subjects(

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from shlex import quote
 from typing import Any
 
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 
 
 def solve_command(
-    source: str, paintings: Mapping[str, str], options: Sequence[str], requests: LightRequests
+    source: str, paintings: Mapping[str, str], options: Sequence[str], requests: SessionRequests
 ) -> str:
     """The command that answers exported paintings as their session does.
 
@@ -21,7 +21,7 @@ def solve_command(
     return " ".join([*words, *options, *options_of(requests)])
 
 
-def options_of(requests: LightRequests) -> list[str]:
+def options_of(requests: SessionRequests) -> list[str]:
     """What is asked, as options of `lightpaint solve`."""
     made = []
     for name, asked in requests.lights.items():

@@ -19,7 +19,7 @@ from lightpaint.lighting.loss.painting import resolve_importance
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.database import OTHER_FOLDER, START_AFRESH
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.settings import Settings
@@ -37,7 +37,7 @@ NOTEBOOK_ADVICE = {
 }
 
 #: Arguments of `Studio.load`: paintings by view, requests, and the label of the step.
-LoadArguments = tuple[Mapping[int, Pixels], LightRequests, str]
+LoadArguments = tuple[Mapping[int, Pixels], SessionRequests, str]
 
 
 def load_targets(session: Session, targets: Any) -> LoadArguments:
@@ -57,7 +57,7 @@ def load_target(session: Session, target: Any) -> LoadArguments:
     return {0: _pixels_to_load(session, 0, fitted)}, requests, "painting from a cell"
 
 
-def _requests_for(requests: LightRequests, targets: Sequence[Target | None]) -> LightRequests:
+def _requests_for(requests: SessionRequests, targets: Sequence[Target | None]) -> SessionRequests:
     """Return `requests` that answer these paintings as `lp.solve` does.
 
     A painting of light, over nothing, is taken literally. One that holds display values, and was
@@ -153,7 +153,7 @@ def load_lighting(session: Session, lighting: Any) -> LoadArguments:
         for light, weight in zip(session.basis.lights, weights, strict=True)
         if not light.is_fixed
     }
-    requests = LightRequests(lights, session.requests.ties, session.requests.values)
+    requests = SessionRequests(lights, session.requests.ties, session.requests.values)
     return {}, requests, "lighting from a cell"
 
 
@@ -163,7 +163,7 @@ def load_constraints(session: Session, constraints: Any) -> LoadArguments:
         kind = type(constraints).__name__
         raise PaintError(f"painter.constraints is a lp.Constraints or None, not {kind}")
     lights, values = session.basis.lights, session.requests.values
-    requests = LightRequests.from_constraints(constraints or Constraints(), lights, values)
+    requests = SessionRequests.from_constraints(constraints or Constraints(), lights, values)
     return {}, requests, "constraints from a cell"
 
 

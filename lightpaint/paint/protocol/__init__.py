@@ -30,7 +30,7 @@ from lightpaint.paint.protocol.events import (
     TaskStopped,
     VerificationResult,
 )
-from lightpaint.paint.protocol.parts import (
+from lightpaint.paint.protocol.message_parts import (
     Advice,
     Closeness,
     EditState,

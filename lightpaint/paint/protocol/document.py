@@ -14,13 +14,13 @@ from typing import Any, get_origin, get_type_hints
 
 import numpy as np
 
-from lightpaint.paint.protocol import events, parts, requests
+from lightpaint.paint.protocol import events, message_parts, requests
 from lightpaint.paint.protocol.typescript import field_types
 
 
 def sections() -> dict[str, str]:
     """Return the generated parts of the document by the names of their marks."""
-    records = [one for one in vars(parts).values() if _is_part(one)]
+    records = [one for one in vars(message_parts).values() if _is_part(one)]
     return {
         "requests": "\n".join(_entry(one.kind, one) for one in requests.REQUESTS.values()),
         "events": "\n".join(_entry(one.kind, one) for one in events.EVENTS.values()),
@@ -38,7 +38,7 @@ def replace_sections(text: str) -> str:
 
 
 def _is_part(value: Any) -> bool:
-    return getattr(value, "__module__", "") == parts.__name__ and isinstance(value, type)
+    return getattr(value, "__module__", "") == message_parts.__name__ and isinstance(value, type)
 
 
 def _entry(name: str, record: type[Any]) -> str:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.paint.protocol.base import OPTIONAL, Message
-from lightpaint.paint.protocol.parts import (
+from lightpaint.paint.protocol.message_parts import (
     EditState,
     Findings,
     LightInfo,

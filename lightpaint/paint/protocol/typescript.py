@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 
 from lightpaint.arrays import RGB
-from lightpaint.paint.protocol import events, parts, requests
+from lightpaint.paint.protocol import events, message_parts, requests
 from lightpaint.paint.store.canvas_pixels import Region
 
 #: Where the types lie, beside the scripts that use them.
@@ -41,7 +41,7 @@ PRIMITIVES = {str: "string", int: "number", float: "number", bool: "boolean", ty
 
 def declarations() -> str:
     """Return the whole file."""
-    records = [one for one in vars(parts).values() if _is_record_of(one, parts)]
+    records = [one for one in vars(message_parts).values() if _is_record_of(one, message_parts)]
     made = [HEADER, *(_interface(one, is_request=False) for one in records)]
     made += [_interface(one, is_request=False) for one in events.EVENTS.values()]
     made += [_interface(one, is_request=True) for one in requests.REQUESTS.values()]

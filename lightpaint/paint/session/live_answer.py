@@ -10,7 +10,7 @@ from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.settings import Settings
 
 
@@ -28,14 +28,14 @@ class LiveAnswer:
     def __init__(
         self,
         views: Sequence[LiveView],
-        requests: LightRequests,
+        requests: SessionRequests,
         *,
         settings: Settings,
         constraints: Constraints,
         transform: ViewTransform,
     ) -> None:
         self.requests = requests
-        self.before_slider: LightRequests | None = None
+        self.before_slider: SessionRequests | None = None
         self.weights = views[0].basis.present_weights
         self._settings, self._base_constraints, self._transform = settings, constraints, transform
         self.set_views(views)
@@ -47,7 +47,7 @@ class LiveAnswer:
         self._live.prepare()
 
     @property
-    def requests_at_rest(self) -> LightRequests:
+    def requests_at_rest(self) -> SessionRequests:
         """The requests without those of a slider that still moves."""
         return self.before_slider or self.requests
 
@@ -61,13 +61,13 @@ class LiveAnswer:
         """Settings of the fit, with all defaults resolved."""
         return self._fit(self.requests)
 
-    def settings(self, requests: LightRequests | None = None) -> Settings:
+    def settings(self, requests: SessionRequests | None = None) -> Settings:
         """Return the settings of `requests`, by default those in effect, with defaults
         unresolved.
         """
         return (requests or self.requests).settings(self._settings)
 
-    def constraints(self, requests: LightRequests | None = None) -> Constraints:
+    def constraints(self, requests: SessionRequests | None = None) -> Constraints:
         """Return the constraints of requests, beside those of the scene."""
         return self._base_constraints.and_then((requests or self.requests).constraints())
 
@@ -76,20 +76,20 @@ class LiveAnswer:
         """Basis of the first view, whose lights are those of all views."""
         return self._basis
 
-    def check(self, requests: LightRequests) -> None:
+    def check(self, requests: SessionRequests) -> None:
         """Raise LightpaintError for what cannot be asked, before anything is changed."""
         reduce_lights(self._constraints(requests), self._basis.lights, self._fit(requests))
 
-    def set_requests(self, requests: LightRequests) -> None:
+    def set_requests(self, requests: SessionRequests) -> None:
         """Set the requests; a moving slider has come to rest."""
         self._apply(requests)
         self.before_slider = None
 
-    def _apply(self, requests: LightRequests) -> None:
+    def _apply(self, requests: SessionRequests) -> None:
         self.requests = requests
         self._live.constrain(self.fit, self._constraints(requests))
 
-    def move_slider(self, requests: LightRequests) -> None:
+    def move_slider(self, requests: SessionRequests) -> None:
         """Set requests while a slider moves. Raises LightpaintError, and changes nothing then."""
         self.check(requests)
         self.before_slider = self.requests_at_rest
@@ -106,12 +106,12 @@ class LiveAnswer:
         """Solve for the weights, with the paint as it is."""
         self.weights = self._live.answer(self.weights)
 
-    def _fit(self, requests: LightRequests) -> Settings:
+    def _fit(self, requests: SessionRequests) -> Settings:
         settings = requests.settings(self._settings)
         return resolve_fit(
             settings, over_look=True, through_view=True, display=lambda: self._transform
         )
 
-    def _constraints(self, requests: LightRequests) -> Constraints:
+    def _constraints(self, requests: SessionRequests) -> Constraints:
         asked = constraints_of(self._basis.requests).and_then(self._base_constraints)
         return asked.and_then(requests.constraints())

@@ -26,7 +26,7 @@ from lightpaint.paint.protocol import (
 from lightpaint.paint.session.picture_table import PictureTable, display_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.canvas_pixels import Pixels
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import StoredLook, name_in_view
 from lightpaint.screen import some_names
 
@@ -99,7 +99,7 @@ class LookLibrary:
         """Continue from a look."""
         look = self._find(message.look)
         paintings = dict(enumerate(self._paintings(look)))
-        requests = LightRequests.of(look.fields["wishes"])
+        requests = SessionRequests.of(look.fields["wishes"])
         weights = np.asarray(look.arrays["weights"], np.float64)
         return self._session.load(paintings, requests, f"look {look.fields['name']}", weights)
 
@@ -141,7 +141,7 @@ class LookLibrary:
             name, paintings, self._lock_all(np.asarray(weights)), np.asarray(weights)
         )
 
-    def _lock_all(self, weights: npt.NDArray[Any]) -> LightRequests:
+    def _lock_all(self, weights: npt.NDArray[Any]) -> SessionRequests:
         """Return requests that lock every light at a lighting, (n, 3)."""
         lights = self._session.basis.lights
         locks = {
@@ -149,7 +149,7 @@ class LookLibrary:
             for light, w in zip(lights, weights, strict=True)
             if not light.is_fixed
         }
-        return LightRequests(locks)
+        return SessionRequests(locks)
 
     def _proposed_look(self, message: Propose) -> StoredLook:
         """Return the painting as it is with a proposed lighting."""
@@ -184,7 +184,7 @@ class LookLibrary:
         self,
         name: str,
         paintings: Sequence[Pixels],
-        requests: LightRequests,
+        requests: SessionRequests,
         weights: npt.NDArray[Any],
     ) -> StoredLook:
         fields = {"name": name, "stamp": time.time(), "wishes": requests.as_json()}

@@ -32,7 +32,7 @@ from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.database import DamagedError
-from lightpaint.paint.store.light_requests import TITLES, LightRequests
+from lightpaint.paint.store.session_requests import TITLES, SessionRequests
 from lightpaint.paint.store.steps import Step
 from lightpaint.paint.store.store import Store
 from lightpaint.pipeline.settings import Settings
@@ -97,7 +97,7 @@ class Session:
         return self.views[0].basis
 
     @property
-    def requests(self) -> LightRequests:
+    def requests(self) -> SessionRequests:
         """Requests in effect."""
         return self.live_answer.requests
 
@@ -142,7 +142,7 @@ class Session:
             over_look=is_sketch,
         )
 
-    def snapshot(self, requests: LightRequests | None = None) -> SessionSnapshot:
+    def snapshot(self, requests: SessionRequests | None = None) -> SessionSnapshot:
         """Return the paintings and `requests`, by default those in effect."""
         live_answer, bases = self.live_answer, tuple(view.basis for view in self.views)
         asked = requests or live_answer.requests
@@ -150,7 +150,7 @@ class Session:
         how = live_answer.settings(asked), live_answer.constraints(asked), self.transform
         return SessionSnapshot(self.version, bases, targets, asked, *how)
 
-    def preview_requests(self, change: protocol.Preview) -> LightRequests:
+    def preview_requests(self, change: protocol.Preview) -> SessionRequests:
         """Return the requests after a change. Raises LightpaintError where it cannot be made."""
         self._check_names(change.asked)
         requests = self.requests.with_values(change.values)
@@ -302,7 +302,7 @@ class Session:
     def load(
         self,
         paintings: Mapping[int, Pixels],
-        requests: LightRequests,
+        requests: SessionRequests,
         label: str,
         weights: Doubles | None = None,
     ) -> list[Message]:
@@ -377,7 +377,7 @@ class Session:
             self.views[patch.view].put(patch.region, pixels)
         if step.fields:
             self.live_answer.set_requests(
-                LightRequests.of(step.fields["before" if is_back else "after"])
+                SessionRequests.of(step.fields["before" if is_back else "after"])
             )
         self._update_answer()
         return self._patch_messages(*((patch.view, patch.region) for patch in step.patches))
@@ -407,7 +407,7 @@ class Session:
         if light.is_fixed:
             raise PaintError(f"{light.name} is kept as it is, and cannot be asked for anything")
 
-    def _append_requests(self, label: str, requests: LightRequests) -> Message:
+    def _append_requests(self, label: str, requests: SessionRequests) -> Message:
         """Set requests from now on: a step."""
         self.live_answer.check(requests)
         self._close_stroke("stroke")
@@ -457,10 +457,10 @@ class Session:
 
 def _restore(
     bases: Sequence[Basis], presents: Sequence[Floats], store: Store
-) -> tuple[Canvases, LightRequests]:
+) -> tuple[Canvases, SessionRequests]:
     """Return the canvases and the requests after the steps of the store."""
     done = store.steps[: store.position]
     states = [step.fields["after"] for step in done if step.fields]
-    requests = LightRequests.of(states[-1]) if states else LightRequests()
+    requests = SessionRequests.of(states[-1]) if states else SessionRequests()
     requests.constraints()
     return Canvases(bases, presents, done), requests

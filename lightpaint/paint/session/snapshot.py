@@ -21,7 +21,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.paint.session.answer_messages import preview_text, why_not_closer
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.settings import Settings
 from lightpaint.target.target import Target
 
@@ -37,7 +37,7 @@ class SessionSnapshot:
     version: int
     bases: tuple[Basis, ...]
     targets: tuple[Target | None, ...]
-    requests: LightRequests
+    requests: SessionRequests
     settings: Settings
     constraints: Constraints
     transform: ViewTransform

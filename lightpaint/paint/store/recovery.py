@@ -28,7 +28,7 @@ from lightpaint.paint.store.database import (
     transaction,
 )
 from lightpaint.paint.store.lazy_arrays import DTYPES
-from lightpaint.paint.store.light_requests import LightRequests
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Identity, name_in_view
 from lightpaint.screen import some_names
 from lightpaint.storage.json_records import read_record, strict_json
@@ -153,7 +153,7 @@ def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) 
         raise TypeError("other values")
     if values:
         for its in (values["before"], values["after"]):
-            LightRequests.of(its).constraints()
+            SessionRequests.of(its).constraints()
     regions = []
     for view, top, bottom, left, right, *marked in where:
         if not (0 <= top <= bottom and 0 <= left <= right and view >= 0):

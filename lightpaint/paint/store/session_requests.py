@@ -28,7 +28,7 @@ TITLES = {
 
 
 @dataclass(frozen=True)
-class LightRequests:
+class SessionRequests:
     """Requests of a session, as plain JSON values.
 
     lights: by name of light, keys and values as of a lights file. ties: names that share a dimmer.
@@ -40,7 +40,7 @@ class LightRequests:
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, data: Mapping[str, Any]) -> "LightRequests":
+    def of(cls, data: Mapping[str, Any]) -> "SessionRequests":
         """Return the requests that `as_json` wrote."""
         ties = tuple(tuple(names) for names in data.get("ties", ()))
         return cls(dict(data.get("lights", {})), ties, dict(data.get("values", {})))
@@ -50,7 +50,7 @@ class LightRequests:
         lights = {name: dict(asked) for name, asked in self.lights.items()}
         return {"lights": lights, "ties": [list(x) for x in self.ties], "values": dict(self.values)}
 
-    def with_light(self, name: str, asked: Mapping[str, Any]) -> "LightRequests":
+    def with_light(self, name: str, asked: Mapping[str, Any]) -> "SessionRequests":
         """Return these requests with all those on one light replaced.
 
         Holding a light holds all on its dimmer; earlier holds of these are dropped.
@@ -59,14 +59,14 @@ class LightRequests:
         lights = {**self.lights, name: asked}
         return replace(self, lights=_hold_once(lights, (name, *tied)))
 
-    def with_ties(self, ties: Sequence[Sequence[str]]) -> "LightRequests":
+    def with_ties(self, ties: Sequence[Sequence[str]]) -> "SessionRequests":
         """Return these requests with these dimmers; the first held light of each holds it."""
         lights = dict(self.lights)
         for names in ties:
             lights = _hold_once(lights, names)
         return replace(self, lights=lights, ties=tuple(map(tuple, ties)))
 
-    def with_values(self, values: Mapping[str, Any]) -> "LightRequests":
+    def with_values(self, values: Mapping[str, Any]) -> "SessionRequests":
         """Return these requests with these values, None for defaults. Raises PaintError."""
         if unknown := [key for key in values if key not in (*FIT_KEYS, *ALL_LIGHTS_KEYS)]:
             raise PaintError(f"nothing is called {unknown[0]!r} in what can be set")
@@ -78,7 +78,7 @@ class LightRequests:
     @classmethod
     def from_constraints(
         cls, constraints: Constraints, lights: Sequence[BasisLight], values: Mapping[str, Any]
-    ) -> "LightRequests":
+    ) -> "SessionRequests":
         """Return requests equal to constraints on these lights, and those of `values` in FIT_KEYS.
 
         Raises ConstraintError for lights that do not exist, PaintError for what a session cannot
