@@ -21,7 +21,13 @@ from lightpaint.batch.work.distributed_sums import solve_by_sums
 from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.processes import Processes
 from lightpaint.batch.work.task import Task
-from lightpaint.batch.work.work import attempt, final_render, is_disk_full, job_fields
+from lightpaint.batch.work.work import (
+    OUT_OF_MEMORY_TEXT,
+    attempt,
+    final_render,
+    is_disk_full,
+    job_fields,
+)
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, LightpaintError, OutputError
 from lightpaint.files import sweep
@@ -156,11 +162,12 @@ class _Run:
                     # Workers read what this process rendered, and is done with.
                     files = save_bases(obtained, stack) if obtained else files
                     self._cache.keep_only(())
-            except LightpaintError as error:
+            except (LightpaintError, MemoryError) as error:
                 if is_disk_full(error):
                     raise
+                why = OUT_OF_MEMORY_TEXT if isinstance(error, MemoryError) else str(error)
                 for step in steps:
-                    self._fail(self._looks[step.task.look], step, str(error))
+                    self._fail(self._looks[step.task.look], step, why)
                 return
             for wave in waves(steps, self._looks):
                 given = [replace(step, task=replace(step.task, files=files)) for step in wave]

@@ -27,6 +27,12 @@ _HOMES = {
     "solve": "solve",
 }
 
+#: The scene or the film asks for that, which is no fault of the program.
+OUT_OF_MEMORY_TEXT = (
+    "this takes more memory than there is: close other programs, or render a smaller film "
+    '(--resolution 1/2 takes about a quarter; in a manifest, resolution = "1/2")'
+)
+
 
 def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
     """Run one command and return the exit code. came: the signals that have been heard."""
@@ -94,5 +100,8 @@ def _failed(command: str, error: Exception, given: Sequence[str]) -> int:
     if isinstance(error, LightpaintError):
         for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
             lines.err(f"lightpaint {command}: {spoken(line)}")
+        return 2
+    if isinstance(error, MemoryError):
+        lines.err(f"lightpaint {command}: {OUT_OF_MEMORY_TEXT}")
         return 2
     return report_fault(f"lightpaint {command}", error, given)

@@ -242,6 +242,21 @@ def test_a_full_disk_stops_with_one_line_and_goes_on_after(
     assert contents(here / "out") == contents(here / "whole")
 
 
+def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def too_large(*_: Any, **__: Any) -> None:
+        raise MemoryError
+
+    with monkeypatch.context() as patch:
+        patch.setattr("lightpaint.batch.run.obtain_bases", too_large)
+        done = run(here, "batch", "looks.toml", "-o", "out", "-q")
+    assert done.returncode == 1
+    assert "it takes more memory than there is" in done.stderr
+    assert "Traceback" not in done.stderr
+    succeed(here, "batch", "looks.toml", "-o", "out")
+
+
 def test_a_disk_that_is_really_full(here: Path) -> None:
     disk = here / "disk"
     disk.mkdir()

@@ -71,6 +71,13 @@ def test_what_nobody_foresaw_has_a_code_a_line_and_a_private_file(
     assert "\x1b" not in told
 
 
+def test_too_little_memory_is_no_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fails(monkeypatch, MemoryError("Unable to allocate 12 GiB"))
+    line = refused(tmp_path, "doctor")
+    assert "more memory than there is" in line
+    assert "--resolution 1/2" in line
+
+
 def test_where_nothing_can_be_written_it_is_one_line_still(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
