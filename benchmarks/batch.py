@@ -31,7 +31,7 @@ from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.batch.work.basis_parts import InParts
+from lightpaint.batch.work.basis_parts import PartwiseRender
 from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import SceneFilm
@@ -178,7 +178,7 @@ def basis(engine: Engine, spp: int, cache: Path) -> Basis:
     file = SceneFile(str(GALLERY))
     scene = file.content
     film = SceneFilm(file, files=tuple(map(str, scene.read_files)))
-    return InParts(engine, film)(scene, spp=spp, time_s=None, seed=0, progress=silent)
+    return PartwiseRender(engine, film)(scene, spp=spp, time_s=None, seed=0, progress=silent)
 
 
 def _kept(made: list[Basis], by: Callable[[], Basis]) -> None:

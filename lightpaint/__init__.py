@@ -69,8 +69,8 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
-    from lightpaint.pipeline.call import paint_with_light as paint_with_light
     from lightpaint.pipeline.job import Job as Job
+    from lightpaint.pipeline.one_call import paint_with_light as paint_with_light
     from lightpaint.pipeline.pipeline import run as run
     from lightpaint.pipeline.results import Look as Look
     from lightpaint.pipeline.settings import Settings as Settings
@@ -127,7 +127,7 @@ _HOMES = {
     "display_picture": "images.formats.png",
     "error_bars": "lighting.analysis.noise.uncertainty",
     "load_scene": "scene.scene",
-    "paint_with_light": "pipeline.call",
+    "paint_with_light": "pipeline.one_call",
     "read_basis": "basis.file",
     "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.read",

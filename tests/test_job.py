@@ -188,7 +188,7 @@ def test_what_is_no_job_is_refused_in_one_line():
         json.dumps({**good, "settings": {**good["settings"], "refine": "1"}}),
         json.dumps({**good, "by_sensor": 1}),
     ):
-        with pytest.raises(LightpaintError, match="this is no job: ") as refused:
+        with pytest.raises(LightpaintError, match="this is not a job: ") as refused:
             Job.from_json(bad)
         assert "\n" not in str(refused.value)
     with pytest.raises(LightpaintError, match="spp is 1: expected a whole number >= 2"):

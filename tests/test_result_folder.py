@@ -46,7 +46,7 @@ def no_render(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object, **__: object) -> None:
         raise AssertionError("this was to be refused before it renders")
 
-    for name in ("pipeline.obtain", "renders.render", "renders.render_surfaces"):
+    for name in ("pipeline.obtain", "templates.render", "templates.render_surfaces", "relit_renders.render"):
         monkeypatch.setattr(f"lightpaint.pipeline.{name}", never)
 
 
@@ -224,7 +224,7 @@ def test_results_of_an_older_version_say_nothing_of_whose_they_are(here: Path) -
     (here / "evening" / RECORD).unlink()
     (here / "evening" / "relit.xml").write_text("earlier", encoding="utf-8")
     line = refused(here, *SOLVE, "gallery/evening.exr")
-    assert "evening holds results that do not say what they answer, as an older" in line
+    assert "evening holds results of an older lightpaint, which do not name their" in line
     assert line.endswith("name another folder (-o), or replace it (--force)")
     succeed(here, *SOLVE, "gallery/evening.exr", "--force")
     assert not (here / "evening" / "relit.xml").exists()
@@ -236,7 +236,7 @@ def test_somebody_else_s_files_are_kept(here: Path, name: str) -> None:
     (here / "out").mkdir()
     (here / "out" / name).write_text("{}", encoding="utf-8")
     line = refused(here, *SOLVE, "gallery/evening.exr", "-o", "out")
-    assert ("say what they answer" if name == "lighting.json" else "no result of") in line
+    assert ("an older lightpaint" if name == "lighting.json" else "not a result of") in line
     assert (here / "out" / name).read_text() == "{}"
 
 
@@ -266,7 +266,7 @@ def test_a_damaged_record_is_none(here: Path, damage: dict[str, Any]) -> None:
     record = json.loads(path.read_text(encoding="utf-8"))
     path.write_text(json.dumps(record | damage), encoding="utf-8")
     line = refused(here, *SOLVE, "gallery/evening.exr")
-    assert "do not say what they answer" in line
+    assert "do not name their painting" in line
     succeed(here, *SOLVE, "gallery/evening.exr", "--force")
     assert (here / "gallery" / "evening.exr").is_file()
 

@@ -24,7 +24,7 @@ from lightpaint.pipeline.sources import (
     BasisFile,
     GroupsFile,
     SceneFile,
-    check_nothing_idle,
+    check_nothing_unused,
     content,
 )
 from lightpaint.scene.presets import on_film
@@ -77,7 +77,7 @@ def make_subject(
         scene = _scene_on_film(source, settings, constraints)
         about: dict[str, Any] = {"scene": scene}
     else:
-        check_nothing_idle(settings, source)
+        check_nothing_unused(settings, source)
         found = content(source)
         basis = found.basis if isinstance(found, LightGroups) else found
         _check_constraints(basis.lights, constraints)

@@ -1,1 +1,1 @@
-"""The corridor: a job, its run, and the results that it leaves."""
+"""The pipeline: a job, its run, and its results."""

@@ -1,7 +1,7 @@
-"""Writing an answer into a folder: the lighting, the scene that has it, files for other programs.
+"""Writing an answer to a folder: the lighting, the relit scene, files for other programs.
 
-Whoever has found a lighting leaves it by this: a run, a batch, a variation, a relight and the
-painter. Pictures and reports of it are theirs.
+Everything that finds a lighting writes it with these functions: a run, a batch, a variation, a
+relight and the painter. They add their own pictures and reports.
 """
 
 from collections.abc import Iterator
@@ -17,19 +17,20 @@ from lightpaint.relit.export.exports import EXPORTS, write_exports
 from lightpaint.relit.relight import check_relightable, relight, settle
 from lightpaint.scene.scene import Scene, load_scene
 
-#: Files of an answer beside those that include it and those for other programs.
+#: Files of every answer; a scene may add files that it includes, light groups those for other
+#: programs.
 LIGHTING, RELIT = "lighting.json", "relit.xml"
 
 
 @dataclass
 class AnswerFolder:
-    """A folder that an answer was written to, before it takes its place.
+    """A hidden folder with an answer, before it replaces the real one.
 
     Attributes:
         path: The folder.
-        relit: The scene as it was relit there; None without a scene.
-        has_moved_paths: Whether relative paths in relit.xml are others in its place: known at the
-            end.
+        relit: The relit scene in that folder; None without a scene.
+        has_moved_paths: True if relative paths in relit.xml change when it moves to its final
+            place; set at the end.
     """
 
     path: Path
@@ -37,11 +38,11 @@ class AnswerFolder:
     has_moved_paths: bool = False
 
     def seen_through(self, sensor: int) -> Scene:
-        """Return the relit scene through a sensor; it is loaded anew for another one."""
+        """Return the relit scene through a sensor, reloaded if that is a different one."""
         assert self.relit is not None
         if self.relit.sensor == sensor:
             return self.relit
-        return loaded_relit(self.relit, self.relit.path, sensor)
+        return reload_relit(self.relit, self.relit.path, sensor)
 
 
 def write_answer(
@@ -52,10 +53,10 @@ def write_answer(
     groups: LightGroups | None = None,
     has_lighting: bool = False,
 ) -> Scene | None:
-    """Write an answer to files that people and programs read; return the scene as it was relit.
+    """Write an answer to files for people and programs; return the relit scene.
 
-    scene: that is to be relit. groups: light groups of another renderer, for which there are files
-    for other programs. has_lighting: whether lighting.json is there already, or is not wanted.
+    scene: the scene to relight. groups: light groups of another renderer, which get files for other
+    programs. has_lighting: True if lighting.json exists already, or is not needed.
     """
     if not has_lighting:
         write_lighting(folder / LIGHTING, lighting)
@@ -71,9 +72,9 @@ def answer_files(
     groups: LightGroups | None = None,
     has_lighting: bool = False,
 ) -> list[Path]:
-    """Return the files that `write_answer` writes at most.
+    """Return all files that `write_answer` may write.
 
-    Raises what it would raise for some lighting, before anything is paid for.
+    Raises the errors that `write_answer` would raise for any lighting, before any expensive work.
     """
     files = [] if has_lighting else [folder / LIGHTING]
     if scene is not None:
@@ -92,21 +93,22 @@ def new_answer(
     groups: LightGroups | None = None,
     has_lighting: bool = False,
 ) -> Iterator[AnswerFolder]:
-    """Yield a folder with an answer, to which more may be written; it then appears all at once.
+    """Yield a folder with an answer, to which more files may be added; it then appears all at once.
 
-    Others as of `write_answer`. Raises OutputError as `ResultFolder.filled` does.
+    The other arguments are those of `write_answer`. Raises OutputError as `ResultFolder.filled`
+    does.
     """
     with results.filled() as folder:
-        written = write_answer(
+        relit = write_answer(
             folder, lighting, scene=scene, groups=groups, has_lighting=has_lighting
         )
-        answer = AnswerFolder(folder, written)
+        answer = AnswerFolder(folder, relit)
         yield answer
         if scene is not None:
             home = results.folder / RELIT
             answer.has_moved_paths = settle(scene, lighting, folder / RELIT, home)
 
 
-def loaded_relit(relit: Scene, path: Path, sensor: int) -> Scene:
-    """Load a relit scene anew from `path`, with the parameters that it has."""
+def reload_relit(relit: Scene, path: Path, sensor: int) -> Scene:
+    """Load a relit scene again from `path`, with its parameters."""
     return load_scene(path, sensor=sensor, parameters=relit.parameters, use_lights_file=False)

@@ -1,8 +1,8 @@
-"""One record of what is asked: scene or basis, paintings, constraints, settings, folder.
+"""A job: scene or basis, paintings, constraints, settings and folder, in one record.
 
-A job is checked once, when it is born: whatever somebody gave is looked at before the first
-sample is taken. One of files and plain values can be sent to another machine, which reads the
-files anew; one of objects in memory can only be run where it is.
+A job is checked once, when it is created: every mistake in it is reported before the first sample.
+A job of files and plain values can be sent to another machine, which reads the files again; a job
+of objects in memory can only run where it is.
 """
 
 from collections.abc import Sequence
@@ -31,14 +31,14 @@ from lightpaint.pipeline.remarks import (
     remarks_of_target,
 )
 from lightpaint.pipeline.result_folder import ResultFolder
-from lightpaint.pipeline.results import ALWAYS, VIEW_RESULTS, view_names
+from lightpaint.pipeline.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import (
     BasisFile,
     GroupsFile,
     Painting,
     SceneFile,
-    check_nothing_idle,
+    check_nothing_unused,
     content,
 )
 from lightpaint.placement.light_search import check_suggestible
@@ -52,10 +52,10 @@ from lightpaint.threads import parallel_map
 
 @dataclass(frozen=True)
 class PaintedView:
-    """What is seen through one sensor: its painting, and where its results go.
+    """The view through one sensor: its painting, and the folder of its results.
 
-    scene: on the film of the basis; None where there is only a basis. target: of the size of the
-    basis. basis: None where it is still to be rendered.
+    scene: on the film of the basis; None if there is only a basis. target: of the size of the
+    basis. basis: None if it is still to be rendered.
     """
 
     scene: Scene | None
@@ -67,26 +67,26 @@ class PaintedView:
 @keywords()
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One lighting to be found, for one view or several; checked whole when it is born.
+    """A lighting to find, for one view or several; it is checked completely when it is created.
 
     Attributes:
-        scenes: The scene through the sensor of each view; none to solve from `basis` alone, without
-            a renderer.
-        targets: What each view is to show.
+        scenes: The scene through the sensor of each view; empty to solve from `basis` alone,
+            without a renderer.
+        targets: The painting of each view.
         folder: Receives the results.
-        basis: Made before of the one view; taken from the cache or rendered if not given. Of light
-            groups that another renderer made, `folder` receives the answer for other programs, too.
-        constraints: What is asked of the lights; it goes before what the scene's lights file asks.
-        settings: How it is to be answered.
-        by_sensor: Whether pictures go to a folder for each sensor, as they do of several.
-        views: Found at birth: each view, with what it needs.
-        asked: Found at birth: all constraints, those of the lights file first.
-        fit: Found at birth: the settings, with all decided that follows from the paintings.
-        remarks: Found at birth: what is worth saying to a person, in plain text.
-        results: Found at birth: the folder, and what may be replaced there.
+        basis: Existing basis of a single view; taken from the cache or rendered if not given. With
+            another renderer's light groups `folder` also receives files for other programs.
+        constraints: Constraints on the lights; they override those of the scene's lights file.
+        settings: Settings of the solve.
+        by_sensor: True to write the pictures to a folder for each sensor, as with several views.
+        views: Set on creation: the views, each with what it needs.
+        asked: Set on creation: all constraints, those of the lights file first.
+        fit: Set on creation: the settings, with those decided that depend on the paintings.
+        remarks: Set on creation: remarks for the user, in plain text.
+        results: Set on creation: the folder, and the files that may be replaced there.
 
     Raises:
-        LightpaintError: For what cannot be.
+        LightpaintError: For an invalid job.
 
     Examples:
         >>> from pathlib import Path
@@ -114,8 +114,8 @@ class Job:
     def __post_init__(self) -> None:
         self._check_counts()
         if not self.scenes:
-            check_nothing_idle(self.settings, self.basis)
-        # A painting is read beside the basis, and a mistake in it is said first.
+            check_nothing_unused(self.settings, self.basis)
+        # Paintings and basis are read in parallel; an error in a painting is reported first.
         *targets, basis = parallel_map(content, [*self.targets, self.basis])
         basis = basis.basis if isinstance(basis, LightGroups) else basis
         if basis is not None and basis.origin.is_light_groups:
@@ -126,36 +126,36 @@ class Job:
         if self.by_sensor or len(scenes) > 1:
             folders = [self.folder / name for name in view_names(scenes)]
         self._check_painting_is_no_light()
-        told = scenes[0] if scenes else basis
+        source = scenes[0] if scenes else basis
         asked = self.constraints
-        if isinstance(told, Scene | Basis):
-            asked = constraints_of(told.requests).and_then(asked)
+        if isinstance(source, Scene | Basis):
+            asked = constraints_of(source.requests).and_then(asked)
         if scenes and basis is not None:
             check_same_view(scenes[0], basis)
-        # Names what cannot be had before it renders.
+        # Reports impossible constraints before rendering.
         reduce_to(asked, basis_lights(scenes[0]) if basis is None else basis.lights)
         if self.settings.suggest:
             check_suggestible(scenes[0])
         views = tuple(
-            PaintedView(*self._on_one_film(scene, target, basis), folder, basis)
+            PaintedView(*self._with_equal_size(scene, target, basis), folder, basis)
             for scene, target, folder in zip(scenes or [None], targets, folders, strict=True)
         )
         results = self._result_folder(views, scenes, targets)
         results.check()
-        # The only place that sets what was found; frozen afterwards.
-        born = vars(self)
+        # The only place that sets these fields; they are frozen afterwards.
+        fields = vars(self)
         fit = resolve_for_targets(self.settings, [view.target for view in views])
-        born.update(views=views, asked=asked, fit=fit, results=results)
-        born.update(remarks=tuple(self._remarks(targets, scenes)))
+        fields.update(views=views, asked=asked, fit=fit, results=results)
+        fields.update(remarks=tuple(self._remarks(targets, scenes)))
 
     @property
     def groups(self) -> LightGroups | None:
-        """The light groups it is solved from, if it is from such."""
-        found = content(self.basis)
-        return found if isinstance(found, LightGroups) else None
+        """The light groups that the job is solved from; None for another basis."""
+        basis = content(self.basis)
+        return basis if isinstance(basis, LightGroups) else None
 
     def to_json(self) -> str:
-        """This job as text, to be run elsewhere; paths stay as they were given.
+        """Return this job as text, to run it elsewhere; paths stay as they were given.
 
         Raises LightpaintError for a job of objects in memory.
         """
@@ -172,14 +172,14 @@ class Job:
     @staticmethod
     @keywords()
     def from_json(text: str) -> "Job":
-        """The job that `to_json` wrote, of the files as they are here and now.
+        """Return the job that `to_json` wrote, with the files as they are now on this machine.
 
-        Raises LightpaintError for what is no job, and for one that cannot be done here.
+        Raises LightpaintError for invalid text, and for a job that cannot run here.
         """
         return Job(**decode_job(text))
 
     def __eq__(self, other: object) -> bool:
-        """Whether the same is asked of the same files. Jobs in memory equal only themselves."""
+        """Return True if both ask the same of the same files; in memory, if identical."""
         if self is other or not isinstance(other, Job):
             return self is other
         try:
@@ -191,10 +191,10 @@ class Job:
         return hash(self.folder)
 
     def _check_counts(self) -> None:
-        """Raise unless every view has its painting, and there is something to solve with."""
+        """Raise unless every view has a painting, and there is a scene or a basis."""
         if not isinstance(self.constraints, Constraints):
             raise ConstraintError(
-                f"the constraints are a {type(self.constraints).__name__}: give Constraints.of(...)"
+                f"the constraints are a {type(self.constraints).__name__}: pass Constraints.of(...)"
             )
         if not self.scenes and self.basis is None:
             raise LightpaintError("give a scene, a basis, or both")
@@ -202,17 +202,17 @@ class Job:
             raise TargetError("no painting to solve for: give a target")
         several = len(self.targets) > 1 or len(self.scenes) > 1
         if several and self.basis is not None:
-            raise BasisError("a basis has one view only: give the scene, to solve for several")
+            raise BasisError("a basis has only one view: give the scene to solve for several")
         if several and self.settings.suggest:
-            raise LightpaintError("lights are suggested for one view only: leave out the others")
+            raise LightpaintError("lights can be suggested for one view only: leave out the others")
         if self.scenes and len(self.targets) != len(self.scenes):
             raise TargetError(
                 f"{len(self.targets)} targets for {len(self.scenes)} views: give one for each; "
-                "several paintings of one view are a job each"
+                "several paintings of one view need a job each"
             )
 
     def _check_painting_is_no_light(self) -> None:
-        """Raise BasisError where a folder of light groups has the painting among its lights."""
+        """Raise BasisError if a folder of light groups includes the painting as a light."""
         if self.groups is None or not self.groups.path.is_dir():
             return
         files = {layer.file.resolve() for layer in self.groups.layers}
@@ -226,12 +226,12 @@ class Job:
     def _result_folder(
         self, views: Sequence[PaintedView], scenes: Sequence[Scene], targets: Sequence[Target]
     ) -> ResultFolder:
-        """Where results go, with all that is read for them. targets: as they were read."""
+        """Return the result folder, with all files that are read. targets: as they were read."""
         scene = scenes[0] if scenes else None
         files = answer_files(self.folder, scene=scene, groups=self.groups)
         for view in views:
             check_writable(view.folder)
-            files += [view.folder / name for name in (VIEW_RESULTS if scenes else ALWAYS)]
+            files += [view.folder / name for name in (VIEW_RESULTS if scenes else SOLVE_RESULTS)]
         reads = [file for target in targets for file in target.files]
         reads += [file for scene in scenes for file in scene.read_files]
         if isinstance(self.basis, BasisFile):
@@ -246,33 +246,33 @@ class Job:
             force=self.settings.force,
         )
 
-    def _on_one_film(
+    def _with_equal_size(
         self, scene: Scene | None, target: Target, basis: Basis | None
     ) -> tuple[Scene | None, Target]:
-        """Scene and target of the size that the basis has, or will have."""
+        """Return scene and target in the size that the basis has, or will have."""
         if not isinstance(target, Target):
             raise TargetError(
-                f"the target is a {type(target).__name__}: give what read_target returns"
+                f"the target is a {type(target).__name__}: pass what read_target returns"
             )
         if scene is not None:
             check_same_picture(target, scene)
         if scene is not None and basis is None:
             scene = on_film(scene, self.settings.quality, self._resolution(scene, target))
-        given = scene if basis is None else basis
-        assert given is not None
-        fitted = target.fitted_to(given.size, resize=self.settings.resize)
-        return scene, fitted if self.groups is None else fitted.without(self.groups.holes)
+        sized = scene if basis is None else basis
+        assert sized is not None
+        resized = target.fitted_to(sized.size, resize=self.settings.resize)
+        return scene, resized if self.groups is None else resized.without(self.groups.holes)
 
     def _resolution(self, scene: Scene, target: Target) -> str | None:
-        """Return the resolution asked for; else, of a smaller template, that it was painted at."""
-        asked = self.settings
-        if asked.quality is not None or asked.resolution is not None or asked.resize:
-            return asked.resolution
+        """Return the resolution in the settings, else that of a smaller painted template."""
+        settings = self.settings
+        if settings.quality is not None or settings.resolution is not None or settings.resize:
+            return settings.resolution
         factor = whole_factor(scene.size, target.size)
         return f"1/{factor}" if target.content and factor and factor > 1 else None
 
     def _remarks(self, targets: Sequence[Target], scenes: Sequence[Scene]) -> list[str]:
-        """Say what a person should know before this is run. targets, scenes: as they were read."""
+        """Return remarks for the user before this runs. targets, scenes: as they were read."""
         remarks = []
         if self.groups is not None:
             remarks += [*self.groups.remarks, *spoken_unreadable(self.groups, self.folder)]
@@ -287,15 +287,15 @@ class Job:
         return remarks + remarks_of_pictures()
 
 
-def _over_look(given: Target | Painting, target: Target, basis: Basis) -> Target:
-    """Return `target`, as it was painted over what `basis` shows, where it was."""
-    if not isinstance(given, Painting):
+def _over_look(source: Target | Painting, target: Target, basis: Basis) -> Target:
+    """Return `target`, read as painted over the look of `basis` if it was."""
+    if not isinstance(source, Painting):
         return target
-    return given.over(basis.present_look, f"the look of {basis.origin.scene}") or target
+    return source.over(basis.present_look, f"the look of {basis.origin.scene}") or target
 
 
 def check_same_picture(target: Target, scene: Scene) -> None:
-    """Raise TargetError for a painting of another view than `scene` is seen through."""
+    """Raise TargetError if the painting's sensor is not that of `scene`."""
     sensor = scene.sensor_names[scene.sensor]
     if target.sensor not in ("", sensor):
         raise TargetError(

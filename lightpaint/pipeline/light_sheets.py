@@ -1,4 +1,4 @@
-"""Sheets of lights: a picture of what each light of a scene does alone."""
+"""Light sheets: a picture of each light of a scene alone."""
 
 from pathlib import Path
 
@@ -15,43 +15,47 @@ from lightpaint.scene.presets import Preset
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 
-#: Rendering of a sheet of lights, and its seed: one of its own, so that no answer that goes on from
-#: what is kept depends on whether somebody has looked at the lights.
+#: Rendering of a light sheet, and its own seed: answers that continue a cached basis must not
+#: depend on whether somebody has looked at the lights.
 SHEET, SHEET_SEED = Preset(16, 2**15), 2**31 - 1
 
-#: Pixels of all lights together that are rendered for it, and of each at least; bytes of a kept
-#: basis that is read for it, at most; lights that it is rendered for where each takes a render.
-MANY_PIXELS, FEW_PIXELS, MUCH, FEW_RENDERS = 2**20, 2**12, 2**27, 6
+#: Most pixels of all lights together that are rendered for a sheet, and fewest of each light; most
+#: bytes of a cached basis that is read for it; most lights if each needs a render of its own.
+SHEET_MAX_PIXELS, LIGHT_MIN_PIXELS, MAX_BASIS_BYTES, MAX_RENDERS = 2**20, 2**12, 2**27, 6
 
-#: Text of a PNG that is a sheet of lights.
+#: Key of the text in a PNG that marks it as a light sheet.
 SHEET_KEY = "lightpaint.lights"
 
 
 def check_sheet(scene: Scene, path: Path, *, force: bool = False) -> None:
-    """Raise OutputError for a place that the sheet of `scene` cannot or should not go to."""
+    """Raise OutputError if the sheet of `scene` cannot or should not be written to `path`."""
     if path.suffix.lower() != ".png":
-        raise OutputError(f"{path} must end in .png, the format that is written")
+        raise OutputError(f"{path} must end in .png: a light sheet is a PNG")
     check_files([path], scene.read_files)
     check_writable(path.parent)
     if path.exists() and not force and not (path.is_file() and png_has_text(path, SHEET_KEY)):
         raise OutputError(
-            f"{path} is there, and no sheet of lights: choose another name with folder=..., or "
+            f"{path} exists and is not a light sheet: choose another name with folder=..., or "
             "pass force=True"
         )
 
 
 def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
-    """Write what each light of `scene` does alone to `path`, a PNG to look at.
+    """Write a picture of each light of `scene` alone to `path`, a PNG.
 
-    Of a basis that is kept or, where there is none, of few samples on a small film. Returns why
-    nothing was written, if that takes too long here; "" if it was.
+    It shows a cached basis or, if there is none, one of few samples on a small film. Returns "", or
+    the reason why nothing was written, if rendering would take too long.
     """
     sensor = scene.sensor_names[scene.sensor]
-    basis = cache.any_of(scene.identity, sensor, samples=SHEET.spp * FEW_PIXELS, largest=MUCH)
+    basis = cache.any_of(
+        scene.identity, sensor, samples=SHEET.spp * LIGHT_MIN_PIXELS, largest=MAX_BASIS_BYTES
+    )
     if basis is None:
-        if why := _why_no_sheet(scene):
-            return why
-        pixels = max(min(SHEET.pixels or 0, MANY_PIXELS // len(scene.lights)), FEW_PIXELS)
+        if reason := _why_no_sheet(scene):
+            return reason
+        pixels = max(
+            min(SHEET.pixels or 0, SHEET_MAX_PIXELS // len(scene.lights)), LIGHT_MIN_PIXELS
+        )
         small = scene.reduced(f"1/{Preset(SHEET.spp, pixels).reduction(scene.film)}")
         basis = obtain_basis(small, spp=SHEET.spp, seed=SHEET_SEED, progress=progress)
     title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {len(scene.lights)} lights"
@@ -62,10 +66,10 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
 
 
 def _why_no_sheet(scene: Scene) -> str:
-    """Why the lights of `scene` are not rendered just to be looked at; "" if they are."""
+    """Return the reason not to render lights just to look at them; "" if there is none."""
     if note := use_variant().note:
         return note
-    why = why_not_one_pass(scene)
-    if why is None or len(scene.lights) <= FEW_RENDERS:
+    reason = why_not_one_pass(scene)
+    if reason is None or len(scene.lights) <= MAX_RENDERS:
         return ""
-    return f"{why}, so that each light takes a render of its own"
+    return f"{reason}, so that each light needs a render of its own"

@@ -1,4 +1,4 @@
-"""The corridor: obtain bases → solve → improve → analyse → relight → predict, verify, report."""
+"""The pipeline: obtain bases → solve → improve → analyse → relight → predict, verify, report."""
 
 import math
 import time
@@ -18,7 +18,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.pipeline.answer_folder import AnswerFolder, loaded_relit, new_answer
+from lightpaint.pipeline.answer_folder import AnswerFolder, new_answer, reload_relit
 from lightpaint.pipeline.job import Job, PaintedView
 from lightpaint.pipeline.results import Look, write_predicted, write_report
 from lightpaint.pipeline.settings import Settings
@@ -38,13 +38,13 @@ from lightpaint.scene.scene import Scene
 
 @keywords()
 def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = None) -> list[Look]:
-    """Do `job`: find its lighting, prove it, and write results to its folder.
+    """Run `job`: find its lighting, verify it, and write results to its folder.
 
     Args:
-        job: What is asked.
-        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
-        bases: Of the views on their films, where an earlier run has obtained them; the list is
-            emptied, so that no pixel is held twice.
+        job: The job to run.
+        progress: Receives progress and, if it is a `Listener`, remarks.
+        bases: Bases of the views on their films, if an earlier run has obtained them; the list is
+            emptied to save memory.
 
     Returns:
         A look for each view.
@@ -61,7 +61,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     for remark in job.remarks:
         listen.say(remark)
     problem = Problem.of(
-        _obtained(job, bases, listen),
+        _obtain_bases(job, bases, listen),
         [view.target for view in job.views],
         constraints=job.asked,
         fit=job.fit,
@@ -69,15 +69,15 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     if job.settings.report:
         for basis in problem.views.bases:
             make_ahead(basis, prepare_page)
-    solution = _improved(job, solution_of(problem), listen)
+    solution = _reduce_noise(job, solution_of(problem), listen)
     analyses = analyse(solution)
     lighting, scene = with_findings(solution, analyses).lighting, job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
-            _finished(job, answer, view, analysis, _hearing(job, view, listen))
+            _finish_view(job, answer, view, analysis, _view_listener(job, view, listen))
             for view, analysis in zip(job.views, analyses, strict=True)
         ]
-    return [_loaded_anew(look) for look in looks] if answer.has_moved_paths else looks
+    return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
 
 
 def obtain(
@@ -88,9 +88,10 @@ def obtain(
     views: int = 1,
     render: Render = render_basis,
 ) -> Basis:
-    """The basis of `scene` on its film, kept or rendered.
+    """Return the basis of `scene` on its film, from the cache or rendered.
 
-    views: that share the time there is. render: who renders what is missing.
+    views: number of views that share the rendering time. render: function that renders missing
+    samples.
     """
     listen = listener(progress)
     is_rendered = is_all_rendered = False
@@ -101,11 +102,11 @@ def obtain(
         is_rendered = True
         listen(label, done, total, unit)
 
-    asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+    spp = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
     began_s = time.perf_counter()
     basis = obtain_basis(
         scene,
-        spp=asked,
+        spp=spp,
         time_s=None if settings.time_s is None else settings.time_s / views,
         seed=settings.seed,
         use_cache=settings.use_cache,
@@ -117,42 +118,44 @@ def obtain(
         basis = replace(basis, render_s=time.perf_counter() - began_s)
     if settings.use_cache and not cache.is_kept(basis):
         listen.say(
-            f"the basis could not be kept in {folder()}, so the next run renders it again: "
+            f"the basis could not be saved in {folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
         )
     elif settings.use_cache and is_rendered:
         clean_planes(basis, most=MOST, progress=lambda k, n: listen("denoising", k, n, "planes"))
-    has = f"basis of {basis.origin.spp} samples per pixel"
-    wanted = scene.spp if asked is None else asked
-    if not is_rendered and basis.origin.spp > samples_for(scene, asked):
+    basis_text = f"basis of {basis.origin.spp} samples per pixel"
+    requested_spp = scene.spp if spp is None else spp
+    if not is_rendered and basis.origin.spp > samples_for(scene, spp):
         listen.say(
-            f"{has} kept from an earlier run: more than the {wanted} asked for, so the answer may "
-            "differ a little from one of these (exact_spp=True takes just them)"
+            f"{basis_text} kept from an earlier run: more than the {requested_spp} requested, so "
+            "the answer may differ a little from one with exactly these (exact_spp=True)"
         )
     elif not is_rendered:
-        listen.say(f"{has} kept from an earlier run (use_cache=False renders it anew)")
-    elif settings.time_s is None and basis.origin.spp > wanted + 1:
-        listen.say(f"{has}, not {wanted}: it takes one in each pixel of a block for each half")
+        listen.say(f"{basis_text} kept from an earlier run (use_cache=False renders it again)")
+    elif settings.time_s is None and basis.origin.spp > requested_spp + 1:
+        listen.say(
+            f"{basis_text}, not {requested_spp}: a block needs a sample in each pixel for each half"
+        )
     origin, (height, width) = basis.origin, basis.size
-    how = "rendered" if is_rendered else "taken from the cache"
+    origin_text = "rendered" if is_rendered else "taken from the cache"
     listen.note(
-        f"basis {how}: {len(basis.lights)} lights, {width}x{height} pixels, {origin.spp} samples "
-        f"per pixel, seed {origin.seed}, {origin.method}"
+        f"basis {origin_text}: {len(basis.lights)} lights, {width}x{height} pixels, {origin.spp} "
+        f"samples per pixel, seed {origin.seed}, {origin.method}"
     )
     return basis
 
 
-def _obtained(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:
-    """The basis of each view: handed in, given with the job, kept, or rendered."""
+def _obtain_bases(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:
+    """Return the basis of each view: passed in, given with the job, cached or rendered."""
     if bases is None:
-        made = [_basis_of(job, view, listen) for view in job.views]
+        obtained = [_basis_of(job, view, listen) for view in job.views]
     else:
-        made = list(bases)
+        obtained = list(bases)
         bases.clear()
-    # What the scene's lights file asks by now, whenever they were made.
+    # With the present requests of the scene's lights file, whenever the bases were made.
     return [
         basis if view.scene is None else basis.with_requests(view.scene.requests)
-        for basis, view in zip(made, job.views, strict=True)
+        for basis, view in zip(obtained, job.views, strict=True)
     ]
 
 
@@ -160,19 +163,20 @@ def _basis_of(job: Job, view: PaintedView, listen: Listener) -> Basis:
     if view.basis is not None:
         return view.basis
     assert view.scene is not None
-    return obtain(view.scene, job.settings, _hearing(job, view, listen), views=len(job.views))
+    return obtain(view.scene, job.settings, _view_listener(job, view, listen), views=len(job.views))
 
 
-def _hearing(job: Job, view: PaintedView, listen: Listener) -> Listener:
-    """`listen`, told of which view, where there are several."""
+def _view_listener(job: Job, view: PaintedView, listen: Listener) -> Listener:
+    """Return `listen`, which names the view if there are several."""
     return listen if len(job.views) == 1 else labelled(listen, view.folder.name)
 
 
-def _improved(job: Job, solution: Solution, listen: Listener) -> Solution:
-    """What can be done against noise is done."""
-    settings, found = job.settings, solution.certificate
+def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
+    """Return the solution corrected for noise and refined by rendering, as the settings ask."""
+    settings, certificate = job.settings, solution.certificate
     listen.note(
-        f"solved in {max(found.sweeps)} sweeps, to a KKT residual of {max(found.kkt_residual):.1e}"
+        f"solved in {max(certificate.sweeps)} sweeps, to a KKT residual of "
+        f"{max(certificate.kkt_residual):.1e}"
     )
     if settings.corrects_noise(is_known=solution.basis.knows_noise):
         solution = correct_noise(solution)
@@ -185,40 +189,42 @@ def _improved(job: Job, solution: Solution, listen: Listener) -> Solution:
     return replace(solution, lighting=lighting)
 
 
-def _loaded_anew(look: Look) -> Look:
-    """`look` with its relit scene as it is written by now."""
+def _reloaded(look: Look) -> Look:
+    """Return `look` with its relit scene as it is on disk now."""
     assert look.relit is not None
-    relit = loaded_relit(look.relit, look.relit.path, look.relit.sensor)
+    relit = reload_relit(look.relit, look.relit.path, look.relit.sensor)
     return replace(look, relit=relit)
 
 
-def _finished(
+def _finish_view(
     job: Job, answer: AnswerFolder, view: PaintedView, analysis: Analysis, listen: Listener
 ) -> Look:
-    """A view predicted, verified and shown."""
+    """Predict, verify and report a view; return its look."""
     settings, scene, solution = job.settings, view.scene, analysis.solution
     listen.note("analysed, and the lighting written")
     basis = solution.basis
-    place = answer.path / view.folder.relative_to(job.folder)
-    place.mkdir(exist_ok=True)
+    folder = answer.path / view.folder.relative_to(job.folder)
+    folder.mkdir(exist_ok=True)
     predicted = combine(basis, solution.lighting)
     verification, suggestions, budget, relit = None, None, None, None
     if scene is not None:
         relit = answer.seen_through(scene.sensor)
         budget = _budget(settings, basis, relit)
         if relit.parameters and view is job.views[0]:
-            given = " ".join(f"-D{name}={value}" for name, value in relit.parameters.items())
-            listen.say(f"relit.xml keeps the scene's own defaults: give Mitsuba {given} with it")
+            arguments = " ".join(f"-D{name}={value}" for name, value in relit.parameters.items())
+            listen.say(
+                f"relit.xml keeps the scene's own defaults: pass {arguments} to Mitsuba with it"
+            )
     spp, size = basis.origin.spp, basis.size
     if budget is not None:
         spp, size = budget.spp, budget.scene.size
     write_predicted(
-        place / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size, scene=relit
+        folder / "predicted.exr", predicted, origin=basis.origin, spp=spp, size=size, scene=relit
     )
     if budget is not None and settings.verify:
-        listen.say(_spoken(budget, basis, is_fixed=settings.verify_spp is not None))
-        verification = _verified(settings, predicted, budget, solution, listen)
-        write_estimate(place / "verified.exr", verification.verified, {})
+        listen.say(_verification_text(budget, basis, is_fixed=settings.verify_spp is not None))
+        verification = _verify(settings, predicted, budget, solution, listen)
+        write_estimate(folder / "verified.exr", verification.verified, {})
         listen.note(f"verified with {verification.spp} samples per pixel")
     if settings.suggest and scene is not None:
         suggestions = suggest_lights(
@@ -235,21 +241,21 @@ def _finished(
         analysis=analysis,
         suggestions=suggestions,
     )
-    write_report(place, look, command=settings.command, is_shown=settings.report)
+    write_report(folder, look, command=settings.command, is_shown=settings.report)
     listen.note("report written")
     for remark in look.remarks:
         listen.say(remark if len(job.views) == 1 else f"{view.folder.name}: {remark}")
     return look
 
 
-def _verified(
+def _verify(
     settings: Settings,
     predicted: Estimate,
     budget: VerificationBudget,
     solution: Solution,
     listen: Listener,
 ) -> Verification:
-    """Render the relit scene and compare: just the samples asked for, or until it can tell."""
+    """Render the relit scene and compare, with the given samples or until the result is clear."""
     basis, lighting = solution.basis, solution.lighting
     if settings.verify_spp is None:
         return verify_in_stages(
@@ -261,30 +267,34 @@ def _verified(
             seed=settings.seed,
             progress=listen,
         )
-    found = verify(predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen)
-    return with_power(found, predicted, LightShares.of(basis, lighting))
+    verification = verify(
+        predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen
+    )
+    return with_power(verification, predicted, LightShares.of(basis, lighting))
 
 
 def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudget:
-    """Return what the verification of `relit`, on its whole film, may cost."""
-    most = None if settings.checks_as_basis else settings.spp or relit.spp
+    """Return the budget for the verification of `relit`, on its whole film."""
+    max_spp = None if settings.checks_as_basis else settings.spp or relit.spp
     spp = basis.origin.spp
     if settings.time_s is None:
-        # A basis that was kept may have many times the samples that are asked for.
+        # A cached basis may have many times the requested samples.
         spp = min(spp, samples(settings.quality, spp=settings.spp, time_s=None) or relit.spp)
-    return verification_budget(relit, basis.size, spp, most_spp=most, asked_spp=settings.verify_spp)
+    return verification_budget(
+        relit, basis.size, spp, most_spp=max_spp, asked_spp=settings.verify_spp
+    )
 
 
-def _spoken(budget: VerificationBudget, basis: Basis, *, is_fixed: bool) -> str:
-    """Return how long a verification takes, said before it starts."""
+def _verification_text(budget: VerificationBudget, basis: Basis, *, is_fixed: bool) -> str:
+    """Return the remark on how long a verification takes, shown before it starts."""
     height, width = budget.scene.size
-    most = "" if is_fixed else "at most "
-    its = f"verification of {most}{budget.spp} samples per pixel on {width}x{height}"
-    how = "(verify=False skips it)"
+    limit = "" if is_fixed else "at most "
+    subject = f"verification of {limit}{budget.spp} samples per pixel on {width}x{height}"
+    hint = "(verify=False skips it)"
     if basis.render_s is not None:
         seconds = math.ceil(budget.share * basis.render_s)
-        long = f"{seconds} s" if seconds < 120 else f"{math.ceil(seconds / 60)} min"
-        return f"{its}: at most {long} {how}"
+        duration = f"{seconds} s" if seconds < 120 else f"{math.ceil(seconds / 60)} min"
+        return f"{subject}: at most {duration} {hint}"
     if budget.share <= 1:
-        return f"{its}: no longer than that many samples of the basis took {how}"
-    return f"{its}: at most {budget.share:.2g} times as long as the basis took {how}"
+        return f"{subject}: as long as that many samples of the basis at most {hint}"
+    return f"{subject}: at most {budget.share:.2g} times as long as the basis took {hint}"

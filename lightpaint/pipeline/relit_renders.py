@@ -28,7 +28,10 @@ def relit_folder(
     views: Sequence[str] = ("",),
     force: bool = False,
 ) -> ResultFolder:
-    """Where `relight_look` writes. lighting: the file whose lighting it is. views: as there."""
+    """Return the folder that `relight_look` writes to.
+
+    lighting: the file of the lighting. views: as in `relight_look`.
+    """
     files = answer_files(folder, scene=scene, has_lighting=True)
     files += [folder / view / name for view in views for name in ("relit.exr", "relit.png")]
     reads = (lighting, *scene.read_files)
@@ -44,25 +47,29 @@ def relight_look(
     seed: int = 0,
     resolution: str | None = None,
     progress: Progress = silent,
-    rendered: Callable[[Scene], Estimate] | None = None,
+    render_elsewhere: Callable[[Scene], Estimate] | None = None,
 ) -> None:
-    """Write relit.xml, and its renders as relit.exr and, denoised, as relit.png.
+    """Write relit.xml, and its renders as relit.exr and, denoised, relit.png.
 
-    scenes: one through each sensor, by the folder in `results` that its pictures go to; "" for that
-    itself. resolution: part of the film that is rendered, as of `Settings`. rendered: who renders
-    the relit scene, instead of this process.
+    scenes: the scene through each sensor, by the folder in `results` for its pictures; "" for
+    `results` itself. resolution: part of the film to render, as in `Settings`. render_elsewhere:
+    function that renders the relit scene outside this process.
     """
     for remark in remarks_of_pictures():
         listener(progress).say(remark)
     results.check()
-    how: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
+    options: dict[str, Any] = {"seed": seed, "stream": Stream.VERIFICATION, "progress": progress}
     first, *_ = scenes.values()
     with new_answer(results, lighting, scene=first, has_lighting=True) as answer:
         for view, scene in scenes.items():
             folder = answer.path
             relit = on_film(answer.seen_through(scene.sensor), None, resolution)
             label = f"relit of {view}" if view else "relit"
-            image = rendered(relit) if rendered else render(relit, spp=spp, label=label, **how)
+            image = (
+                render_elsewhere(relit)
+                if render_elsewhere
+                else render(relit, spp=spp, label=label, **options)
+            )
             (folder / view).mkdir(exist_ok=True)
             write_estimate(folder / view / "relit.exr", image, {})
             features = render_features(relit, seed=seed)

@@ -1,4 +1,4 @@
-"""What is worth saying to a person before a job is run, in plain text."""
+"""Remarks for the user before a job runs, in plain text."""
 
 from lightpaint.basis.render.integrators import remark_on_separate_renders
 from lightpaint.basis.render.render import memory_needed
@@ -11,26 +11,26 @@ from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 from lightpaint.target.target import Target
 
-#: Bytes of memory from which on a basis is worth a word.
+#: Bytes of memory above which a basis gets a remark.
 MUCH_MEMORY = 2e9
 
 
 def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
-    """What is worth knowing of its lights and, where it is to be rendered, of how that is done."""
+    """Return remarks on the lights of a scene and, if it is rendered, on how."""
     remarks = []
     if scene.lights_file is not None:
         remarks.append(f"lights and groups as in {scene.lights_file}")
     remarks += [
-        f"{len(x.members)} alike lamps without names are one light, {x.name}: group_alike=False "
-        "parts them all, groups={'name': ...} makes a light of some"
+        f"{len(x.members)} similar lamps without names form one light, {x.name}: group_alike=False "
+        "separates them, groups={'name': ...} makes a light of some"
         for x in scene.lights
         if x.is_found
     ]
     if scene.instead is not None:
-        remarks.append(f"rendered by {scene.instead}, not by the scene's own integrator")
+        remarks.append(f"rendered with {scene.instead} instead of the scene's own integrator")
     if obstacles := [f"{x.name!r} {x.obstacle}" for x in scene.emitters if x.obstacle]:
-        remarks.append(f"left as it is: {some_names(obstacles, '; ')}")
-    # Python gets the same as a warning.
+        remarks.append(f"not adjusted: {some_names(obstacles, '; ')}")
+    # Python code gets the same text as a warning.
     note = use_variant().note
     if not note and is_rendered:
         note = remark_on_separate_renders(scene) or ""
@@ -38,9 +38,9 @@ def remarks_of_scene(scene: Scene, *, is_rendered: bool = True) -> list[str]:
 
 
 def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
-    """What of the picture a reduced film leaves out, and whether it is as small as was asked for.
+    """Return remarks on pixels that a reduced film leaves out, and on its size.
 
-    scene: on that film.
+    scene: on the reduced film.
     """
     film, remarks = scene.film, []
     width, height = film.pixels
@@ -48,21 +48,21 @@ def remarks_of_film(scene: Scene, settings: Settings) -> list[str]:
         whole = "x".join(map(str, film.crop_size))
         remarks.append(
             f"film of {whole} reduced to {width}x{height} blocks of {film.block}x{film.block} "
-            f"pixels: {_spoken_rest(film.left_out)} left over, and nowhere counted"
+            f"pixels: {_remainder_text(film.left_out)} left over and ignored"
         )
-    few = None
+    max_pixels = None
     if settings.quality is not None and settings.resolution is None:
-        few = PRESETS[settings.quality].pixels
-    if few is not None and width * height > few:
+        max_pixels = PRESETS[settings.quality].pixels
+    if max_pixels is not None and width * height > max_pixels:
         remarks.append(
-            f'the film cannot be made as small as quality="{settings.quality}" would have it: '
+            f'the film cannot be reduced as far as quality="{settings.quality}" asks: '
             f"{width}x{height} pixels are rendered"
         )
     return remarks
 
 
-def _spoken_rest(rest: tuple[int, int]) -> str:
-    """`3 columns at the right and 1 row at the bottom are`. rest: how many of both."""
+def _remainder_text(rest: tuple[int, int]) -> str:
+    """Return `3 columns of pixels at the right and 1 row at the bottom are`. rest: their counts."""
     columns, rows = rest
     parts = [f"{columns} column{'s' * (columns > 1)} of pixels at the right"] * bool(columns)
     parts += [f"{rows} row{'s' * (rows > 1)} at the bottom"] * bool(rows)
@@ -70,17 +70,17 @@ def _spoken_rest(rest: tuple[int, int]) -> str:
 
 
 def remarks_of_pictures() -> list[str]:
-    """Says so where pictures are denoised less well than they could be."""
+    """Return a remark if the better denoiser is not installed."""
     return [] if oidn_is_installed() else [MISSING_REMARK]
 
 
 def remarks_of_memory(scene: Scene) -> list[str]:
-    """Says so where the basis of `scene` takes much memory."""
+    """Return a remark if the basis of `scene` takes much memory."""
     if (needed := memory_needed(scene)) <= MUCH_MEMORY:
         return []
     return [
         f"{len(scene.lights)} lights of {scene.size[1]}x{scene.size[0]} pixels: "
-        f"{needed / 1e9:.1f} GB of memory at most"
+        f"up to {needed / 1e9:.1f} GB of memory"
     ]
 
 
@@ -92,10 +92,10 @@ def remarks_of_target(
     *,
     film: Size | None = None,
 ) -> list[str]:
-    """Say how `target` was read.
+    """Return remarks on how `target` was read.
 
-    size: of the basis that it is solved on. fit: with all decided. film: size of the whole film of
-    a scene that is rendered.
+    size: that of the basis. fit: the settings with all decided. film: size of the whole film, if
+    the scene is rendered.
     """
     remarks = []
     if scene is not None and target.content not in ("", scene.content):
@@ -106,17 +106,17 @@ def remarks_of_target(
         rest = left_over(target.size, whole_factor(target.size, size) or 1)
         remark = f"{mine_w}x{mine_h} pixels averaged to the basis's {width}x{height}"
         if any(rest):
-            remark += f": {_spoken_rest((rest[1], rest[0]))} left over, and nowhere counted"
+            remark += f": {_remainder_text((rest[1], rest[0]))} left over and ignored"
         remarks.append(remark)
     if film not in (None, size) and not is_asked_for:
         remarks.append(f"solved at {width}x{height} pixels, the size of its template")
     name = "srgb" if target.transform is None else target.transform.name
     if fit.space == "linear" and name not in ("srgb", "linear"):
         remarks.append(
-            f"painted through {name}, whose highlights stand for very much light and rule the "
+            f"painted through {name}, whose highlights stand for very much light and dominate the "
             'fit: space="display" fits what the eye sees'
         )
     remarks += target.notes
     if target.not_finite:
-        remarks.append(f"{target.not_finite} pixels hold NaN or Inf and count nothing")
+        remarks.append(f"{target.not_finite} pixels hold NaN or Inf and are ignored")
     return [f"{target.name}: {remark}" for remark in remarks]

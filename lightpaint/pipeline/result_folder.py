@@ -1,4 +1,4 @@
-"""The folder that results go to: whose answer it holds, and what may be replaced there."""
+"""The folder of results: what its answer belongs to, and which files may be replaced."""
 
 import json
 import os
@@ -19,22 +19,22 @@ from lightpaint.version import __version__
 
 FORMAT: Literal["lightpaint-result 1"] = "lightpaint-result 1"
 
-#: What a result folder says of itself.
+#: File in which a result folder describes itself.
 RECORD = "result.json"
 
-#: What the name of a painting ends in that no file was given for.
+#: Suffix of the name of a painting without a file.
 IN_MEMORY = " (in memory)"
 
-#: What to do about a folder that holds something else.
+#: Advice about a folder that holds something else.
 REMEDY = "name another folder (folder=...), or replace it (force=True)"
 
 
 @dataclass(frozen=True)
 class _Record:
-    """What result.json says.
+    """The content of result.json.
 
-    answers: what the results answer, relative to the folder: paintings, or a lighting.json that the
-    scene was relit with. files: relative to the folder, with the CRC-32 of what was written.
+    answers: what the results answer, relative to the folder: paintings, or the lighting.json of a
+    relit scene. files: paths relative to the folder, with the CRC-32 of each file as written.
     """
 
     format: Literal["lightpaint-result 1"]
@@ -45,14 +45,14 @@ class _Record:
 
 @dataclass(frozen=True)
 class ResultFolder:
-    """Where results go.
+    """A folder for results, and the rules for what may be replaced in it.
 
-    What is there is kept, unless it is an answer to the same, as lightpaint wrote it, or `force`
-    gives it up; what is read is kept in any case.
+    Existing files stay, unless they are lightpaint's unchanged answer to the same painting, or
+    `force` is set. Files that are read stay in any case.
 
-    folder: need not be there. files: in it, that may be written. reads: files that what is written
-    comes from. answers: paintings, by file or, of those in memory, by name. adds_to: the lighting
-    that was read; if it lies in the folder, what is written belongs to it, and it is kept.
+    folder: it may not exist yet. files: files in it that may be written. reads: files that are
+    read. answers: paintings, by file or, for those in memory, by name. adds_to: the lighting that
+    was read; if it lies in the folder, the new files belong to it, and it stays.
     """
 
     folder: Path
@@ -63,39 +63,39 @@ class ResultFolder:
     force: bool = False
 
     def check(self) -> None:
-        """Raise OutputError for what cannot be written there, or must not be replaced."""
+        """Raise OutputError for a file that cannot be written, or must not be replaced."""
         finish(self.folder)
         check_writable(self.folder)
         record = self._record()
-        replaced = dict.fromkeys(self._gone(record) + list(self.files))
+        replaced = dict.fromkeys(self._obsolete(record) + list(self.files))
         check_files([*replaced, self.folder / RECORD], self.reads)
-        there = [file for file in replaced if os.path.lexists(file)]
+        existing = [file for file in replaced if os.path.lexists(file)]
         if self._read_record() is None and os.path.lexists(self.folder / RECORD):
-            there.append(self.folder / RECORD)
-        if self.force or not there or (record is None and self._adds):
+            existing.append(self.folder / RECORD)
+        if self.force or not existing or (record is None and self._belongs_to_lighting):
             return
         if record is None:
-            raise self._unknown(there)
+            raise self._unrecorded(existing)
         if not self._is_own(record):
             raise OutputError(
-                f"{self.folder} holds the answer to {self._listed(record.answers)}, not to "
-                f"{self._listed(self._answers)}: {REMEDY}"
+                f"{self.folder} holds the answer to {self._names_of(record.answers)}, not to "
+                f"{self._names_of(self._answers)}: {REMEDY}"
             )
-        for file in there:
+        for file in existing:
             known = record.files.get(file.relative_to(self.folder).as_posix())
             if known is None:
-                raise OutputError(f"{file} is there, and no result of lightpaint: {REMEDY}")
+                raise OutputError(f"{file} exists and is not a result of lightpaint: {REMEDY}")
             if known != _checksum(file):
                 raise OutputError(f"{file} was changed since lightpaint wrote it: {REMEDY}")
 
     @contextmanager
     def filled(self) -> Iterator[Path]:
-        """Yield a folder to write to; what is in it then appears in the true one, all at once.
+        """Yield a folder to write to; its files then appear in the real one, all at once.
 
-        Raises OutputError as `check` does, also for what came there in between.
+        Raises OutputError as `check` does, also for files that appeared in the meantime.
         """
         record = self._record()
-        with staged(self.folder, self._gone(record)) as stage:
+        with staged(self.folder, self._obsolete(record)) as stage:
             yield stage
             self._write_record(stage, record)
             self.check()
@@ -115,25 +115,25 @@ class ResultFolder:
         ]
 
     @property
-    def _adds(self) -> bool:
-        """Whether what is written belongs to the lighting that lies there."""
+    def _belongs_to_lighting(self) -> bool:
+        """True if the new files belong to the lighting in the folder."""
         lighting = self.folder / "lighting.json"
         return self.adds_to is not None and lighting.exists() and self.adds_to.samefile(lighting)
 
     def _is_own(self, record: _Record) -> bool:
-        """Whether what stands there answers nothing else."""
-        return self._adds or set(record.answers) <= set(self._answers)
+        """Return True if the existing results answer nothing else."""
+        return self._belongs_to_lighting or set(record.answers) <= set(self._answers)
 
-    def _gone(self, record: _Record | None) -> list[Path]:
-        """What disappears when the new results appear, if it is not among them."""
-        if self._adds:
+    def _obsolete(self, record: _Record | None) -> list[Path]:
+        """Return the files that disappear when new results appear, unless these replace them."""
+        if self._belongs_to_lighting:
             return []
         if record is not None:
             return [self.folder / name for name in record.files]
         return earlier_results(self.folder)
 
     def _record(self) -> _Record | None:
-        """What result.json says, if any of the files that it names is there."""
+        """Return the content of result.json, if any file that it lists exists."""
         record = self._read_record()
         if record is None:
             return None
@@ -143,7 +143,7 @@ class ResultFolder:
         return _Record(FORMAT, tuple(map(os.path.normpath, record.answers)), known)
 
     def _read_record(self) -> _Record | None:
-        """None without a result.json, and for one of somebody else's."""
+        """Return the content of result.json; None if it is missing or not ours."""
         try:
             text = read_text(self.folder / RECORD, "record", OutputError)
             return read_record(_Record, strict_json(text), others=True)
@@ -151,10 +151,10 @@ class ResultFolder:
             return None
 
     def _write_record(self, stage: Path, earlier: _Record | None) -> None:
-        """What `stage` holds, and what it answers, goes on record."""
+        """Record the files in `stage`, and what they answer."""
         answers, files = tuple(self._answers), {}
-        if self._adds:
-            if earlier is None:  # an older version's, which goes on saying nothing of itself
+        if self._belongs_to_lighting:
+            if earlier is None:  # results of an older version stay without a record
                 return
             answers, files = earlier.answers, dict(earlier.files)
         written = sorted(file for file in stage.rglob("*") if file.is_file())
@@ -162,26 +162,26 @@ class ResultFolder:
         record = asdict(_Record(FORMAT, answers, files))
         write_text(stage / RECORD, json.dumps(record, indent=2, ensure_ascii=False) + "\n")
 
-    def _listed(self, answers: Iterable[str]) -> str:
-        """Recorded answers, as they are called where the command is given."""
+    def _names_of(self, answers: Iterable[str]) -> str:
+        """Return recorded answers, named relative to the working directory."""
         named = [
             one if one.endswith(IN_MEMORY) else os.path.relpath(os.path.join(self._real, one))
             for one in answers
         ]
         return one_line(" and ".join(named))
 
-    def _unknown(self, there: list[Path]) -> OutputError:
-        """What to say of a folder that does not say whose results it holds."""
-        if self.folder / "lighting.json" in there:
+    def _unrecorded(self, existing: list[Path]) -> OutputError:
+        """Return the error for a folder without a record."""
+        if self.folder / "lighting.json" in existing:
             return OutputError(
-                f"{self.folder} holds results that do not say what they answer, as an older "
-                f"lightpaint left them: {REMEDY}"
+                f"{self.folder} holds results of an older lightpaint, which do not name their "
+                f"painting: {REMEDY}"
             )
-        return OutputError(f"{there[0]} is there, and no result of lightpaint: {REMEDY}")
+        return OutputError(f"{existing[0]} exists and is not a result of lightpaint: {REMEDY}")
 
 
 def is_as_written(folder: Path) -> bool:
-    """Whether all that the record of `folder` names is there, as it was written."""
+    """Return True if all files in the record of `folder` exist and are unchanged."""
     record = ResultFolder(folder, (), (), ())._read_record()
     return record is not None and all(
         is_below(name) and _checksum(folder / name) == known for name, known in record.files.items()
@@ -189,18 +189,18 @@ def is_as_written(folder: Path) -> bool:
 
 
 def earlier_results(folder: Path) -> list[Path]:
-    """What a version of lightpaint that kept no record left in `folder`."""
+    """Return the results in `folder` of a version of lightpaint that kept no record."""
     if not (folder / "lighting.json").is_file():
-        return []  # somebody else's files, whatever they are called
+        return []  # not ours, whatever their names
     return [file for pattern in RESULTS for file in folder.glob(pattern)]
 
 
 def _checksum(file: Path) -> str:
-    """CRC-32 of a file; "" of none."""
+    """Return the CRC-32 of a file; "" if there is none."""
     if not file.is_file():
         return ""
-    sum_ = 0
+    crc = 0
     with file.open("rb") as opened:
         while data := opened.read(2**24):
-            sum_ = zlib.crc32(data, sum_)
-    return f"{sum_:08x}"
+            crc = zlib.crc32(data, crc)
+    return f"{crc:08x}"

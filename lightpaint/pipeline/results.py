@@ -1,4 +1,4 @@
-"""What a solve leaves in its folder, and what is read back from there."""
+"""The results of a solve in its folder, and reading them back."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -40,16 +40,16 @@ from lightpaint.storage.staging import finish
 from lightpaint.target.target import Target
 from lightpaint.threads import parallel_map
 
-#: Header attribute of predicted.exr: how to see the relit scene as the basis saw it.
+#: Header attribute of predicted.exr: the sensor, film and samples of the basis.
 VIEW_KEY = "lightpaint.view"
 
-#: What every solve writes.
-ALWAYS = ("lighting.json", "predicted.exr", "comparison.png", "report.html", "report.json")
+#: Files of every solve.
+SOLVE_RESULTS = ("lighting.json", "predicted.exr", "comparison.png", "report.html", "report.json")
 
-#: What each view has where there are several.
+#: Files of each view, if there are several.
 VIEW_RESULTS = ("predicted.exr", "verified.exr", "comparison.png", "report.html", "report.json")
 
-#: What a solve and a relight write, and the next solve replaces.
+#: Files of a solve or a relight, which the next solve replaces.
 RESULTS = (
     "lighting.json",
     "predicted.exr",
@@ -71,14 +71,12 @@ class Look:
     """One painting and its answer.
 
     Attributes:
-        target: What was wanted, at the size of the basis.
-        basis: What it was solved with.
-        solution: The answer, with its errors and what holds its lights.
-        predicted: Σ w_i Φ_i, what it will look like.
-        relit: The scene as it was relit; None where there was only a saved basis.
-        verification: Prediction against a render; None without a scene.
-        analysis: How sure the lights are, and why the painting is not met.
-        suggestions: Lights that would help most, None if they were not asked for.
+        target: The painting, at the size of the basis. basis: The basis it was solved with.
+        solution: The answer, with its errors and active bounds. predicted: Σ w_i Φ_i, the predicted
+        picture. relit: The relit scene; None if there was only a saved basis. verification:
+        Comparison of the prediction with a render; None without a scene. analysis: How certain the
+        lights are, and why the answer is not closer. suggestions: Lights that would help most; None
+        if not requested.
 
     Examples:
         >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
@@ -105,22 +103,22 @@ class Look:
 
     @property
     def verdict(self) -> str:
-        """How near the lights come to what was painted, in sentences."""
+        """How close the lights come to the painting, in sentences."""
         return verdict(self.solution, self.predicted, self.verification, seen=self.analysis.seen)
 
     @property
     def uncertainty(self) -> Uncertainty | None:
-        """How sure the lights are; None where nothing is known of the noise."""
+        """How certain the lights are; None if the noise is unknown."""
         return self.analysis.uncertainty
 
     @property
     def diagnosis(self) -> Diagnosis:
-        """Why the painting is not met."""
+        """Why the answer is not closer to the painting."""
         return self.analysis.diagnosis
 
     @property
     def remarks(self) -> list[str]:
-        """What a person should know of emitters in view: painted pixels that do not count."""
+        """Remarks on emitters in view: painted pixels that are ignored."""
         return emitter_remarks(self.target, self.solution, self.predicted)
 
     @property
@@ -130,7 +128,7 @@ class Look:
 
 
 def result_folders(folder: Path) -> list[Path]:
-    """`folder` itself, or where it holds several views the folders of these."""
+    """Return `folder` itself or, if it holds several views, their folders."""
     finish(folder)
     if (folder / "predicted.exr").is_file() or not (folder / "relit.xml").is_file():
         return [folder]
@@ -138,13 +136,13 @@ def result_folders(folder: Path) -> list[Path]:
 
 
 def view_names(scenes: Sequence[Scene]) -> list[str]:
-    """The sensor of each, after which its folder is called.
+    """Return the sensor of each scene, after which its folder is named.
 
-    Raises SceneError for one that is there twice or names no folder.
+    Raises SceneError for a repeated sensor, or one that cannot name a folder.
     """
     names = [scene.sensor_names[scene.sensor] for scene in scenes]
     if len(set(names)) < len(names):
-        raise SceneError(f"a view is painted twice: {some_names(names)}; give each sensor once")
+        raise SceneError(f"a view is given twice: {some_names(names)}; give each sensor once")
     for name in names:
         if not is_name(name):
             raise SceneError(
@@ -162,25 +160,27 @@ def write_predicted(
     size: Size | None = None,
     scene: Scene | None = None,
 ) -> None:
-    """Write predicted.exr, with a note of how to see the relit scene as the basis saw it.
+    """Write predicted.exr, with a note of the sensor, film and samples for its verification.
 
-    origin: of the basis. spp, size: samples per pixel of the verification, and (height, width) of
-    its film, the whole one by default. scene: whose parameters the relit scene needs again.
+    origin: that of the basis. spp, size: samples per pixel of the verification, and (height, width)
+    of its film, by default the whole one. scene: its parameters are needed again by the relit
+    scene.
     """
     film = {} if size is None else {"width": size[1], "height": size[0]}
-    given = {} if scene is None or not scene.parameters else {"parameters": scene.parameters}
-    seen = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film, **given}
-    write_estimate(path, predicted, {VIEW_KEY: json.dumps(seen)})
+    parameters = {} if scene is None or not scene.parameters else {"parameters": scene.parameters}
+    view = {"sensor": origin.sensor, "spp": spp, "basis_spp": origin.spp, **film, **parameters}
+    write_estimate(path, predicted, {VIEW_KEY: json.dumps(view)})
 
 
 def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = True) -> None:
-    """Write what people look at, denoised, and its numbers.
+    """Write the pictures and the report page, denoised, and their numbers.
 
-    These are comparison.png and report.html, and report.json. is_shown: whether people look.
+    These are comparison.png, report.html and report.json. is_shown: False to write only the
+    numbers.
     """
-    how = _reported(look, command)
+    arguments = _report_arguments(look, command)
     if not is_shown:
-        write_text(folder / "report.json", report_numbers(**how))
+        write_text(folder / "report.json", report_numbers(**arguments))
         return
     verified = look.verification.verified.image if look.verification else None
     larger = None
@@ -209,16 +209,16 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
         write_bytes(folder / "comparison.png", png_bytes(sheet, looks.texts))
 
     def page() -> None:
-        write_text(folder / "report.html", report_page(**how, looks=looks, missed=missed))
+        write_text(folder / "report.html", report_page(**arguments, looks=looks, missed=missed))
 
     def numbers() -> None:
-        write_text(folder / "report.json", report_numbers(**how, missed=missed))
+        write_text(folder / "report.json", report_numbers(**arguments, missed=missed))
 
     parallel_map(lambda write: write(), (page, comparison, numbers))
 
 
-def _reported(look: Look, command: str) -> dict[str, Any]:
-    """What page and numbers tell of."""
+def _report_arguments(look: Look, command: str) -> dict[str, Any]:
+    """Return the arguments that page and numbers have in common."""
     return {
         "basis": look.basis,
         "target": look.target,
@@ -242,38 +242,38 @@ def verify_result(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Verification:
-    """Render the relit.xml of a result folder anew and compare it with its predicted.exr.
+    """Render the relit.xml of a result folder again and compare it with its predicted.exr.
 
-    spp: samples per pixel (those that predicted.exr was solved with by default).
-    Raises OutputError if `folder` holds no such result, ImageError if predicted.exr is damaged.
+    spp: samples per pixel, by default those recorded in predicted.exr. Raises OutputError if
+    `folder` holds no such result, ImageError if predicted.exr is damaged.
     """
     folder = Path(folder)
-    for one in (folder, folder.parent):
-        finish(one)
+    for each in (folder, folder.parent):
+        finish(each)
     relit_xml = folder / "relit.xml"
     if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
         relit_xml = folder.parent / "relit.xml"  # one of several views
     missing = [file.name for file in (folder / "predicted.exr", relit_xml) if not file.is_file()]
     if missing:
         raise OutputError(
-            f"{folder} is no result folder with a relit scene: it has no "
+            f"{folder} is not a result folder with a relit scene: it has no "
             f"{' and no '.join(missing)}; give one that lightpaint solve made from a scene"
         )
     path = folder / "predicted.exr"
     predicted, attributes = read_estimate(path)
-    seen = _read_view(path, attributes.get(VIEW_KEY, "{}"))
+    view = _read_view(path, attributes.get(VIEW_KEY, "{}"))
     relit = load_scene(
-        relit_xml, sensor=seen.sensor, parameters=seen.parameters, use_lights_file=False
+        relit_xml, sensor=view.sensor, parameters=view.parameters, use_lights_file=False
     )
-    if seen.width is not None and seen.height is not None:
-        film = (seen.height, seen.width)
-        # A scene that was changed by hand has another film, which `verify` refuses by name.
+    if view.width is not None and view.height is not None:
+        film = (view.height, view.width)
+        # A scene that was edited by hand may have another film, which `verify` refuses.
         if relit.size != film and whole_factor(relit.size, film) is not None:
-            relit = relit.reduced(f"{seen.width}x{seen.height}")
+            relit = relit.reduced(f"{view.width}x{view.height}")
     return verify(
         predicted,
         relit,
-        spp=seen.spp if spp is None else spp,
+        spp=view.spp if spp is None else spp,
         seed=seed,
         stream=Stream.SECOND_VERIFICATION,
         progress=progress,
@@ -281,11 +281,11 @@ def verify_result(
 
 
 @dataclass(frozen=True)
-class _Seen:
-    """What stands under VIEW_KEY; None where nothing does.
+class _RecordedView:
+    """The content of VIEW_KEY; None for what is missing.
 
-    spp: samples per pixel. width, height: of the verification; of the whole film if not there.
-    parameters: values of `$name` parameters that the scene was loaded with.
+    spp: samples per pixel. width, height: film of the verification; None for the whole film.
+    parameters: values of `$name` parameters of the scene.
     """
 
     sensor: str | None = None
@@ -299,9 +299,9 @@ class _Seen:
             raise ValueError("spp is a whole number > 0, not 0")
 
 
-def _read_view(path: Path, text: str) -> _Seen:
+def _read_view(path: Path, text: str) -> _RecordedView:
     try:
-        return read_record(_Seen, strict_json(text), others=True)
+        return read_record(_RecordedView, strict_json(text), others=True)
     except ValueError as error:
         raise ImageError(
             f"{path} is damaged in its attribute {VIEW_KEY}: {one_line(str(error))}; solve again"

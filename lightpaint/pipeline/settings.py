@@ -1,4 +1,4 @@
-"""What can be asked of a solve beside scene and painting."""
+"""Settings of a solve, beyond scene and painting."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,54 +12,55 @@ from lightpaint.scene.film import MAX_SPP, check_resolution
 from lightpaint.scene.presets import Quality
 from lightpaint.validation import SWITCH, Check, a, number, one_of, whole
 
-#: More rounds of rendering and solving again than this are a slip of the pen.
+#: Most rounds of rendering and solving again: a larger number is a typing error.
 MAX_REFINE = 100
-#: And lights that are suggested.
+#: Most suggested lights: a larger number is a typing error.
 MAX_SUGGEST = 100
 
 
 @keywords()
 @dataclass(frozen=True)
 class Settings(Fit):
-    """How a painting is to be answered.
+    """The settings of a solve.
 
     Attributes:
-        space: As of `Fit`, as are the next six: `linear` or `display`; None as it was painted.
-        hold: Weight of all that is not painted beside all that is; None as it was painted.
-        colors: `free`, `gentle` or `white`; None as it was painted.
-        unpainted: Instead of `hold`, the weight of each pixel that is not painted.
-        literal: Whether the target is taken at its word, and noise is left in the equations, but
-            for what is said here.
+        space: `linear` or `display`; None decides by the painting. It and the next six are those of
+            `Fit`.
+        hold: Weight of all unpainted pixels relative to all painted ones; None decides by the
+            painting.
+        colors: `free`, `gentle` or `white`; None decides by the painting.
+        unpainted: Weight of each unpainted pixel, instead of `hold`.
+        literal: True to fit the target exactly as given and leave noise in the equations, unless
+            another setting says otherwise.
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
-        transform: The display meant by `space`; None for that of the painting or, where it holds
-            light, sRGB at an exposure that shows something.
-        emitters: Whether pixels in which the camera sees an emitter count, as of `Fit`.
-        resize: Whether a target of another size is resampled.
-        spp: Samples per pixel of the basis, and at most of the verification.
-        time_s: Instead of spp, seconds in which the basis is rendered, of all views together.
-        seed: Of the basis and, with other random numbers, of the verification.
-        resolution: `1/4` or `320x180`: part of the film that the basis is rendered on. The
-            verification has the whole film, or as much of it as its samples are enough for.
-        quality: Preset of spp and resolution, where these are not given.
-        use_cache: Whether a basis from an earlier run is taken, and this one kept.
-        exact_spp: Whether the basis has just as many samples as are asked for, even where one with
-            more is kept: then the answer does not depend on what earlier runs have left.
-        noise_correction: Whether the noise's power, or part of it, is taken out of the equations;
-            None for wherever it is known, unless `literal`.
-        refine: How often to render the scene as solved, with as many samples as the basis, and
-            improve the answer by what that shows; needs a scene.
-        suggest: How many point lights that would help most are looked for at most; needs a scene,
-            and one view only.
+        transform: View transform of `space`; None for that of the painting or, if it holds light,
+            sRGB at a metered exposure.
+        emitters: Whether pixels in which the camera sees an emitter count, as in `Fit`. resize:
+        Whether to resample a target of another size.
+        spp: Samples per pixel of the basis, and upper limit for the verification. time_s: Seconds
+        to render the bases of all views, instead of spp. seed: Seed of the basis; the verification
+        derives its own from it.
+        resolution: `1/4` or `320x180`: size of the film for the basis. The verification uses the
+            whole film, or as much of it as its samples allow.
+        quality: Preset of spp and resolution, if these are not given.
+        use_cache: Whether to use a basis from an earlier run, and keep this one.
+        exact_spp: Whether to use exactly the requested samples, even if a cached basis has more:
+            then the answer does not depend on earlier runs.
+        noise_correction: Whether to remove the power of the noise, or part of it, from the
+            equations; None if the noise is known, unless `literal`.
+        refine: Rounds of rendering the solved scene, with as many samples as the basis, and
+            improving the answer; needs a scene.
+        suggest: Most point lights to suggest; needs a scene, and a single view.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
-        verify: Whether the scene as it was relit is rendered, to see that the prediction holds,
-            with as many samples as the basis has at most, so that it takes no longer.
-        verify_spp: Instead, samples per pixel of the verification, on the whole film.
-        report: Whether there are report.html and comparison.png beside the numbers.
-        force: Whether results of something else, or changed by hand, are replaced.
-        command: The shell command that asks for this, for the report.
+        verify: Whether to render the relit scene and compare it with the prediction, with at most
+            as many samples as the basis, so that it takes no longer.
+        verify_spp: Samples per pixel of the verification on the whole film, instead of that limit.
+        report: Whether to write report.html and comparison.png beside the numbers.
+        force: Whether to replace results of another painting, or ones changed by hand.
+        command: The shell command of this solve, for the report.
 
     Raises:
-        LightpaintError: For a value that means nothing.
+        LightpaintError: For an invalid value.
 
     Examples:
         >>> lp.Settings(spp=64, refine=2).refine
@@ -91,7 +92,7 @@ class Settings(Fit):
     expected: ClassVar[Mapping[str, Check]] = {
         **Fit.expected,
         "resize": SWITCH,
-        # Two halves of the samples tell the noise.
+        # The noise is estimated from two halves of the samples.
         "spp": whole(2, MAX_SPP),
         "time_s": number("seconds"),
         "seed": whole(0),
@@ -115,37 +116,40 @@ class Settings(Fit):
         if self.spp is not None and self.time_s is not None:
             raise LightpaintError(
                 f"spp is {self.spp} and time_s {self.time_s:g}: expected a number of samples or a "
-                "time to render for, not both"
+                "rendering time, not both"
             )
         if self.exact_spp and self.time_s is not None:
             raise LightpaintError(
-                f"exact_spp is True and time_s {self.time_s:g}: expected a number of samples, of "
-                "which a time says nothing"
+                f"exact_spp is True and time_s {self.time_s:g}: expected a number of samples "
+                "(spp) instead of a time"
             )
         if self.verify_spp is not None and not self.verify:
             raise LightpaintError(
-                f"verify is False and verify_spp {self.verify_spp}: expected one of them, no "
-                "verification or its samples"
+                f"verify is False and verify_spp {self.verify_spp}: expected either no "
+                "verification, or its samples"
             )
         if self.resolution is not None:
             check_resolution(self.resolution)
 
     def corrects_noise(self, *, is_known: bool) -> bool:
-        """Whether noise is taken out of the equations. is_known: whether the basis knows it."""
+        """Return True if noise is removed from the equations.
+
+        is_known: whether the basis knows its noise.
+        """
         if self.noise_correction is None:
             return is_known and not self.literal
         return self.noise_correction
 
     @property
     def checks_as_basis(self) -> bool:
-        """Whether the verification has as many samples as the basis, whatever their films."""
+        """True if the verification takes as many samples as the basis, whatever their films."""
         return self.spp is None and (self.time_s is not None or self.quality is not None)
 
 
 class SettingsByName(TypedDict, total=False):
-    """Fields of `Settings` for `**settings`, so that type checkers know their names.
+    """The fields of `Settings` for `**settings`, so that type checkers know their names.
 
-    `transform` is an argument of its own where part of one can be asked.
+    `transform` is missing: functions that accept a partial one have an argument for it.
     """
 
     space: Space | None

@@ -1,6 +1,5 @@
-"""What a job is made of, by file: a scene, a painting, a saved basis, light groups.
-
-Each is plain values that can be sent, and is read once, when it is first asked for.
+"""The files of a job: a scene, a painting, a saved basis, light groups.  Each consists of plain
+values that can be sent elsewhere, and is read once, on first use.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,20 +20,20 @@ from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.target.target import Target
 from lightpaint.target.target_reader import Paint, read_over_look, read_target
 
-#: Settings that only change what is rendered, and those that light groups know nothing of.
+#: Settings of sampling, of rendering, and those that light groups do not support.
 SAMPLED = ("spp", "exact_spp", "time_s", "quality", "resolution")
 RENDERED = (*SAMPLED, "refine", "suggest", "verify_spp")
 NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 
 
 class ReadOnce:
-    """A file by plain values, whose content is read when it is first asked for, and kept.
+    """A file described by plain values, whose content is read on first use, and kept.
 
-    What was read stays in this process: a copy that is sent elsewhere reads the file there.
+    The content stays in this process: a copy that is sent elsewhere reads the file there.
     """
 
     def unread(self) -> Self:
-        """Return the same file, of which nothing is read or kept yet."""
+        """Return the same file, not read yet."""
         return type(self)(**vars_of(self))
 
     def __getstate__(self) -> dict[str, Any]:
@@ -47,7 +46,7 @@ class ReadOnce:
 @keywords()
 @dataclass(frozen=True)
 class SceneFile(ReadOnce):
-    """A scene by its file, as `load_scene` takes it; loaded once, when it is first asked for.
+    """A scene file with the arguments of `load_scene`; loaded once, on first use.
 
     Attributes:
         path: Mitsuba XML.
@@ -55,11 +54,10 @@ class SceneFile(ReadOnce):
         parameters: Values of the `$name` parameters.
         variant: Mitsuba variant.
         lights: Names or patterns of the lights to adjust.
-        groups: Emitters that are one light, by its name.
-        lights_file: TOML to read instead of the one beside the scene.
-        use_lights_file: False leaves that one alone.
-        group_alike: False adjusts emitters that are alike and without names one by one.
-        integrator: To render with instead of the scene's own.
+        groups: Emitters that form one light, by its name. lights_file: TOML to read instead of the
+        one beside the scene. use_lights_file: False to ignore that one. group_alike: False to
+        adjust similar emitters without names one by one. integrator: Integrator to use instead of
+        the scene's own.
 
     Examples:
         >>> lp.SceneFile("room.xml").content.size
@@ -79,22 +77,20 @@ class SceneFile(ReadOnce):
 
     @cached_property
     def content(self) -> Scene:
-        """The scene, as it is when it is first asked for."""
+        """The scene, loaded on first use."""
         return load_scene(**vars_of(self))
 
 
 @keywords()
 @dataclass(frozen=True)
 class Painting(ReadOnce):
-    """A painting by its file, as `read_target` takes it; read once.
+    """A painting file with the arguments of `read_target`; read once.
 
     Attributes:
         path: EXR, PNG, TIFF, JPEG or a layered file.
-        mask: Picture of what counts.
-        layer: Of an EXR.
-        transform: What it was encoded by.
-        template: Folder of the template it was painted on.
-        find: Whether one is looked for beside it.
+        mask: Picture of the importance of pixels. layer: Layer of an EXR. transform: View transform
+        that encoded it. template: Folder of the template it was painted on. find: Whether to look
+        for a template beside it.
         paint: `look` or `light`.
 
     Examples:
@@ -112,13 +108,13 @@ class Painting(ReadOnce):
 
     @cached_property
     def content(self) -> Target:
-        """The target, as it is when it is first asked for."""
+        """The target, read on first use."""
         return read_target(**vars_of(self))
 
     def over(self, look: Floats, name: str) -> Target | None:
-        """The target, if it was painted over that look and nothing else says what counts.
+        """Return the target if it was painted over that look and nothing else marks what counts.
 
-        look: (h, w, 3) linear, what a basis or light groups called `name` show as they are.
+        look: (h, w, 3) linear, the present look of a basis or light groups called `name`.
         """
         target = self.content
         if not (self.find and target.everything) or self.template or self.paint != "look":
@@ -130,19 +126,19 @@ class Painting(ReadOnce):
 
 @dataclass(frozen=True)
 class BasisFile(ReadOnce):
-    """A saved basis; read once."""
+    """A file of a saved basis; read once."""
 
     path: str
 
     @cached_property
     def content(self) -> Basis:
-        """The basis, as it is when it is first asked for."""
+        """The basis, read on first use."""
         return read_basis(Path(self.path))
 
 
 @dataclass(frozen=True)
 class GroupsFile(ReadOnce):
-    """Light groups of another renderer, as `read_light_groups` takes them; read once."""
+    """A file of light groups with the arguments of `read_light_groups`; read once."""
 
     path: str
     pattern: str | None = None
@@ -150,44 +146,44 @@ class GroupsFile(ReadOnce):
 
     @cached_property
     def content(self) -> LightGroups:
-        """The light groups, as they are when they are first asked for."""
+        """The light groups, read on first use."""
         return read_light_groups(**vars_of(self))
 
 
-#: What of a job can be sent.
+#: Kinds of files in a job, which can be sent elsewhere.
 File = SceneFile | Painting | BasisFile | GroupsFile
 
 
-def vars_of(given: Any) -> dict[str, Any]:
-    """What a dataclass holds, by name."""
-    return {name: getattr(given, name) for name in given.__dataclass_fields__}
+def vars_of(record: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass, by name."""
+    return {name: getattr(record, name) for name in record.__dataclass_fields__}
 
 
-def content(given: Any) -> Any:
-    """What is in a file that a job names; what is in memory already, and None, as it is."""
-    return given.content if isinstance(given, File) else given
+def content(source: Any) -> Any:
+    """Return the content of a file of a job; return objects in memory, and None, as they are."""
+    return source.content if isinstance(source, File) else source
 
 
 def check_needed(given: Iterable[str], basis: Any) -> None:
-    """Raise BasisError for anything `given`, by name, that a basis without its scene has no use of.
+    """Raise BasisError for arguments that are useless with a basis without its scene.
 
     basis: a saved one, or light groups.
     """
-    if not (idle := [f"{name}=..." for name in given]):
+    if not (unused := [f"{name}=..." for name in given]):
         return
     if isinstance(basis, LightGroups | GroupsFile):
         raise BasisError(
-            f"{', '.join(idle)} cannot be used with {basis.path}: its light groups are rendered "
+            f"{', '.join(unused)} cannot be used with {basis.path}: its light groups are rendered "
             "already, and say nothing of samples, noise, units or emitters in view; leave it out"
         )
     raise BasisError(
-        f"{', '.join(idle)} cannot change a saved basis: leave "
-        f"{'it' if len(idle) == 1 else 'them'} out, or give the scene"
+        f"{', '.join(unused)} cannot change a saved basis: leave "
+        f"{'it' if len(unused) == 1 else 'them'} out, or give the scene"
     )
 
 
-def check_nothing_idle(settings: Settings, basis: Any) -> None:
-    """Raise BasisError for settings that change nothing, since nothing is rendered.
+def check_nothing_unused(settings: Settings, basis: Any) -> None:
+    """Raise BasisError for settings without effect, since nothing is rendered.
 
     basis: a saved one, or light groups.
     """

@@ -24,7 +24,7 @@ from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_features, render_surfaces
 from lightpaint.target.template import LIGHTS, SHOWN, Template, write_look, write_template
 
-#: Rendering of what each light does alone, to recognise it by.
+#: Rendering of the small picture of each light, to recognise it by.
 THUMBNAIL = Preset(32, 2**14)
 
 
@@ -40,20 +40,18 @@ def render_template(
     use_cache: bool = True,
     progress: Progress = silent,
 ) -> list[Path]:
-    """Render something to paint on into `folder`, and return its files (docs/targets.md).
+    """Render a template to paint on into `folder`, and return its files (docs/targets.md).
 
-    The look is the sum of the basis that `solve` will ask for, which is kept for it.
+    The look is the sum of the basis that `solve` needs, which is kept in the cache.
 
     Args:
-        scene: What is to be painted.
-        folder: Receives the files.
-        transform: How the look becomes a picture; sRGB by default, at an exposure that shows
-            something.
+        scene: The scene to paint. folder: Receives the files.
+        transform: View transform of the picture; by default sRGB at a metered exposure.
         spp: Samples per pixel (the scene's own number by default).
-        time_s: Instead of spp, seconds in which the basis is rendered.
+        time_s: Seconds to render the basis, instead of spp.
         seed: Any number >= 0.
-        use_cache: Whether a basis from an earlier run is taken, and this one kept.
-        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
+        use_cache: Whether to use a basis from an earlier run, and keep this one. progress: Receives
+        progress and, if it is a `Listener`, remarks.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -94,16 +92,14 @@ def render_template(
 def template_of_basis(
     basis: Basis, folder: str | Path, *, transform: ViewTransform | None = None
 ) -> list[Path]:
-    """Write something to paint on into `folder`, of a saved basis or light groups.
+    """Write a template of a saved basis or light groups into `folder`, and return its files.
 
-    Nothing is rendered: the look is their sum, and what only a scene knows is not there. Where the
-    noise is known, template.png shows the look without it.
+    Nothing is rendered: the look is their sum, and files that need a scene are missing. If the
+    noise is known, template.png shows the denoised look.
 
     Args:
-        basis: What will be solved with.
-        folder: Receives the files, which it returns.
-        transform: How the look becomes a picture; sRGB by default, at an exposure that shows
-            something.
+        basis: The basis to solve with later. folder: Receives the files.
+        transform: View transform of the picture; by default sRGB at a metered exposure.
 
     Examples:
         >>> files = lp.template_of_basis(basis, "over the basis")
@@ -130,7 +126,7 @@ def template_of_basis(
 
 
 def look_of_basis(basis: Basis, path: Path, *, transform: ViewTransform | None = None) -> Path:
-    """Write only the look of a basis, as EXR at `path`; returns the PNG beside it."""
+    """Write only the look of a basis, as EXR at `path`; return the PNG beside it."""
     look, clean, features = _look_of_basis(basis)
     shown = transform or ViewTransform("srgb", meter_exposure(look, basis))
     texts = {} if clean is None else denoiser_text(features, raw=path.name)
@@ -138,7 +134,7 @@ def look_of_basis(basis: Basis, path: Path, *, transform: ViewTransform | None =
 
 
 def _look_of_basis(basis: Basis) -> tuple[Floats, Floats | None, Features | None]:
-    """The sum as it is; without its noise, where that is known; and what that was taken out by."""
+    """Return the look; denoised, if its noise is known; and the features for that."""
     look = basis.present_look
     if not basis.knows_noise:
         return look, None, None
@@ -156,7 +152,7 @@ def render_look(
     use_cache: bool = True,
     progress: Progress = silent,
 ) -> Path:
-    """Only the look to paint on, as EXR at `path`; returns the PNG beside it, which is denoised."""
+    """Write only the look to paint on, as EXR at `path`; return the denoised PNG beside it."""
     listen = listener(progress)
     settings = Settings(spp=spp, time_s=time_s, seed=seed, use_cache=use_cache)
     basis = _basis_of(scene, settings, listen)
@@ -167,26 +163,27 @@ def render_look(
 
 
 def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | None:
-    """The basis whose sum is the look, kept for the solve.
+    """Return the basis whose sum is the look, kept for the solve.
 
-    None where it would cost a render for each light, and nobody has paid for it yet: then a look
-    rendered by itself is there n times sooner, and of several paintings only the last is solved.
+    None if it would need a render for each light and is not in the cache: then a look rendered by
+    itself is ready n times sooner, and only the last of several paintings is solved.
     """
     for remark in remarks_of_pictures():
         listen.say(remark)
-    why = why_not_one_pass(scene)
-    if why is None or len(scene.lights) == 1 or settings.time_s is not None:
+    reason = why_not_one_pass(scene)
+    if reason is None or len(scene.lights) == 1 or settings.time_s is not None:
         return obtain(scene, settings, listen)
     if settings.use_cache:
-        # One that has all the samples that are asked for needs no further render.
+        # A cached basis with all the requested samples needs no further render.
         sensor = scene.sensor_names[scene.sensor]
-        kept = cache.find(scene.identity, sensor, settings.seed, scene.size)
-        asked = scene.spp if settings.spp is None else settings.spp
-        if kept is not None and is_of(scene, kept, settings.seed) and kept.origin.spp >= asked:
+        cached = cache.find(scene.identity, sensor, settings.seed, scene.size)
+        spp = scene.spp if settings.spp is None else settings.spp
+        if cached is not None and is_of(scene, cached, settings.seed) and cached.origin.spp >= spp:
             return obtain(scene, settings, listen)
     listen.say(
-        f"{why}, so that each light takes a render of its own: the template is one of all lights "
-        "together, and solve renders the lights; after lightpaint basis the template is their sum"
+        f"{reason}, so that each light needs a render of its own: the template is a render of all "
+        "lights together, and solve renders the lights; after lightpaint basis the template is "
+        "their sum"
     )
     return None
 
@@ -194,7 +191,7 @@ def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | Non
 def _look(
     scene: Scene, basis: Basis | None, settings: Settings, listen: Listener
 ) -> tuple[Floats, Features]:
-    """The scene as it is, (h, w, 3) linear, and what to denoise it by."""
+    """Return the present look, (h, w, 3) linear, and features to denoise it."""
     if basis is not None:
         features = basis.features or render_features(scene, seed=settings.seed)
         return basis.mix(basis.present_weights), features
@@ -210,7 +207,7 @@ def _look(
 
 
 def _exposure(scene: Scene, basis: Basis | None, look: Floats) -> float:
-    """Stops at which to show the scene as it is."""
+    """Return the exposure in stops at which to show the scene as it is."""
     if basis is not None:
         return meter_exposure(look, basis)
     return choose_exposure(look, emitters_seen(scene))
@@ -219,7 +216,7 @@ def _exposure(scene: Scene, basis: Basis | None, look: Floats) -> float:
 def _thumbnails(
     scene: Scene, basis: Basis | None, settings: Settings, progress: Progress
 ) -> dict[str, Floats]:
-    """By name, what each light does alone at unit emission, (h', w', 3) linear, denoised."""
+    """Return, by name, each light alone at unit emission, (h', w', 3) linear, denoised."""
     factor = THUMBNAIL.reduction(scene.film)
     if basis is None:
         small = scene.reduced(f"1/{factor}")
@@ -229,7 +226,7 @@ def _thumbnails(
 
 
 def _small_planes(basis: Basis, factor: int) -> dict[str, Floats]:
-    """By name, what each light does alone, in means over blocks; denoised, where there is noise."""
+    """Return, by name, each light alone in means over blocks; denoised, if there is noise."""
     small = {
         name: block_mean(image, factor)
         for name, image in zip(basis.names, basis.planes, strict=True)

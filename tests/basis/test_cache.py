@@ -107,12 +107,12 @@ def test_what_is_kept_beyond_what_is_asked_for_is_said(scene: Scene) -> None:
     basis, said = _said(scene, spp=16)
     assert basis.origin.spp == 32
     assert said == [
-        "basis of 32 samples per pixel kept from an earlier run: more than the 16 asked for, so "
-        "the answer may differ a little from one of these (exact_spp=True takes just them)"
+        "basis of 32 samples per pixel kept from an earlier run: more than the 16 requested, so "
+        "the answer may differ a little from one with exactly these (exact_spp=True)"
     ]
     # One more than an odd number makes the halves equal, and is no news.
     for spp in (31, 32):
-        assert "renders it anew" in "".join(_said(scene, spp=spp)[1])
+        assert "renders it again" in "".join(_said(scene, spp=spp)[1])
 
 
 def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
@@ -181,15 +181,15 @@ def test_a_basis_of_blocks_says_when_it_takes_more(tmp_path: Path) -> None:
     path = write_room(tmp_path, integrator='<integrator type="volpathmis"/>', lights=LIGHTS["bulb"])
     small = load_scene(path).reduced("1/3")
     assert _said(small, spp=4)[1] == [
-        "basis of 18 samples per pixel, not 4: it takes one in each pixel of a block for each half"
+        "basis of 18 samples per pixel, not 4: a block needs a sample in each pixel for each half"
     ]
     # No fewer can be had.
     again = (
-        "basis of 18 samples per pixel kept from an earlier run (use_cache=False renders it anew)"
+        "basis of 18 samples per pixel kept from an earlier run (use_cache=False renders it again)"
     )
     assert _said(small, spp=4)[1] == [again]
     assert _said(small, spp=36)[1] == []
-    assert "more than the 4 asked for" in _said(small, spp=4)[1][0]
+    assert "more than the 4 requested" in _said(small, spp=4)[1][0]
 
 
 def test_another_scene_sensor_or_seed_is_another_basis(scene: Scene, tmp_path: Path) -> None:

@@ -498,7 +498,7 @@ def test_groups_and_kept_lights_from_solve_to_relight(tmp_path: Path) -> None:
     room = write_room(tmp_path, lights="".join(LIGHTS.values()) + CHECKERS)
     choice = ("--group", "warm=panel,bulb", "--lights", "warm,s*")
     done = run(tmp_path, "lights", room, *choice, "--json")
-    assert "left as it is: 'screen' has a textured radiance" in done.stderr
+    assert "not adjusted: 'screen' has a textured radiance" in done.stderr
     listed = {light["name"]: light for light in json.loads(done.stdout)["lights"]}
     members = {name: [m["name"] for m in light["members"]] for name, light in listed.items()}
     assert members == {
@@ -674,7 +674,7 @@ def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
     assert done.returncode == 0, done.stderr
     assert (
         "film of 171x128 reduced to 42x32 blocks of 4x4 pixels: 3 columns of pixels at the right "
-        "are left over, and nowhere counted" in done.stderr
+        "are left over and ignored" in done.stderr
     )
     assert "A render confirms it." in done.stdout
     assert read_estimate(tmp_path / "look" / "predicted.exr")[0].size == (32, 42)
@@ -682,7 +682,7 @@ def test_a_film_that_no_blocks_fit_into_is_solved_small_and_verified_whole(
     # Fewer samples, of what is kept or exactly; both say what they used.
     for option, spp in ((), 8), (("--exact-spp",), 4):
         done = run(tmp_path, *solve, "--spp", 4, *option)
-        assert ("more than the 4 asked for" in done.stderr) == (spp == 8)
+        assert ("more than the 4 requested" in done.stderr) == (spp == 8)
         answer = json.loads((tmp_path / "look" / "lighting.json").read_text())
         assert answer["solve"]["basis_spp"] == spp
         _, attributes = read_estimate(tmp_path / "look" / "predicted.exr")

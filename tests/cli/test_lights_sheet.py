@@ -47,10 +47,10 @@ def test_the_sheet_is_drawn_and_drawn_anew(room: Path, monkeypatch: pytest.Monke
     sheet.write_bytes(b"mine")
     kept = run(folder, "lights", room)
     assert (kept.returncode, kept.stdout) == (0, "\n".join([*lines[:-1], ""]))
-    assert "no lights.png: lights.png is there, and no sheet of lights" in kept.stderr
+    assert "no lights.png: lights.png exists and is not a light sheet" in kept.stderr
     assert "choose another name with -o, or pass --force" in kept.stderr
     assert sheet.read_bytes() == b"mine"
-    assert "no sheet of lights" in refused(folder, "lights", room, "-o", "lights.png")
+    assert "is not a light sheet" in refused(folder, "lights", room, "-o", "lights.png")
     assert run(folder, "lights", room, "--force").returncode == 0
     assert sheet.read_bytes() == drawn
 
@@ -83,8 +83,8 @@ def test_a_render_for_each_light_is_not_made_just_to_look(
     room: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(light_sheets, "why_not_one_pass", lambda _scene: "fog")
-    monkeypatch.setattr(light_sheets, "FEW_RENDERS", 1)
+    monkeypatch.setattr(light_sheets, "MAX_RENDERS", 1)
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(room.parent / "cache"))
     done = run(room.parent, "lights", room)
-    assert "no lights.png: fog, so that each light takes a render of its own" in done.stderr
+    assert "no lights.png: fog, so that each light needs a render of its own" in done.stderr
     assert not (room.parent / "lights.png").exists()

@@ -132,7 +132,7 @@ def test_every_word_of_the_table_is_an_argument_of_the_library() -> None:
         ("like pattern='Light_{name}'; its", "like --pattern 'Light_{name}'; its"),
         ("profile (transform=..., mask=...), or", "profile (--view, --mask), or"),
         ("set it with parameters={'width': ...}", "set it with -D width=VALUE"),
-        ("(use_cache=False renders it anew)", "(--no-cache renders it anew)"),
+        ("(use_cache=False renders it again)", "(--no-cache renders it again)"),
         ("spp=..., refine=... cannot", "--spp, --refine cannot"),
         # Names of files and of other things stay as they are.
         ("no such image file: runs/seed=3/a.exr", "no such image file: runs/seed=3/a.exr"),

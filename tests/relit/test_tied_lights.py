@@ -15,7 +15,7 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.solve import solve
-from lightpaint.pipeline.call import paint_with_light
+from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.relit.relight import check_relightable, relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.scene import Scene, load_scene

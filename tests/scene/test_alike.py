@@ -71,9 +71,9 @@ def test_alike_and_without_names_are_one_light(city: Scene) -> None:
     assert sum(len(light.members) for light in city.lights) == 300
     glass = city.light("glass")
     assert (glass.emission, glass.unit) == ((4, 3, 2), "W/(m² sr)")
-    told = [remark for remark in remarks_of_scene(city) if "alike" in remark]
+    told = [remark for remark in remarks_of_scene(city) if "similar lamps" in remark]
     assert len(told) == len(FOUND)
-    assert "100 alike lamps without names are one light, glass" in told[0]
+    assert "100 similar lamps without names form one light, glass" in told[0]
 
 
 def test_they_can_be_parted(city: Scene) -> None:
@@ -142,7 +142,7 @@ def test_from_the_listing_to_the_relit_scene(tmp_path: Path) -> None:
     small = ("-D", "width=16", "--spp", 2)
     done = run(tmp_path, "lights", room, "--no-sheet")
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["light", "glass", "sky"]
-    assert "--no-group-alike parts them all, --group name=VALUE makes a light" in done.stderr
+    assert "--no-group-alike separates them, --group name=VALUE makes a light" in done.stderr
     listed = json.loads(succeed(tmp_path, "lights", room, "--json"))["lights"]
     assert [len(light["members"]) for light in listed] == [40, 1]
     apart = json.loads(succeed(tmp_path, "lights", room, "--json", "--no-group-alike"))["lights"]
@@ -151,7 +151,7 @@ def test_from_the_listing_to_the_relit_scene(tmp_path: Path) -> None:
     write_rgb(tmp_path / "p.exr", np.full((20, 16, 3), 0.4, np.float32))
     done = run(tmp_path, "solve", room, "p.exr", *small, "-o", "out")
     assert done.returncode == 0, done.stderr
-    assert done.stderr.count("alike lamps") == 1
+    assert done.stderr.count("similar lamps") == 1
     lighting = read_lighting(tmp_path / "out" / "lighting.json")
     assert [light.name for light in lighting.lights] == ["glass", "sky"]
     relit = load_scene(tmp_path / "out" / "relit.xml", group_alike=False)

@@ -145,21 +145,20 @@ def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     assert remarks_of_film(scene, asked) == []
     assert remarks_of_film(small, asked) == [
         "film of 23x20 reduced to 7x6 blocks of 3x3 pixels: 2 columns of pixels at the right and 2 "
-        "rows at the bottom are left over, and nowhere counted"
+        "rows at the bottom are left over and ignored"
     ]
     assert remarks_of_film(scene.reduced("1/2"), asked)[0].endswith(
-        "11x10 blocks of 2x2 pixels: 1 column of pixels at the right is left over, and nowhere "
-        "counted"
+        "11x10 blocks of 2x2 pixels: 1 column of pixels at the right is left over and ignored"
     )
     target = Target.of(np.ones((20, 23, 3)))
     assert remarks_of_target(target, small.size, None, Settings()) == [
         "target: 23x20 pixels averaged to the basis's 7x6: 2 columns of pixels at the right and 2 "
-        "rows at the bottom are left over, and nowhere counted"
+        "rows at the bottom are left over and ignored"
     ]
     thin = load_scene(write_room(tmp_path), parameters={"width": 700_000})
     [said] = remarks_of_film(on_film(thin, "preview", None), Settings(quality="preview"))
     assert said == (
-        'the film cannot be made as small as quality="preview" would have it: 35000x1 pixels are '
+        'the film cannot be reduced as far as quality="preview" asks: 35000x1 pixels are '
         "rendered"
     )
 

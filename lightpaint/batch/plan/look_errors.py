@@ -16,7 +16,7 @@ from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LOOK_ERRORS, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduction import reduce_to
-from lightpaint.pipeline.sources import check_nothing_idle, content
+from lightpaint.pipeline.sources import check_nothing_unused, content
 from lightpaint.scene.presets import on_film
 
 
@@ -54,7 +54,7 @@ def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> 
         if found is not None:
             lights = found.basis.lights if isinstance(found, LightGroups) else found.lights
         if not entry.scenes:
-            attempt(partial(check_nothing_idle, entry.settings, entry.basis))
+            attempt(partial(check_nothing_unused, entry.settings, entry.basis))
     if lights is not None:
         for one in _split_constraints(entry.constraints):
             attempt(partial(reduce_to, one, lights))

@@ -188,7 +188,7 @@ def final_render(
         read_lighting(lighting),
         results,
         progress=listen,
-        rendered=render,
+        render_elsewhere=render,
         **options,
     )
 

@@ -31,7 +31,7 @@ from lightpaint.pipeline.sources import (
     GroupsFile,
     Painting,
     SceneFile,
-    check_nothing_idle,
+    check_nothing_unused,
 )
 from lightpaint.pipeline.templates import (
     look_of_basis,
@@ -108,7 +108,7 @@ def _template_of_basis(
     settings: Settings,
 ) -> CommandOutcome:
     """A template of what is rendered already."""
-    check_nothing_idle(settings, source)
+    check_nothing_unused(settings, source)
     found = source.content
     made = found if isinstance(found, Basis) else found.basis
     check_files(_replaced(output), [Path(source.path)] if isinstance(found, Basis) else found.files)

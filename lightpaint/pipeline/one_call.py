@@ -1,4 +1,4 @@
-"""All in one call: from arguments to a job, and its run."""
+"""The one call that does everything: it makes a job from its arguments and runs it."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -55,33 +55,31 @@ def paint_with_light(
     progress: Progress = silent,
     **settings: Any,
 ) -> Look | list[Look]:
-    """Find the lighting of `scene` that comes closest to a painting, and prove it.
+    """Find the lighting of `scene` that comes closest to a painting, and verify it.
 
     Args:
         scene: Mitsuba XML, or None to solve from `basis` alone. For several views a list: the same
-            scene, loaded through another sensor each.
-        target: Painting, as a file or read; for several views a list.
-        folder: Receives the results; of several views, the pictures in a folder for each sensor.
-        basis: One made before, or another renderer's light groups; kept or rendered if not given.
-            For several views a list, which is emptied, so that no pixel is held twice.
-        constraints: What is asked of the lights; it goes before what the scene's lights file asks.
-        mask: As of `read_target`, as are the next two: picture of what counts, where `target` is a
-            path.
-        layer: Of an EXR.
-        find: Whether a template is looked for beside the painting.
-        sensor: As of `load_scene`, as are the next four: index or id, where `scene` is a path.
+            scene, loaded once for each sensor.
+        target: Painting, a file or what `read_target` returned; for several views a list.
+        folder: Receives the results; with several views, each sensor has a folder of its own in it.
+        basis: An existing basis, or another renderer's light groups; taken from the cache or
+            rendered if not given. For several views a list, which is emptied to save memory.
+        constraints: Constraints on the lights; they override those of the scene's lights file.
+        mask: Picture of the importance of pixels, if `target` is a path. The next two are also
+            those of `read_target`.
+        layer: Layer of an EXR. find: Whether to look for a template beside the painting.
+        sensor: Index or id, if `scene` is a path. The next four are also those of `load_scene`.
         parameters: Values of `$name` parameters.
-        lights: Names or patterns of those to adjust.
-        groups: Emitters that are one light, by its name.
-        integrator: To render with instead of the scene's own, like `path`.
-        progress: Hears how far the work has come and, if it is a `Listener`, remarks.
-        **settings: Any of `Settings`, by name, like spp=64.
+        lights: Names or patterns of the lights to adjust.
+        groups: Emitters that form one light, by its name. integrator: Integrator to use instead of
+        the scene's own, like `path`. progress: Receives progress and, if it is a `Listener`,
+        remarks. **settings: Any field of `Settings`, like spp=64.
 
     Returns:
-        The look; of a list, a list.
+        The look; for a list of views, a list of looks.
 
     Raises:
-        LightpaintError: For what cannot be, before anything is rendered.
+        LightpaintError: For invalid arguments, before anything is rendered.
 
     Examples:
         >>> look = lp.paint_with_light("room.xml", "painting.exr", "evening", spp=4)
@@ -99,8 +97,8 @@ def paint_with_light(
     }
     bases = basis if isinstance(basis, list) else None
     if bases is not None:
-        scene = [_on_film_of(x, its) for x, its in zip(_listed(scene), bases, strict=True)]
-        # They are on the films of their bases already.
+        scene = [_with_film_of(x, its) for x, its in zip(_as_list(scene), bases, strict=True)]
+        # These scenes have the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
     read = {"mask": mask and str(mask), "layer": layer, "find": find}
     job = _job((scene, how), (target, read), Path(folder), basis, constraints, Settings(**settings))
@@ -116,41 +114,48 @@ def _job(
     constraints: Constraints | None,
     settings: Settings,
 ) -> Job:
-    """What the arguments of `paint_with_light` ask for. scene, target: and how to read them."""
-    (scenes, how), (targets, read) = scene, target
-    how = {name: value for name, value in how.items() if value not in (None, {})}
+    """Return the job that the arguments of `paint_with_light` describe.
+
+    scene, target: what to read, and the options for reading it.
+    """
+    (scenes, scene_options), (targets, target_options) = scene, target
+    scene_options = {
+        name: value for name, value in scene_options.items() if value not in (None, {})
+    }
     by_sensor = isinstance(scenes, list | tuple)
-    painted = {**read, "transform": TransformChoice.of(settings.transform)}
-    changed = [name for name, value in read.items() if value not in (None, True)]
-    scenes = [SceneFile(str(x), **how) if _is_path(x) else x for x in _listed(scenes)]
-    targets = [Painting(str(x), **painted) if _is_path(x) else x for x in _listed(targets)]
-    if how and not scenes:
-        check_needed(how, basis)
-    if how and not any(isinstance(x, SceneFile) for x in scenes):
-        named = ", ".join(f"{name}=..." for name in how)
-        raise SceneError(f"{named} cannot change a scene that is already loaded: give its path")
+    painting_options = {**target_options, "transform": TransformChoice.of(settings.transform)}
+    changed = [name for name, value in target_options.items() if value not in (None, True)]
+    scenes = [SceneFile(str(x), **scene_options) if _is_path(x) else x for x in _as_list(scenes)]
+    targets = [
+        Painting(str(x), **painting_options) if _is_path(x) else x for x in _as_list(targets)
+    ]
+    if scene_options and not scenes:
+        check_needed(scene_options, basis)
+    if scene_options and not any(isinstance(x, SceneFile) for x in scenes):
+        names = ", ".join(f"{name}=..." for name in scene_options)
+        raise SceneError(f"{names} cannot change a scene that is already loaded: give its path")
     if changed and not any(isinstance(x, Painting) for x in targets):
-        named = ", ".join(f"{name}=..." for name in changed)
-        raise TargetError(f"{named} cannot change a target that is already read: give its path")
+        names = ", ".join(f"{name}=..." for name in changed)
+        raise TargetError(f"{names} cannot change a target that is already read: give its path")
     basis = BasisFile(str(basis)) if _is_path(basis) else basis
-    asked = Constraints() if constraints is None else constraints
-    return Job(tuple(scenes), tuple(targets), folder, basis, asked, settings, by_sensor)
+    all_constraints = Constraints() if constraints is None else constraints
+    return Job(tuple(scenes), tuple(targets), folder, basis, all_constraints, settings, by_sensor)
 
 
-def _listed(given: Any) -> list[Any]:
-    """One or several or none, as several."""
-    if given is None:
+def _as_list(value: Any) -> list[Any]:
+    """Return none, one or several things as a list."""
+    if value is None:
         return []
-    return list(given) if isinstance(given, list | tuple) else [given]
+    return list(value) if isinstance(value, list | tuple) else [value]
 
 
-def _is_path(given: Any) -> bool:
-    return isinstance(given, str | Path)
+def _is_path(value: Any) -> bool:
+    return isinstance(value, str | Path)
 
 
-def _on_film_of(scene: Any, basis: Basis) -> Scene:
-    """`scene`, through the sensor and on the film that `basis` was made with."""
+def _with_film_of(scene: Any, basis: Basis) -> Scene:
+    """Return `scene` with the sensor and the film of `basis`."""
     if not isinstance(scene, Scene):
-        raise SceneError("bases of several views go with scenes that are loaded: use load_scene")
+        raise SceneError("a list of bases needs scenes that are loaded: use load_scene")
     check_same_view(scene, basis)
     return scene.reduced(f"{basis.size[1]}x{basis.size[0]}")
