@@ -46,7 +46,12 @@ def no_render(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object, **__: object) -> None:
         raise AssertionError("this was to be refused before it renders")
 
-    for name in ("pipeline.obtain", "templates.render", "templates.render_surfaces", "relit_renders.render"):
+    for name in (
+        "pipeline.obtain",
+        "templates.render",
+        "templates.render_surfaces",
+        "relit_renders.render",
+    ):
         monkeypatch.setattr(f"lightpaint.pipeline.{name}", never)
 
 

@@ -1,5 +1,6 @@
-"""Colour temperature, hexadecimal colours and luminance.  All functions take linear Rec.709 (D65)
-with a last axis of 3.
+"""Colour temperature, hexadecimal colours and luminance.
+
+All functions take linear Rec.709 (D65) with a last axis of 3.
 """
 
 import math

@@ -1,5 +1,7 @@
-"""sRGB: linear light to display values, and back.  Encoding a million pixels of float32 takes 28 ms
-and decoding 15; colour-science takes 65 and 70, and returns float64.
+"""sRGB: linear light to display values, and back.
+
+Encoding a million pixels of float32 takes 28 ms and decoding 15; colour-science takes 65 and 70,
+and returns float64.
 """
 
 import numpy as np

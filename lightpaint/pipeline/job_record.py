@@ -1,4 +1,4 @@
-"""A job as JSON, to be sent to another machine: files by their paths, and plain values."""
+"""Jobs as JSON, to send them to another machine: paths of files, and plain values."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT = "lightpaint-job 1"
 
-#: Files that a basis may be of, by the name that stands before their fields.
+#: Kinds of files of a basis, by their key in the JSON.
 BASIS_KINDS: Mapping[str, type[BasisFile] | type[GroupsFile]] = {
     "BasisFile": BasisFile,
     "GroupsFile": GroupsFile,
@@ -23,7 +23,7 @@ BASIS_KINDS: Mapping[str, type[BasisFile] | type[GroupsFile]] = {
 
 @dataclass(frozen=True)
 class JobRecord:
-    """The fields of a job in JSON. basis: fields by the name of its kind."""
+    """The fields of a job in JSON. basis: its fields, by the name of its kind."""
 
     scenes: tuple[SceneFile, ...]
     targets: tuple[Painting, ...]
@@ -44,24 +44,24 @@ def encode_job(
     folder: str,
     by_sensor: bool,
 ) -> str:
-    """Return a job's fields as text. Raises LightpaintError for what is in memory."""
+    """Return a job's fields as text. Raises LightpaintError for objects in memory."""
     named = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
     for what, given in named:
         if not all(isinstance(one, File) for one in given):
             raise LightpaintError(
                 f"this job cannot be sent: its {what} is in memory; give the path of a file"
             )
-    of_basis = {type(basis).__name__: asdict(basis)} if basis else None
+    basis_record = {type(basis).__name__: asdict(basis)} if basis else None
     record = JobRecord(
-        tuple(scenes), tuple(targets), of_basis, constraints, settings, folder, by_sensor
+        tuple(scenes), tuple(targets), basis_record, constraints, settings, folder, by_sensor
     )
-    # NumPy's numbers are as good as Python's.
+    # `item` makes NumPy's numbers Python's.
     data = {"format": FORMAT, **asdict(record)}
     return json.dumps(data, indent=1, default=lambda number: number.item())
 
 
 def decode_job(text: str) -> dict[str, Any]:
-    """Return the fields that `encode_job` wrote. Raises LightpaintError for what is no job."""
+    """Return the fields that `encode_job` wrote. Raises LightpaintError for invalid text."""
     try:
         data = strict_json(text)
         if (form := data.pop("format")) != FORMAT:
@@ -77,13 +77,13 @@ def decode_job(text: str) -> dict[str, Any]:
             "folder": Path(record.folder),
         }
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        said = " ".join(str(error).split())
-        raise LightpaintError(f"this is no job: {said}; make one with Job.to_json") from None
+        reason = " ".join(str(error).split())
+        raise LightpaintError(f"this is not a job: {reason}; make one with Job.to_json") from None
 
 
-def _decode_basis(given: Mapping[str, Any] | None) -> BasisFile | GroupsFile | None:
+def _decode_basis(record: Mapping[str, Any] | None) -> BasisFile | GroupsFile | None:
     """Return the file of a basis or of light groups."""
-    if given is None:
+    if record is None:
         return None
-    [(kind, values)] = given.items()
+    [(kind, values)] = record.items()
     return read_record(BASIS_KINDS[kind], dict(values), is_exact=True)

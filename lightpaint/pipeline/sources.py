@@ -1,5 +1,6 @@
-"""The files of a job: a scene, a painting, a saved basis, light groups.  Each consists of plain
-values that can be sent elsewhere, and is read once, on first use.
+"""The files of a job: a scene, a painting, a saved basis, light groups.
+
+Each consists of plain values that can be sent elsewhere, and is read once, on first use.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -158,8 +158,7 @@ def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     thin = load_scene(write_room(tmp_path), parameters={"width": 700_000})
     [said] = remarks_of_film(on_film(thin, "preview", None), Settings(quality="preview"))
     assert said == (
-        'the film cannot be reduced as far as quality="preview" asks: 35000x1 pixels are '
-        "rendered"
+        'the film cannot be reduced as far as quality="preview" asks: 35000x1 pixels are rendered'
     )
 
 
