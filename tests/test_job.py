@@ -201,7 +201,7 @@ def test_what_is_no_job_is_refused_in_one_line():
     [
         ({"basis": None}, LightpaintError, "give a scene, a basis, or both"),
         ({"targets": ()}, TargetError, "no painting to solve for"),
-        ({"targets": (Painting("p.exr"),) * 2}, BasisError, "a basis has one view only"),
+        ({"targets": (Painting("p.exr"),) * 2}, BasisError, "a basis has only one view"),
         ({"targets": ("p.exr",)}, TargetError, "the target is a str"),
         ({"constraints": {"a": {"off": True}}}, ConstraintError, "constraints are a dict"),
         ({"constraints": Constraints.of({"x": {}})}, ConstraintError, "no light 'x'"),
@@ -246,7 +246,7 @@ def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
         replace(target, image=image[:7, :9], importance=image[:7, :9, 0]),
     )
     refused(TargetError, "2 targets for 1 views", scene, [target, target])
-    refused(SceneError, "painted twice", [scene, scene], [target, target])
+    refused(SceneError, "given twice", [scene, scene], [target, target])
     refused(
         TargetError, "template of the sensor side, not of", scene, replace(target, sensor="side")
     )
@@ -296,10 +296,10 @@ def test_remarks_say_what_was_done_to_a_painting(here: Path, make_basis: Any):
     job = _from_basis(targets=(target,))
     assert job.remarks == (
         "t: 20x24 pixels averaged to the basis's 10x12",
-        "t: painted through agx, whose highlights stand for very much light and rule the fit: "
+        "t: painted through agx, whose highlights stand for very much light and dominate the fit: "
         'space="display" fits what the eye sees',
         "t: a note",
-        "t: 3 pixels hold NaN or Inf and count nothing",
+        "t: 3 pixels hold NaN or Inf and are ignored",
     )
     quiet = _from_basis(targets=(target,), settings=Settings(resize=True, space="display"))
     assert quiet.remarks == job.remarks[2:]

@@ -117,7 +117,7 @@ def test_forms_that_a_look_has_nothing_for_are_told_before(here: Path) -> None:
         ('light_groups = "gone.exr"\n', "light_groups: no such file or folder: gone.exr"),
         (groups + 'basis = "groups.exr"\n', "light_groups stand for scene and basis: give them"),
         ('scene = "room.xml"\npattern = "{name}"\n', "pattern is of light_groups"),
-        (groups + 'sensors = ["a"]\n', "a basis has one view only"),
+        (groups + 'sensors = ["a"]\n', "a basis has only one view"),
         (groups + "settings = { spp = 4 }\n", "spp"),
         (groups + want + 'export = { to = ["mitsuba"] }\n', "'mitsuba' is of a scene, and no"),
         (groups + want + 'export = { to = ["maya"] }\n', "to is ['maya']: expected a list of"),

@@ -71,7 +71,7 @@ WRONG: dict[str, tuple[str, tuple[str, ...]]] = {
     "a sensor of a basis": (FIRST + 'sensor = "a"\n', ("look 'one'", "sensor", "saved basis")),
     "several sensors of a basis": (
         FIRST + 'sensors = ["a", "b"]\n',
-        ("look 'one'", "a basis has one view only"),
+        ("look 'one'", "a basis has only one view"),
     ),
     "a sensor that is a list": (FIRST + "sensor = [1]\n", ("sensor is [1]",)),
     "an unknown step": (FIRST + 'want = ["solved"]\n', ("want is ['solved']", "'predict'")),

@@ -54,7 +54,7 @@ def check_combination(mistakes: Mistakes, table: Table) -> None:
     elif "views" in look and ("sensor" in look or "sensors" in look):
         mistakes.add(where, "views name their sensors: leave sensor and sensors out")
     elif several and given:
-        mistakes.add(where, "a basis has one view only: give the scene, to see it from several")
+        mistakes.add(where, "a basis has only one view: give the scene to solve for several")
     elif given and not table.has("scene"):
         _check_basis_keys(mistakes, where, look)
     want, is_given = look.get("want", ()), "lighting" in look or "lightings" in look
