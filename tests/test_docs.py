@@ -63,13 +63,8 @@ def test_decisions_are_numbered_and_whole() -> None:
 #: Characters of a paragraph: six lines of 100, and half a word at the end of each.
 LONGEST = 620
 
-#: Measurements, which are read line by line.
-MEASURED = {"benchmarks.md"}
 
-
-@pytest.mark.parametrize(
-    "document", [x for x in DOCUMENTS if x.name not in MEASURED], ids=lambda path: path.name
-)
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_paragraphs_are_short(document: Path) -> None:
     """Six lines of 100 characters, however the file is wrapped; tables and code aside."""
     text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
