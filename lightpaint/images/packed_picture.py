@@ -9,7 +9,6 @@ reads them in the page.
 
 import zlib
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -55,29 +54,10 @@ def pack_picture(image: Floats, *, dropped: int = DROPPED_BITS) -> PackedPicture
     )
 
 
-def unpack_picture(packed: PackedPicture) -> Floats:
-    """Return the picture (h, w, 3) float32 of packed data."""
-    height, width = packed.size
-    data = np.frombuffer(zlib.decompress(packed.data), np.uint8).astype(np.int32)
-    folded = (data[: data.size // 2] | data[data.size // 2 :] << 8).reshape(3, height, width)
-    residuals = (folded >> 1) ^ -(folded & 1)
-    planes = np.zeros((3, height + 1, width + 1), np.int32)
-    for y in range(1, height + 1):
-        for x in range(1, width + 1):
-            near = planes[:, y, x - 1], planes[:, y - 1, x], planes[:, y - 1, x - 1]
-            planes[:, y, x] = residuals[:, y - 1, x - 1] + _predictor(*near)
-    green, red, blue = planes[:, 1:, 1:]
-    codes = np.stack([red + green, green, blue + green], axis=-1)
-    halves = np.asarray(codes << packed.dropped, np.uint16).view(np.float16)
-    return np.asarray(halves.astype(np.float32) * np.float32(packed.scale))
-
-
 def _predicted(planes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
     """Return the prediction of each number from its neighbours, (3, h, w); 0 beyond the border."""
     around = np.pad(planes, ((0, 0), (1, 0), (1, 0)))
-    return np.asarray(_predictor(around[:, 1:, :-1], around[:, :-1, 1:], around[:, :-1, :-1]))
-
-
-def _predictor(left: Any, above: Any, corner: Any) -> Any:
-    """Return JPEG-LS's prediction: a plane through the three, clamped to the two neighbours."""
-    return np.clip(left + above - corner, np.minimum(left, above), np.maximum(left, above))
+    left, above, corner = around[:, 1:, :-1], around[:, :-1, 1:], around[:, :-1, :-1]
+    # JPEG-LS's: a plane through the three, clamped to the two neighbours.
+    least, most = np.minimum(left, above), np.maximum(left, above)
+    return np.asarray(np.clip(left + above - corner, least, most))

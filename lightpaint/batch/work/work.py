@@ -119,7 +119,7 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     for key, file in zip(task.bases, task.files, strict=True):
         cache.load(key, file)
     if task.lightings:
-        _derive_answer(task, fields, cache, listen)
+        _derive_answer(task, fields, cache)
         return
     job = Job(**fields)
     bases = None
@@ -131,9 +131,7 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     run(job, listen, bases=bases)
 
 
-def _derive_answer(
-    task: Task, fields: dict[str, Any], cache: WorkerCache, listen: Listener
-) -> None:
+def _derive_answer(task: Task, fields: dict[str, Any], cache: WorkerCache) -> None:
     """Write an answer derived from others: a lighting as it is, warmer, or between two."""
     settings: Settings = fields["settings"]
     scenes: list[Scene] = [file.content for file in fields["scenes"]]

@@ -119,26 +119,16 @@ class ViewTransform:
         linear = _encoding(self.name).decode(np.clip(image_display, 0, 1))
         return np.asarray(linear / 2.0**self.stops)
 
-    def jacobian(self, image: Floats) -> Floats:
-        """Return the derivatives of `encode` at a linear image (..., 3).
-
-        The result is (..., 3, 3): of display value i by linear channel j, 0 where the display
-        clips. Only `agx` and `ocio:` mix channels.
-        """
-        _, slopes = self.with_slopes(np.reshape(image, (-1, 3)).T)
-        if slopes.ndim == 2:
-            slopes = slopes * np.eye(3)[..., None]
-        return np.asarray(slopes.transpose(2, 0, 1).reshape(*image.shape, 3))
-
     def encode_planes(self, planes: Floats) -> Floats:
         """Return `encode` of channels in planes, (3, p) linear."""
         return _encoding(self.name).encode_planes(planes * 2.0**self.stops)
 
     def with_slopes(self, planes: Floats) -> tuple[Floats, Floats]:
-        """Return `encode` and `jacobian` of channels in planes at once.
+        """Return `encode` of channels in planes, and its derivatives.
 
-        planes: (3, p) linear. Returns display values, (3, p), and derivatives, (3, 3, p) or, if
-        channels do not mix, their diagonal, (3, p).
+        planes: (3, p) linear. Returns display values, (3, p), and derivatives of display value i by
+        linear channel j, (3, 3, p), 0 where the display clips; if channels do not mix, which they
+        do in `agx` and `ocio:` alone, their diagonal, (3, p).
         """
         scale = 2.0**self.stops
         shown, slopes = _encoding(self.name).with_slopes(planes * scale)
