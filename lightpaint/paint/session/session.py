@@ -19,21 +19,19 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.errors import LightpaintError, NothingToUndoError, PaintError
+from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import AnswerUpdate, CanvasPatch, Message
 from lightpaint.paint.session.answer_messages import Judgement, answer_findings, unpainted_text
-from lightpaint.paint.session.canvas import Canvases
+from lightpaint.paint.session.history import History, restore
+from lightpaint.paint.session.light_changes import constrain_light, constrain_lights, tie_lights
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.session_requests import TITLES, SessionRequests
-from lightpaint.paint.store.steps import Step
 from lightpaint.paint.store.store import Store
 from lightpaint.pipeline.settings import Settings
 from lightpaint.target.target import Target
@@ -74,12 +72,12 @@ class Session:
         self.store, self.name, self.transform = store, name, transform
         self.version, self._stroke = 0, -1
         try:
-            self.views, requests = _restore(bases, presents, store)
+            self.views, requests = restore(bases, presents, store)
         except (LightpaintError, ArithmeticError, LookupError, TypeError, ValueError):
             if not store.has_file:
                 raise
             store.recover()
-            self.views, requests = _restore(bases, presents, store)
+            self.views, requests = restore(bases, presents, store)
         self.live_answer = LiveAnswer(
             self.views.live,
             requests,
@@ -87,6 +85,7 @@ class Session:
             constraints=constraints or Constraints(),
             transform=transform,
         )
+        self._history = History(store, self.views, self.live_answer)
         self._update_answer()
 
     # State
@@ -152,14 +151,11 @@ class Session:
 
     def preview_requests(self, change: protocol.Preview) -> SessionRequests:
         """Return the requests after a change. Raises LightpaintError where it cannot be made."""
-        self._check_names(change.asked)
+        lights = self.basis.lights
         requests = self.requests.with_values(change.values)
-        for name, asked in change.asked.items():
-            self._check_free(self.basis.lights[self.basis.names.index(name)])
-            requests = requests.with_light(name, asked)
+        requests = constrain_lights(requests, lights, change.asked)
         if change.ties is not None:
-            self._check_names(name for names in change.ties for name in names)
-            requests = requests.with_ties(change.ties)
+            requests = tie_lights(requests, lights, change.ties)
         self.live_answer.check(requests)
         return requests
 
@@ -196,17 +192,15 @@ class Session:
             case protocol.Ask():
                 return [self._constrain_light(message)]
             case protocol.AskAll():
-                return [self._constrain_lights(message)]
+                requests = constrain_lights(self.requests, self.basis.lights, message.asked)
+                return [self._append_requests(", ".join(message.asked), requests)]
             case protocol.TieLights():
-                self._check_names(name for names in message.ties for name in names)
-                return [self._append_requests("tie", self.requests.with_ties(message.ties))]
+                requests = tie_lights(self.requests, self.basis.lights, message.ties)
+                return [self._append_requests("tie", requests)]
             case protocol.Set():
                 requests = self.requests.with_values(message.values)
-                return [
-                    self._append_requests(
-                        ", ".join(TITLES[key] for key in message.values), requests
-                    )
-                ]
+                label = ", ".join(TITLES[key] for key in message.values)
+                return [self._append_requests(label, requests)]
         raise PaintError(f"a session has no answer to {type(message).__name__}")
 
     def answer_update(self, **more: Any) -> AnswerUpdate:
@@ -254,25 +248,14 @@ class Session:
     @property
     def edit_state(self) -> dict[str, Any]:
         """Steps that can be undone, and requests in effect: the fields of `EditState`."""
-        steps, position = self.store.steps, self.store.position
         fit = self.live_answer.fit
         return {
-            "history": protocol.HistoryInfo(
-                undo=tuple(self._step_label(step) for step in steps[:position][-50:]),
-                redo=tuple(self._step_label(step) for step in steps[position:][:50]),
-                count=position,
-            ),
+            "history": self._history.info(),
             "asked": {name: dict(its) for name, its in self.requests.lights.items()},
             "ties": self.requests.ties,
             "settings": dict(self.requests.values),
             "meant": protocol.ResolvedFit(fit.space, fit.hold, fit.colors),
         }
-
-    def _step_label(self, step: Step) -> str:
-        """Return the label of a step for undo, with the view's name if there are several."""
-        where = [self.views[patch.view].name for patch in step.patches]
-        names_view = len(self.views) > 1 and len(where) == 1
-        return f"{step.label}, {where[0]}" if names_view else step.label
 
     def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
         """Replace the bases by ones of more samples, with the same lights and sizes.
@@ -290,7 +273,7 @@ class Session:
         """
         is_stroke = with_stroke and self.views.is_open
         if is_stroke:  # kept before anything is solved, which may be given up
-            self._close_stroke("stroke")
+            self._history.close_stroke("stroke")
         if self.live_answer.reset_slider() or is_stroke:
             self._update_answer()
 
@@ -315,11 +298,7 @@ class Session:
         self.live_answer.check(requests)
         if self.views.is_open:
             self._drop_stroke()
-        patches = self.views.replacement_patches(paintings)
-        fields = {"before": self.requests.as_json(), "after": requests.as_json()}
-        self.store.append(Step("look_loaded", label, fields, patches))
-        self.views.put(patches)
-        self.live_answer.set_requests(requests)
+        patches = self._history.replace_all(paintings, requests, label)
         self._update_answer()
         if weights is not None:
             self.live_answer.weights = weights.copy()
@@ -332,23 +311,17 @@ class Session:
         pixels = view.check_pixels(request.region, arrays)
         if request.stroke != self._stroke:
             # Of a stroke whose end was never heard, what is there is kept.
-            self._close_stroke("stroke")
+            self._history.close_stroke("stroke")
             self._stroke = request.stroke
         view.paint(request.region, pixels)
         if request.done:
             try:
-                self._close_stroke(request.label)
+                self._history.close_stroke(request.label)
             except LightpaintError:
                 self._drop_stroke()
                 raise
         self._update_answer()
         return self.answer_update(**(self.edit_state if request.done else {}))
-
-    def _close_stroke(self, label: str) -> None:
-        """Append the open stroke as a step, if there is one."""
-        if patches := self.views.stroke_patches():
-            self.store.append(Step("stroke", label, {}, patches))
-        self.views.close()
 
     def _drop_stroke(self) -> list[tuple[int, Region]]:
         """Drop the open stroke; return its views and regions."""
@@ -361,68 +334,26 @@ class Session:
     def _move_step(self, by: int) -> list[Message]:
         """Move back or forth by one step."""
         if self.views.is_open:
-            self._close_stroke("stroke")
+            self._history.close_stroke("stroke")
             self._update_answer()
-        steps, now = self.store.steps, self.store.position
-        position, is_back = now + by, by < 0
-        if not 0 <= position <= len(steps):
-            raise NothingToUndoError(f"There is nothing to {'undo' if is_back else 'redo'}.")
-        step = steps[position] if is_back else steps[now]
-        try:
-            found = [patch.before if is_back else patch.after for patch in step.patches]
-        except DamagedError:
-            raise PaintError(self.store.recover()) from None
-        self.store.move_to(position)
-        for patch, pixels in zip(step.patches, found, strict=True):
-            self.views[patch.view].put(patch.region, pixels)
-        if step.fields:
-            self.live_answer.set_requests(
-                SessionRequests.of(step.fields["before" if is_back else "after"])
-            )
+        patches = self._history.move(by)
         self._update_answer()
-        return self._patch_messages(*((patch.view, patch.region) for patch in step.patches))
+        return self._patch_messages(*((patch.view, patch.region) for patch in patches))
 
-    def _constrain_light(self, request: protocol.Ask) -> Message:
-        if request.light >= len(self.basis.lights):
-            raise PaintError(f"no light {request.light}: there are {len(self.basis.lights)}")
-        light = self.basis.lights[request.light]
-        self._check_free(light)
-        requests = self.requests.with_light(light.name, request.asked)
-        if request.done:
-            return self._append_requests(light.name, requests)
+    def _constrain_light(self, message: protocol.Ask) -> Message:
+        name, requests = constrain_light(self.requests, self.basis.lights, message)
+        if message.done:
+            return self._append_requests(name, requests)
         # While a slider moves nothing is kept.
         self.live_answer.move_slider(requests)
         self._update_answer()
         return self.answer_update()
 
-    def _constrain_lights(self, request: protocol.AskAll) -> Message:
-        self._check_names(request.asked)
-        requests = self.requests
-        for name, asked in request.asked.items():
-            self._check_free(self.basis.lights[self.basis.names.index(name)])
-            requests = requests.with_light(name, asked)
-        return self._append_requests(", ".join(request.asked), requests)
-
-    def _check_free(self, light: BasisLight) -> None:
-        if light.is_fixed:
-            raise PaintError(f"{light.name} is kept as it is, and cannot be asked for anything")
-
     def _append_requests(self, label: str, requests: SessionRequests) -> Message:
         """Set requests from now on: a step."""
-        self.live_answer.check(requests)
-        self._close_stroke("stroke")
-        fields = {
-            "before": self.live_answer.requests_at_rest.as_json(),
-            "after": requests.as_json(),
-        }
-        self.store.append(Step("asked", label, fields))
-        self.live_answer.set_requests(requests)
+        self._history.append_requests(label, requests)
         self._update_answer()
         return self.answer_update(**self.edit_state)
-
-    def _check_names(self, names: Any) -> None:
-        if unknown := [name for name in names if name not in self.basis.names]:
-            raise PaintError(f"no light is called {unknown[0]!r}")
 
     # Answers
 
@@ -453,14 +384,3 @@ class Session:
             )
             messages.append(patch)
         return messages
-
-
-def _restore(
-    bases: Sequence[Basis], presents: Sequence[Floats], store: Store
-) -> tuple[Canvases, SessionRequests]:
-    """Return the canvases and the requests after the steps of the store."""
-    done = store.steps[: store.position]
-    states = [step.fields["after"] for step in done if step.fields]
-    requests = SessionRequests.of(states[-1]) if states else SessionRequests()
-    requests.constraints()
-    return Canvases(bases, presents, done), requests

@@ -1,0 +1,44 @@
+"""Changes of what is asked of lights, by the messages of a page: all lights exist and are free."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from lightpaint.basis.lights import Lights
+from lightpaint.errors import PaintError
+from lightpaint.paint import protocol
+from lightpaint.paint.store.session_requests import SessionRequests
+
+
+def constrain_light(
+    requests: SessionRequests, lights: Lights, message: protocol.Ask
+) -> tuple[str, SessionRequests]:
+    """Return the name of a light by its place, and the requests with those on it replaced."""
+    if message.light >= len(lights):
+        raise PaintError(f"no light {message.light}: there are {len(lights)}")
+    name = lights.names[message.light]
+    return name, constrain_lights(requests, lights, {name: message.asked})
+
+
+def constrain_lights(
+    requests: SessionRequests, lights: Lights, asked: Mapping[str, Mapping[str, Any]]
+) -> SessionRequests:
+    """Return the requests with those on some lights replaced, by their names."""
+    _check_names(asked, lights)
+    for name, its in asked.items():
+        if lights[lights.names.index(name)].is_fixed:
+            raise PaintError(f"{name} is kept as it is, and cannot be asked for anything")
+        requests = requests.with_light(name, its)
+    return requests
+
+
+def tie_lights(
+    requests: SessionRequests, lights: Lights, ties: Sequence[Sequence[str]]
+) -> SessionRequests:
+    """Return the requests with other dimmers, each with the names of its lights."""
+    _check_names((name for names in ties for name in names), lights)
+    return requests.with_ties(ties)
+
+
+def _check_names(names: Iterable[str], lights: Lights) -> None:
+    if unknown := [name for name in names if name not in lights.names]:
+        raise PaintError(f"no light is called {unknown[0]!r}")
