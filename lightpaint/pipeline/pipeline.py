@@ -123,6 +123,23 @@ def obtain(
         )
     elif settings.use_cache and is_rendered:
         clean_planes(basis, most=MOST, progress=lambda k, n: listen("denoising", k, n, "planes"))
+    _remark_on_samples(scene, basis, settings, spp, listen, is_rendered=is_rendered)
+    return basis
+
+
+def _remark_on_samples(
+    scene: Scene,
+    basis: Basis,
+    settings: Settings,
+    spp: int | None,
+    listen: Listener,
+    *,
+    is_rendered: bool,
+) -> None:
+    """Say where a basis comes from, if it has not just the samples that were requested.
+
+    spp: the requested samples per pixel; None for the scene's own.
+    """
     basis_text = f"basis of {basis.origin.spp} samples per pixel"
     requested_spp = scene.spp if spp is None else spp
     if not is_rendered and basis.origin.spp > samples_for(scene, spp):
@@ -142,7 +159,6 @@ def obtain(
         f"basis {origin_text}: {len(basis.lights)} lights, {width}x{height} pixels, {origin.spp} "
         f"samples per pixel, seed {origin.seed}, {origin.method}"
     )
-    return basis
 
 
 def _obtain_bases(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:

@@ -77,21 +77,9 @@ def paint(
             terminal.say(remark)
     addresses = []
 
-    def told() -> dict[str, str]:
-        return {"folder": str(folder), "scene": subject.name}
-
     def opened(server: "Server") -> None:
         addresses.append(server.url)
-        if host is not None:
-            about = REACH[server.address.reach].format(name=server.address.name, folder=folder)
-            is_open = server.address.reach is not Reach.MACHINE
-            (partial(terminal.complain, "paint") if is_open else terminal.say)(about)
-        said = f"painting {subject.name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
-        if manner().as_json:  # now, in one line: programs connect while it runs
-            lines.err(said)
-            lines.out(json.dumps({**server.connection, **told()}))
-        else:
-            terminal.write(said)
+        _announce(server, subject.name, folder, is_reachable=host is not None)
         if with_browser and _has_browser():
             # Some browsers keep who starts them waiting.
             given = (server.one_time_url(),)
@@ -109,6 +97,23 @@ def paint(
         terminal.complain("paint", str(error))
         return CommandOutcome(None, 2)
     return CommandOutcome(None)
+
+
+def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) -> None:
+    """Tell where the painter is, and with --host who reaches it.
+
+    name: of what is painted. is_reachable: whether an address to listen at was given.
+    """
+    if is_reachable:
+        about = REACH[server.address.reach].format(name=server.address.name, folder=folder)
+        is_open = server.address.reach is not Reach.MACHINE
+        (partial(terminal.complain, "paint") if is_open else terminal.say)(about)
+    said = f"painting {name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
+    if manner().as_json:  # now, in one line: programs connect while it runs
+        lines.err(said)
+        lines.out(json.dumps({**server.connection, "folder": str(folder), "scene": name}))
+    else:
+        terminal.write(said)
 
 
 def _say(text: str) -> None:

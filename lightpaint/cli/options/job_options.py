@@ -54,18 +54,7 @@ def jobs_of(
     paths = options.targets or [path for _, path in options.views]
     if not paths:
         raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
-    paintings = [
-        Painting(
-            path,
-            mask=mask,
-            layer=options.layer,
-            transform=transform_of(options),
-            template=options.template,
-            find=options.find_template,
-            paint=options.paint,
-        )
-        for path, mask in zip(paths, _one_for_each(options.masks or [None], paths), strict=True)
-    ]
+    paintings = _paintings_of(options, paths)
     asked = constraints_of(options)
     if basis is not None and options.lights_file:
         asked = read_constraints(options.lights_file).and_then(asked)
@@ -96,6 +85,22 @@ def jobs_of(
         for job in jobs:  # where there is no scene to have read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
+
+
+def _paintings_of(options: Namespace, paths: list[str]) -> list[Painting]:
+    """Return the paintings at `paths`, each with its mask."""
+    return [
+        Painting(
+            path,
+            mask=mask,
+            layer=options.layer,
+            transform=transform_of(options),
+            template=options.template,
+            find=options.find_template,
+            paint=options.paint,
+        )
+        for path, mask in zip(paths, _one_for_each(options.masks or [None], paths), strict=True)
+    ]
 
 
 def transform_of(options: Namespace) -> TransformChoice:

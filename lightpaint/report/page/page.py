@@ -81,11 +81,10 @@ def report_page(
     looks = looks or raw
     transform = looks.encoder(report_transform(target, basis, predicted.image))
     current = looks.current
-    template = resources.files("lightpaint.report.page").joinpath("page.html.in")
     # Pictures take the time, and none waits for another.
-    making: tuple[Callable[[], str], ...] = (
-        partial(_mixer, basis, target, solution, looks, transform=transform),
-        partial(
+    making: dict[str, Callable[[], str]] = {
+        "mixer": partial(_mixer, basis, target, solution, looks, transform=transform),
+        "maps": partial(
             maps,
             solution,
             predicted.image,
@@ -94,26 +93,24 @@ def report_page(
             transform=transform,
             missed=missed,
         ),
-        partial(_wipe, target, solution, looks, raw, transform=transform),
-        partial(missed_section, solution, diagnosis, current, transform=transform, seen=seen),
-        partial(
+        "wipe": partial(_wipe, target, solution, looks, raw, transform=transform),
+        "missed": partial(
+            missed_section, solution, diagnosis, current, transform=transform, seen=seen
+        ),
+        "constraints": partial(
             constraints_section, basis, solution, unconstrained, transform=transform, looks=looks
         ),
-        partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
-    )
-    made = parallel_map(lambda make: make(), making)
-    mixer, of_pixels, pictures, what_is_missed, constraints, lights = made
+        "lights": partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
+    }
+    made = parallel_map(lambda make: make(), tuple(making.values()))
+    drawn = dict(zip(making, made, strict=True))
+    drawn["missed"] += drawn.pop("constraints") + colors_section(color_choices)
+    drawn["mixer"] += mixer_assets()
+    template = resources.files("lightpaint.report.page").joinpath("page.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
-        title=escape(f"{target.name} · {basis.origin.scene}"),
-        target=escape(target.name),
-        scene=escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
-        verdict=escape(verdict(solution, predicted, verification, seen=seen)),
-        meant=escape(fit_sentence(solution)),
-        banner=_banner(verification) + _notes(emitter_remarks(target, solution, predicted)),
-        wipe=pictures,
+        **drawn,
+        **_texts(basis, target, solution, predicted, verification, seen),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
-        maps=of_pixels,
-        missed=what_is_missed + constraints + colors_section(color_choices),
         suggestions=suggestion_section(
             suggestions,
             transform=transform,
@@ -121,15 +118,32 @@ def report_page(
             is_clean=looks.is_clean,
         ),
         sure=sure_section(basis, solution, uncertainty),
-        lights=lights,
-        fit=fit_table(solution),
-        verification=verification_table(verification),
-        render=render_table(basis, target, solution, predicted, verification),
-        mixer=mixer + mixer_assets(),
         command=escape(command or "(made from Python, without a command line)"),
-        again=_next_steps(basis, target, verification),
-        versions=escape(versions(basis)),
     )
+
+
+def _texts(
+    basis: Basis,
+    target: Target,
+    solution: Solution,
+    predicted: Estimate,
+    verification: Verification | None,
+    seen: Seen | None,
+) -> dict[str, str]:
+    """Return the parts of the page without a picture, by their marks in it."""
+    return {
+        "title": escape(f"{target.name} · {basis.origin.scene}"),
+        "target": escape(target.name),
+        "scene": escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
+        "verdict": escape(verdict(solution, predicted, verification, seen=seen)),
+        "meant": escape(fit_sentence(solution)),
+        "banner": _banner(verification) + _notes(emitter_remarks(target, solution, predicted)),
+        "fit": fit_table(solution),
+        "verification": verification_table(verification),
+        "render": render_table(basis, target, solution, predicted, verification),
+        "again": _next_steps(basis, target, verification),
+        "versions": escape(versions(basis)),
+    }
 
 
 def prepare_page(basis: Basis) -> None:
