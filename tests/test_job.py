@@ -227,7 +227,7 @@ def test_what_cannot_be_done_is_said_at_birth(how: Any, error: type[Exception], 
 def test_what_cannot_be_done_with_a_scene_is_said_before_it_renders(
     room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("lightpaint.pipeline.pipeline.obtain_basis", None)
+    monkeypatch.setattr("lightpaint.pipeline.job_bases.obtain_basis", None)
     scene = load_scene(room)
     side = load_scene(room, sensor="side")
     (height, width) = scene.size
@@ -328,12 +328,12 @@ def test_one_listener_hears_work_and_remarks(here: Path):
 def test_a_basis_that_was_obtained_serves_the_next_painting(
     room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    from lightpaint.pipeline import pipeline
+    from lightpaint.pipeline import job_bases
 
     rendered: list[Any] = []
-    once = pipeline.obtain_basis
+    once = job_bases.obtain_basis
     monkeypatch.setattr(
-        pipeline, "obtain_basis", lambda *a, **k: (rendered.append(a), once(*a, **k))[1]
+        job_bases, "obtain_basis", lambda *a, **k: (rendered.append(a), once(*a, **k))[1]
     )
     scene = SceneFile(str(room))
     image = np.ones((20, 24, 3), np.float32)

@@ -47,7 +47,7 @@ def no_render(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("this was to be refused before it renders")
 
     for name in (
-        "pipeline.obtain",
+        "job_bases.obtain",
         "templates.render",
         "templates.render_surfaces",
         "relit_renders.render",

@@ -93,7 +93,7 @@ class Subject:
             yield cached
             return
         # What renders is not needed for a basis that is there.
-        from lightpaint.pipeline.pipeline import obtain
+        from lightpaint.pipeline.job_bases import obtain
 
         scene, settings, target_spp = self.loaded_scene, self.settings, self.target_spp or 1
         cached = cache.find(scene.identity, sensor_name(scene), settings.seed, scene.size)

@@ -14,7 +14,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.denoiser import Features, denoised, denoiser_text
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
-from lightpaint.pipeline.pipeline import obtain
+from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.remarks import remarks_of_pictures
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Listener, Progress, listener, silent

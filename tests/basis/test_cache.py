@@ -21,7 +21,7 @@ from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.render import is_on_the_way, render_basis
 from lightpaint.errors import LightpaintError, OutputError, SceneError
-from lightpaint.pipeline.pipeline import obtain
+from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene, load_scene

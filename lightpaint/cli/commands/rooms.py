@@ -20,7 +20,7 @@ from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.pipeline.job import Job
-from lightpaint.pipeline.pipeline import obtain
+from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.relit_renders import relight_look, relit_folder
 from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
 from lightpaint.pipeline.result_folder import ResultFolder

@@ -1,0 +1,123 @@
+"""The bases of a job: given, kept from an earlier run, or rendered."""
+
+import time
+from dataclasses import replace
+
+from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache_folder import folder
+from lightpaint.basis.clean import MOST, clean_planes
+from lightpaint.basis.render.obtain import Render, obtain_basis
+from lightpaint.basis.render.render import render_basis, samples_for
+from lightpaint.pipeline.job import Job, PaintedView
+from lightpaint.pipeline.settings import Settings
+from lightpaint.progress import Listener, Progress, labelled, listener
+from lightpaint.scene.presets import samples
+from lightpaint.scene.scene import Scene
+
+
+def obtain(
+    scene: Scene,
+    settings: Settings,
+    progress: Progress,
+    *,
+    views: int = 1,
+    render: Render = render_basis,
+) -> Basis:
+    """Return the basis of `scene` on its film, from the cache or rendered.
+
+    views: number of views that share the rendering time. render: function that renders missing
+    samples.
+    """
+    listen = listener(progress)
+    is_rendered = is_all_rendered = False
+
+    def report(label: str, done: int, total: int, unit: str = "passes") -> None:
+        nonlocal is_rendered, is_all_rendered
+        is_all_rendered |= not is_rendered and done == 0
+        is_rendered = True
+        listen(label, done, total, unit)
+
+    spp = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+    began_s = time.perf_counter()
+    basis = obtain_basis(
+        scene,
+        spp=spp,
+        time_s=None if settings.time_s is None else settings.time_s / views,
+        seed=settings.seed,
+        use_cache=settings.use_cache,
+        exact_spp=settings.exact_spp,
+        progress=report,
+        render=render,
+    )
+    if is_all_rendered:
+        basis = replace(basis, render_s=time.perf_counter() - began_s)
+    if settings.use_cache and not cache.is_kept(basis):
+        listen.say(
+            f"the basis could not be saved in {folder()}, so the next run renders it again: "
+            "is the disk full, or the folder not yours?"
+        )
+    elif settings.use_cache and is_rendered:
+        clean_planes(basis, most=MOST, progress=lambda k, n: listen("denoising", k, n, "planes"))
+    _remark_on_samples(scene, basis, settings, spp, listen, is_rendered=is_rendered)
+    return basis
+
+
+def _remark_on_samples(
+    scene: Scene,
+    basis: Basis,
+    settings: Settings,
+    spp: int | None,
+    listen: Listener,
+    *,
+    is_rendered: bool,
+) -> None:
+    """Say where a basis comes from, if it has not just the samples that were requested.
+
+    spp: the requested samples per pixel; None for the scene's own.
+    """
+    basis_text = f"basis of {basis.origin.spp} samples per pixel"
+    requested_spp = scene.spp if spp is None else spp
+    if not is_rendered and basis.origin.spp > samples_for(scene, spp):
+        listen.say(
+            f"{basis_text} kept from an earlier run: more than the {requested_spp} requested, so "
+            "the answer may differ a little from one with exactly these (exact_spp=True)"
+        )
+    elif not is_rendered:
+        listen.say(f"{basis_text} kept from an earlier run (use_cache=False renders it again)")
+    elif settings.time_s is None and basis.origin.spp > requested_spp + 1:
+        listen.say(
+            f"{basis_text}, not {requested_spp}: a block needs a sample in each pixel for each half"
+        )
+    origin, (height, width) = basis.origin, basis.size
+    origin_text = "rendered" if is_rendered else "taken from the cache"
+    listen.note(
+        f"basis {origin_text}: {len(basis.lights)} lights, {width}x{height} pixels, {origin.spp} "
+        f"samples per pixel, seed {origin.seed}, {origin.method}"
+    )
+
+
+def obtain_bases_of(job: Job, bases: list[Basis] | None, listen: Listener) -> list[Basis]:
+    """Return the basis of each view: passed in, given with the job, cached or rendered."""
+    if bases is None:
+        obtained = [_basis_of(job, view, listen) for view in job.views]
+    else:
+        obtained = list(bases)
+        bases.clear()
+    # With the present requests of the scene's lights file, whenever the bases were made.
+    return [
+        basis if view.scene is None else basis.with_requests(view.scene.requests)
+        for basis, view in zip(obtained, job.views, strict=True)
+    ]
+
+
+def _basis_of(job: Job, view: PaintedView, listen: Listener) -> Basis:
+    if view.basis is not None:
+        return view.basis
+    assert view.scene is not None
+    return obtain(view.scene, job.settings, view_listener(job, view, listen), views=len(job.views))
+
+
+def view_listener(job: Job, view: PaintedView, listen: Listener) -> Listener:
+    """Return `listen`, which names the view if there are several."""
+    return listen if len(job.views) == 1 else labelled(listen, view.folder.name)
