@@ -73,6 +73,24 @@ def test_white_light_on_a_wall_that_wood_reflects_on(gallery: lp.Basis) -> None:
         assert _duv(gallery, _over_look(gallery, {left: white})).max() < GREEN
 
 
+@pytest.mark.parametrize(("mired", "stops"), [(-100, -1), (-60, -2), (60, -1)])
+def test_a_whole_picture_that_is_asked_cooler_or_warmer(
+    gallery: lp.Basis, mired: float, stops: float
+) -> None:
+    """The lamps are 0.003 to the green side of whites themselves, which is not seen."""
+    tint = kelvin_to_rgb(1e6 / (1e6 / 6504 + mired)) / kelvin_to_rgb(6504)
+    target = lp.Target(
+        "asked",
+        (gallery.present_look * tint * 2.0**stops).astype(np.float32),
+        np.ones(gallery.size, np.float32),
+        everything=False,
+        transform=lp.ViewTransform("srgb", 0),
+        through_view=True,
+        over_look=True,
+    )
+    assert _duv(gallery, target).max() < GREEN
+
+
 @pytest.mark.parametrize("name", ["opening.png", "morning.exr", "overcast.png", "after-hours.png"])
 def test_shipped_paintings(gallery: lp.Basis, name: str) -> None:
     target = lp.read_target(ROOT / "targets/gallery" / name).fitted_to(gallery.size, resize=True)

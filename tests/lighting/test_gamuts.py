@@ -99,6 +99,17 @@ def test_who_paints_green_gets_green(make_basis: Any, space: Any) -> None:
     assert where[np.argmax(lit)] > 0.02
 
 
+def test_a_red_lamp_keeps_nobody_from_painting_green(make_basis: Any) -> None:
+    """What is allowed beside whites follows from lamps that are nearly white."""
+    basis = _room(make_basis, 1)
+    emission = [light.emission for light in basis.lights]
+    emission[0] = (1.0, 0.05, 0.02)
+    colored = make_basis(6, SIZE, images=basis.images, emission=emission)
+    image, weight = _painting(colored, GREEN)
+    solution = lp.solve(colored, _target(image, weight), hold=0.1)
+    assert white_range(2200, 9000).greener(solution.weights[1:]).max() > 0.02
+
+
 @pytest.mark.parametrize("space", ["display", "linear"])
 @pytest.mark.parametrize("seed", range(3))
 def test_nor_under_the_brush(make_basis: Any, seed: int, space: Any) -> None:

@@ -27,6 +27,9 @@ from lightpaint.colour.color_hull import (
 from lightpaint.colour.white_range import white_range
 from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
 
+#: Whites that paint may ask for, in kelvin: those that have a name.
+ALL_KELVINS = (1901, 100_000)
+
 #: Share of the painted light that is ignored as outliers: noise, edges of strokes.
 OUTLIER_SHARE = 0.05
 
@@ -36,6 +39,9 @@ WHITE_MARGIN = 0.004
 #: Largest distance from painted colours: people paint hues that much off. The distance allowed is
 #: twice that of the paint itself from whites, since whoever paints white means white.
 PAINTED_MARGIN = 0.01
+
+#: Distance from whites of all temperatures that a colour may have, relative to that of the paint.
+PAINTED_FACTOR = 3
 
 #: Rounding of bounds, in (u', v'): too small to see, and it keeps bounds equal between strokes.
 REACH_STEP = 0.001
@@ -119,8 +125,14 @@ class Gamuts:
         self._light, self._power, self._present = light, power, present
         self._own = np.where(luminance(present)[:, None] > 0, present, 1.0)
         # Its own colour is within its gamut, and not at the edge of it.
-        own = chromaticity(self._own) @ DIRECTIONS.T + 2 * REACH_STEP
-        self._reach = np.maximum(own, reach_of(white_range(*LAMP_KELVINS).colors) + WHITE_MARGIN)
+        own = chromaticity(self._own) @ DIRECTIONS.T
+        lamps, every = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
+        self._reach = np.maximum(own + 2 * REACH_STEP, lamps + WHITE_MARGIN)
+        self._whites = every
+        # Off-white lamps lie beside whites, and so does what they shine on; coloured ones are none.
+        self._off_white = np.maximum(own - every, 0).max(axis=1)
+        near = self._off_white <= PAINTED_MARGIN
+        self._tolerance = float(self._off_white[near].max(initial=0.0))
         self._sides = sides_of(self._reach - REACH_STEP)
         self._needed: _NeededLight | None = None
         self._gamuts: dict[int, ColorHull] = {}
@@ -133,6 +145,11 @@ class Gamuts:
             own, wanted = self._reach[light], self._needed.reach(light)
             beside = np.clip(2 * (wanted - own + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
             reach = np.maximum(own, wanted + beside)
+            # Paint that is cooler or warmer asks for other whites, and for none that is greener.
+            off = max(self._off_white[light], 2 * REACH_STEP)
+            painted = np.maximum(wanted - self._whites - self._tolerance, 0)
+            whites = np.maximum(own, self._whites + off)
+            reach = np.minimum(reach, whites + PAINTED_FACTOR * painted)
             reach = np.round(reach / REACH_STEP) * REACH_STEP
             found, before = ColorHull(reach, self._own[light]), self._former_gamuts.get(light)
             is_same = before is not None and np.array_equal(before.reach, reach)
