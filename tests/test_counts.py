@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import refused
-from serving import in_a_loop
+from live_server import in_a_loop
 
 import lightpaint as lp
 from lightpaint.batch.manifest.manifest import read_manifest

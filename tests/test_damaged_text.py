@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damage import Case, attempt, clear, outcomes, turned, wrong
 from damage_readers import Reader, contents, contents_of_json
+from damaged_files import Case, attempt, clear, outcomes, turned, wrong
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -93,7 +93,7 @@ def test_so_is_a_journal_that_is_settled(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("_unsafe")
 def test_so_is_a_session_that_is_written_anew(tmp_path: Path) -> None:
-    from sessions import IDENTITY, content, step
+    from stored_sessions import IDENTITY, content, step
 
     path = tmp_path / "session.db"
     with Store.open(path, IDENTITY) as store:

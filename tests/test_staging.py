@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from lightpaint.errors import OutputError
-from lightpaint.storage import mount_points as system
-from lightpaint.storage import staging
+from lightpaint.storage import mount_points, staging
 from lightpaint.storage.staging import JOURNAL, MARK, finish, staged
 
 EARLIER = {"a": "earlier", "deep/b": "earlier", "view/c": "earlier"}
@@ -304,5 +303,5 @@ def test_a_disk_without_locks(look: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 @pytest.mark.skipif(sys.platform != "linux", reason="mounts are asked of Linux")
 def test_mounts_are_known() -> None:
-    assert system.is_mounted(Path("/proc"))
-    assert not system.is_mounted(Path(__file__).parent)
+    assert mount_points.is_mounted(Path("/proc"))
+    assert not mount_points.is_mounted(Path(__file__).parent)

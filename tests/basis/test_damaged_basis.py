@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damage import Case, cut_and_read, damaged, outcomes, turned, wrong
+from damaged_files import Case, cut_and_read, damaged, outcomes, turned, wrong
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis

@@ -23,8 +23,7 @@ from lightpaint.batch.manifest.folder_names import FILES, is_reserved
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import _Run, run_batch
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.batch.work import engine as engines
-from lightpaint.batch.work import work
+from lightpaint.batch.work import engine, work
 from lightpaint.batch.work.processes import Processes
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import ItemResult
@@ -285,7 +284,7 @@ def test_an_interrupt_says_how_to_go_on(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(engines, "run_item", interrupted)
+        patch.setattr(engine, "run_item", interrupted)
         with pytest.raises(Interrupted, match="10 looks are left; the same command goes on"):
             run_item(here)
     run_item(here)
@@ -295,9 +294,9 @@ def test_an_interrupt_says_how_to_go_on(
 def test_workers_that_are_all_gone_are_no_look_s_failure(
     here: Path, undisturbed: tuple[Path, dict[str, bytes]]
 ) -> None:
-    class Gone(engines.InProcess):
+    class Gone(engine.InProcess):
         def run(self, items: Any) -> Any:
-            yield engines.run_item(items[0], self._cache, self._listen)
+            yield engine.run_item(items[0], self._cache, self._listen)
             self.is_gone = True
             yield ItemResult(items[1].name, items[1].kind, "the scheduler is gone")
 

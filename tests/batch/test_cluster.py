@@ -27,7 +27,7 @@ from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import BatchOutcome, RunOptions
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.scene import scene_render as render_module
+from lightpaint.scene import scene_render
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 
 distributed = pytest.importorskip("distributed", reason="Dask's distributed")
@@ -154,7 +154,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[st
 def in_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
     patch.setattr(parts_module, "SAMPLES", 2**11)
     patch.setattr(parts_module, "LESSON", 2**12)
-    patch.setattr(render_module, "SAMPLES_PER_RANGE", 1)
+    patch.setattr(scene_render, "SAMPLES_PER_RANGE", 1)
     patch.setenv("LIGHTPAINT_CACHE", str(cache))
 
 

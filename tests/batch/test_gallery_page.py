@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from accessible import axe_source, violations
+from axe import axe_source, violations
 from batches import NAMES, run_all, small_basis, write_batch
 from command import succeed
 from PIL import Image

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from lightpaint.batch.cluster import workers as cluster_workers
+from lightpaint.batch.cluster import workers
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.cluster.parcels import unpack
 from lightpaint.batch.cluster.workers import ClusterWorkers
@@ -67,8 +67,8 @@ def answering(with_bytes: bytes | None) -> Iterator[str]:
 def test_one_that_ends_while_it_is_reached(
     said: bytes | None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(cluster_workers, "ANSWER_S", 1.0)
-    monkeypatch.setattr(cluster_workers, "GONE_S", 0.5)
+    monkeypatch.setattr(workers, "ANSWER_S", 1.0)
+    monkeypatch.setattr(workers, "GONE_S", 0.5)
     began_s = time.monotonic()
     with answering(said) as address, pytest.raises(BatchError) as refusal:
         ClusterWorkers(address, Listens(), "topic")  # type: ignore[arg-type]

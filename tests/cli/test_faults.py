@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command import refused, run
 
-from lightpaint.cli import dispatcher as command
+from lightpaint.cli import dispatcher
 from lightpaint.cli.crash_report import FAULT
 from lightpaint.scene.mitsuba_errors import render_errors
 
@@ -35,7 +35,7 @@ def fails(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     def doctor(**_: object) -> None:
         raise error
 
-    monkeypatch.setattr(command, "_command", lambda name: doctor)
+    monkeypatch.setattr(dispatcher, "_command", lambda name: doctor)
 
 
 def test_a_recursion_without_end_is_no_error_of_mitsuba() -> None:
@@ -95,7 +95,7 @@ def test_a_fault_before_there_is_a_command_is_told_too(
     def broken() -> None:
         raise ImportError("half an installation")
 
-    monkeypatch.setattr(command, "command_parser", broken)
+    monkeypatch.setattr(dispatcher, "command_parser", broken)
     done = run(tmp_path, "doctor", XDG_STATE_HOME=str(tmp_path), HOME=str(tmp_path))
     assert done.returncode == FAULT
     assert "lightpaint: a fault of lightpaint's own: ImportError: half an inst" in done.stderr

@@ -1,13 +1,14 @@
 """Killed at any moment, a solve and a relight leave the earlier result or the new one, whole.
 
-All steps of how results appear are tried in test_staging.py; `python tests/kills.py` kills more.
+All steps of how results appear are tried in test_staging.py; `python tests/killed_commands.py`
+kills more.
 """
 
 import signal
 from collections.abc import Callable
 
 import pytest
-from kills import Stage, after, when_staged, when_staging
+from killed_commands import Stage, after, when_staged, when_staging
 from nightly import at_night
 
 

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 import pytest
 from command import as_from_a_terminal, refused
-from keys import key_of, offered
 from light_groups import interleaved, pictures
 from raw_message import RawMessage
+from server_key import key_of, offered
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol

@@ -15,7 +15,7 @@ import numpy as np
 import OpenEXR
 import pytest
 import tifffile
-from damage import Case, cut_and_read, damaged, outcomes, wrong
+from damaged_files import Case, cut_and_read, damaged, outcomes, wrong
 from picture_files import P3, SRGB_CURVE, icc, layered, luminance_chroma, para, png, psd
 from PIL import Image
 

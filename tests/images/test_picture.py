@@ -19,7 +19,7 @@ from PIL import Image, ImageCms
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import decode_display
 from lightpaint.errors import ImageError
-from lightpaint.images.formats import openraster as layered_module
+from lightpaint.images.formats import openraster
 from lightpaint.images.formats.png import MAX_CHUNK, longest_png
 from lightpaint.images.picture import Picture, read_mask, read_picture
 
@@ -525,7 +525,7 @@ def test_a_merged_picture_of_nothing_is_not_unpacked(
         archive.writestr("mimetype", b"application/x-krita", zipfile.ZIP_STORED)
         archive.writestr("mergedimage.png", head + bytes(2**26))
     unpacked = []
-    monkeypatch.setattr(layered_module, "_copy", lambda *given: unpacked.append(given))
+    monkeypatch.setattr(openraster, "_copy", lambda *given: unpacked.append(given))
     with pytest.raises(ImageError, match=r"that is not a PNG|longer than it can be"):
         _read(tmp_path, buffer.getvalue())
     assert unpacked == []

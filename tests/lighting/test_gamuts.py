@@ -9,7 +9,7 @@ import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.color_hull import DIRECTIONS, chromaticity
 from lightpaint.colour.white_range import white_range
-from lightpaint.lighting import problem as module
+from lightpaint.lighting import problem
 from lightpaint.lighting.constraints.gamuts import PAINTED_MARGIN
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
@@ -80,7 +80,7 @@ def test_without_gamuts_lamps_would_be_green(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else the test above could not fail."""
-    monkeypatch.setattr(module, "gamuts_for", lambda *_: None)
+    monkeypatch.setattr(problem, "gamuts_for", lambda *_: None)
     found = []
     for seed in range(8):
         basis = _room(make_basis, seed)
@@ -132,7 +132,7 @@ def test_nor_under_the_brush(make_basis: Any, seed: int, space: Any) -> None:
 def test_gamuts_are_no_wider_than_what_is_painted(make_basis: Any) -> None:
     basis = _room(make_basis, 3)
     target = _target(*_painting(basis, WARM))
-    gamuts = module.Problem.of(basis, target).full.gamuts
+    gamuts = problem.Problem.of(basis, target).full.gamuts
     assert gamuts is not None
     allowed = np.vstack([white_range(2200, 9000).colors, WARM * basis.present_weights])
     allowed = np.vstack([allowed, basis.present_weights, WARM * np.eye(3).sum(axis=0)])

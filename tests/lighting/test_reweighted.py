@@ -20,7 +20,7 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.fit import Fit
-from lightpaint.lighting.loss import reweighting as reweighted
+from lightpaint.lighting.loss import reweighting
 from lightpaint.lighting.loss.loss import image_of, planes_of
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.lighting.normal_equations import inner_products
@@ -135,7 +135,7 @@ def test_the_objective_never_rises(
     plain = solve(basis, replace(target, at_least=None))
     values = [problem.objective(plain.weights).sum()]
     for rounds in range(1, 12):
-        monkeypatch.setattr(reweighted, "MAX_ROUNDS", rounds)
+        monkeypatch.setattr(reweighting, "MAX_ROUNDS", rounds)
         solution = solve(basis, target, transform=transform)
         values.append(sum(solution.certificate.objective))
         assert solution.certificate.converged or transform is not None or rounds < 6
@@ -151,7 +151,7 @@ def test_running_out_of_rounds_keeps_what_was_won(
     target, transform = _target(image, importance), ViewTransform("srgb", 2.0)
     asked = Constraints.of({"light 0": {"limits": {"max": 0.2}}, "light 1": {"lock": True}})
     problem = solve(basis, target, constraints=asked)
-    monkeypatch.setattr(reweighted, "MAX_ROUNDS", 1)
+    monkeypatch.setattr(reweighting, "MAX_ROUNDS", 1)
     solution = solve(basis, target, constraints=asked, transform=transform)
     assert not solution.certificate.converged
     begin = solution.problem.objective(problem.lighting.weights_for(basis)).sum()
@@ -247,7 +247,7 @@ def test_what_is_clipped_comes_back(make_basis: Any):
     def linear(equations: Any, begin: Any) -> Any:
         return solve_reduced(equations, problem.reduction, begin).weights
 
-    found = reweighted.descend(basis, problem.loss, np.full((2, 3), 50.0), linear)
+    found = reweighting.descend(basis, problem.loss, np.full((2, 3), 50.0), linear)
     np.testing.assert_allclose(found.weights, truth, rtol=1e-5)
 
 

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Iterator
 
 import pytest
-from serving import Serving
+from live_server import Serving
 
 
 @pytest.fixture

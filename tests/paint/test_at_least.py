@@ -14,7 +14,7 @@ from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.images.formats.exr import ExrPart, write_parts
 from lightpaint.paint import protocol
-from lightpaint.paint.notebook import widget_arguments as cells
+from lightpaint.paint.notebook import widget_arguments
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
@@ -70,7 +70,7 @@ def _session(basis: lp.Basis, store: Store | None = None) -> Session:
 
 
 def _set(session: Session, target: lp.Target) -> None:
-    session.load(*cells.load_target(session, target))
+    session.load(*widget_arguments.load_target(session, target))
 
 
 def _paint(session: Session, stroke: int, region: Any, change: Any, *, done: bool = True) -> None:

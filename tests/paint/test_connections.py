@@ -7,11 +7,11 @@ from contextlib import closing, suppress
 from typing import Any
 
 import pytest
-from keys import bearer
-from serving import Page, Serving, until
+from live_server import Page, Serving, until
+from server_key import bearer
 
 from lightpaint.paint.protocol import VERSION
-from lightpaint.paint.server import http_connections as connections
+from lightpaint.paint.server import http_connections
 
 HALF = b"GET / HTTP/1.1\r\nHost: 127.0"
 
@@ -40,14 +40,14 @@ def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: Serving) -> Non
     page = Page(serving)
     for _ in range(300):
         serving.connection().sendall(HALF)
-    until(lambda: len(there(serving)) >= connections.MAX_UNAUTHENTICATED, "they do not come")
+    until(lambda: len(there(serving)) >= http_connections.MAX_UNAUTHENTICATED, "they do not come")
     assert status(serving, "/data/present", serving.key) == 200
     assert status(serving, "/") == 200  # a page that is being opened
     another = Page(serving)
     for one in (page, another):
         one.says("hello", version=VERSION)
         assert one.hears()[0]["kind"] in ("state", "closed")
-    assert len(there(serving)) <= connections.MAX_UNAUTHENTICATED + 4
+    assert len(there(serving)) <= http_connections.MAX_UNAUTHENTICATED + 4
     # The latest have the best chance of being people.
     assert is_cut(serving.connections[1])
 
@@ -55,7 +55,7 @@ def test_hundreds_of_half_sent_requests_shut_nobody_out(serving: Serving) -> Non
 def test_a_request_comes_in_time_or_its_connection_is_closed(
     serving: Serving, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "REQUEST_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(http_connections, "REQUEST_TIMEOUT_S", 0.3)
     silent, half, second, slow, known = (serving.connection() for _ in range(5))
     page = Page(serving)
     half.sendall(HALF)
@@ -88,7 +88,7 @@ def test_an_answer_that_is_taken_slowly_is_not_cut(
     serving: Serving, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As the page's own files through a slow tunnel are, by a browser that has no key yet."""
-    monkeypatch.setattr(connections, "REQUEST_TIMEOUT_S", 0.1)
+    monkeypatch.setattr(http_connections, "REQUEST_TIMEOUT_S", 0.1)
     asking = serving.connection()
     until(lambda: there(serving), "it is not there")
     for connection in there(serving):  # else the system takes it all

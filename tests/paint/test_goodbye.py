@@ -1,6 +1,6 @@
 """How the server ends, over real connections: with pages that hear, are deaf, or have just left."""
 
-from serving import LARGE, Page, Serving, until
+from live_server import LARGE, Page, Serving, until
 
 from lightpaint.paint.protocol import VERSION, PictureData
 

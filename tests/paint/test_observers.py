@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from fake_messages import fake_answer, fake_progress, fake_state
 from fake_session import FakeSession
-from keys import bearer, offered
 from raw_message import RawMessage
+from server_key import bearer, offered
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 

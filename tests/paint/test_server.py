@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from fake_messages import fake_answer, fake_progress
 from fake_session import FakeSession
-from keys import bearer, offered
+from live_server import in_a_loop
 from raw_message import RawMessage
-from serving import in_a_loop
+from server_key import bearer, offered
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 

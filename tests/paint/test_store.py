@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sessions import IDENTITY, SIZE, Plain, big, content, look, patch, step, told
+from stored_sessions import IDENTITY, SIZE, Plain, big, content, look, patch, step, told
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import OutputError, PaintError
@@ -140,7 +140,7 @@ PLACES = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 WRITER = """
 import sys
 from pathlib import Path
-from sessions import IDENTITY, look, step
+from stored_sessions import IDENTITY, look, step
 from lightpaint.paint.store.store import Store
 store = Store.open(Path(sys.argv[1]), IDENTITY)
 print("open", len(store.steps), flush=True)
@@ -274,7 +274,7 @@ def test_what_cannot_be_written_at_the_end_is_said(disk: Path) -> None:
 LIMITED = """
 import resource, sys
 from pathlib import Path
-from sessions import IDENTITY, big, content
+from stored_sessions import IDENTITY, big, content
 from lightpaint.paint.store.store import Store
 store, number = Store.open(Path(sys.argv[1]), IDENTITY), 0
 before = resource.getrlimit(resource.RLIMIT_FSIZE)

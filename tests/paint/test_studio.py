@@ -19,11 +19,9 @@ import lightpaint as lp
 from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
 from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.paint import plane_denoiser as cleaning
-from lightpaint.paint import protocol, studio, subject
-from lightpaint.paint import session_exports as exports
+from lightpaint.paint import plane_denoiser, protocol, session_exports, studio, subject
 from lightpaint.paint.protocol import Message
-from lightpaint.paint.session import picture_table as pictures
+from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store import store
@@ -164,7 +162,7 @@ def test_a_stroke_whose_end_was_never_heard_is_kept_at_the_end(
 def test_one_export_is_written_at_a_time(heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch):
     """Also of what needs no render: they go to the same files."""
     at_work, most = 0, 0
-    real = exports.export
+    real = session_exports.export
 
     def export(*given: Any) -> Any:
         nonlocal at_work, most
@@ -176,7 +174,7 @@ def test_one_export_is_written_at_a_time(heard: IncomingMessage, monkeypatch: py
         finally:
             at_work -= 1
 
-    monkeypatch.setattr(exports, "export", export)
+    monkeypatch.setattr(session_exports, "export", export)
     heard.paint(1, 0.8)
     heard.exact()
     for _ in range(3):
@@ -198,7 +196,7 @@ def test_an_export_can_be_stopped(
             time.sleep(0.001)
         yield tmp_path / "never.html"
 
-    monkeypatch.setattr(exports, "_write_report", report)
+    monkeypatch.setattr(session_exports, "_write_report", report)
     heard.paint(1, 0.8)
     heard.exact()
     heard.studio.handle(protocol.Export(("lighting", "report")), {})
@@ -230,7 +228,7 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
     better = replace(basis, planes=basis.images * np.float32(1.5))
     is_taken, goes_on = threading.Event(), threading.Event()
     cleaned: list[lp.Basis] = []
-    real = cleaning.clean_plane
+    real = plane_denoiser.clean_plane
 
     def clean_plane(its: lp.Basis, k: int) -> Any:
         if its.images is better.images:
@@ -239,7 +237,7 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
         cleaned.append(its)
         return real(its, k)
 
-    monkeypatch.setattr(cleaning, "clean_plane", clean_plane)
+    monkeypatch.setattr(plane_denoiser, "clean_plane", clean_plane)
     monkeypatch.setattr(studio, "obtain_bases", lambda *_: iter([[basis], [better]]))
     heard = IncomingMessage(tmp_path, basis)
     assert is_taken.wait(30)
@@ -507,7 +505,9 @@ def test_a_preview_shows_what_the_change_does_then(
     heard: IncomingMessage, monkeypatch: pytest.MonkeyPatch
 ):
     """To the last pixel, where no clean planes are there; and nothing is done before."""
-    monkeypatch.setattr(cleaning.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases))
+    monkeypatch.setattr(
+        plane_denoiser.PlaneDenoiser, "planes_for", lambda _, bases: [None] * len(bases)
+    )
     heard.paint(1, 1.2)
     heard.paint(2, 0.02, (3, 12, 20, 30))
     heard.exact()
@@ -523,7 +523,7 @@ def test_a_preview_shows_what_the_change_does_then(
         studio.handle(protocol.Set(values), {})
         heard.exact()
         mixed = studio.session.views[0].basis.mix(studio.session.weights)
-        shown = pictures.display_thumbnail(mixed, studio.session.transform)
+        shown = picture_table.display_thumbnail(mixed, studio.session.transform)
         np.testing.assert_array_equal(seen.arrays["after"], shown)
         assert (seen.arrays["after"] != seen.arrays["before"]).any()
         studio.handle(protocol.Undo(), {})
@@ -573,7 +573,7 @@ class Renders:
         self.views: list[str] = []  # of those that have begun
         self.at_work = self.most = 0
         self.is_enough = threading.Event()
-        monkeypatch.setattr(exports, "render_verification", self.render_verification)
+        monkeypatch.setattr(session_exports, "render_verification", self.render_verification)
 
     def render_verification(self, subject: Subject, basis: lp.Basis, _: Any, progress: Any) -> Any:
         self.views.append(subject.source)

@@ -24,10 +24,8 @@ from renderer import LIGHTS, REPOSITORY, write_room
 
 import lightpaint as lp
 from lightpaint.errors import ConstraintError, OutputError, PaintError
-from lightpaint.paint import background_threads as beside
-from lightpaint.paint import protocol, studio
-from lightpaint.paint.notebook import widget_arguments as cells
-from lightpaint.paint.notebook import widget_files as bundle
+from lightpaint.paint import background_threads, protocol, studio
+from lightpaint.paint.notebook import widget_arguments, widget_files
 from lightpaint.paint.store import store
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.steps import Identity
@@ -472,7 +470,7 @@ class Rendered:
         self.goes_on = threading.Event()
         scene: Any = SimpleNamespace(spp=4, size=basis.size)
         subject = Subject("room.xml", folder, scene=scene, settings=Settings(use_cache=False))
-        monkeypatch.setattr(cells, "widget_subjects", lambda *_, **__: (subject,))
+        monkeypatch.setattr(widget_arguments, "widget_subjects", lambda *_, **__: (subject,))
         monkeypatch.setattr(studio, "obtain_bases", self._bases)
 
     def _bases(self, *_: Any) -> Iterator[list[lp.Basis]]:
@@ -709,7 +707,7 @@ def test_a_full_disk_is_said_and_tried_again(
     def said(tone: str) -> Any:
         return [x["text"] for x, _ in page.heard() if x["kind"] == "say" and x["tone"] == tone]
 
-    monkeypatch.setattr(beside, "RETRY_S", 0.01)
+    monkeypatch.setattr(background_threads, "RETRY_S", 0.01)
     painter = open_(store=tmp_path / "evening.db")
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
@@ -817,12 +815,12 @@ def test_without_the_extra_there_is_one_line(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_the_script_is_one_module() -> None:
-    text = bundle.widget_script()
+    text = widget_files.widget_script()
     assert text.endswith(".default\n")
     assert text.count("\nexport ") == 1
     assert "\nimport " not in text
     assert "http:" not in text.replace("http://www.w3.org", "")
-    assert ".lightpaint" in bundle.widget_style()
+    assert ".lightpaint" in widget_files.widget_style()
     # Of what others wrote, who wrote it and under which licence.
     assert "MIT" in text
     assert text == bundled.__wrapped__("paint/page/widget.js")

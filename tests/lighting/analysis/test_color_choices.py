@@ -5,9 +5,8 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from lightpaint.lighting.analysis.appearance import color_choices as module
 from lightpaint.lighting.analysis.appearance.appearance import what_is_seen
-from lightpaint.lighting.analysis.appearance.color_choices import color_choices
+from lightpaint.lighting.analysis.appearance.color_choices import MIN_SAMPLE, color_choices
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.solve import solve
@@ -56,7 +55,7 @@ def test_on_a_display_a_sample_of_the_pixels_says_nearly_the_same(make_basis: An
     """Its own rounds end at a change of `ENOUGH`, far below a ΔE of 0.1."""
     size = (100, 110)
     basis, target = _basis(make_basis, size=size), _target(size)
-    assert size[0] * size[1] > 2 * module.MIN_SAMPLE
+    assert size[0] * size[1] > 2 * MIN_SAMPLE
     found = _choices(solve(basis, target, colors=colors, space="display"))
     for choice in found:
         other = what_is_seen(solve(basis, target, colors=choice.colors, space="display"))

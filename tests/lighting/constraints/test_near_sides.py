@@ -8,7 +8,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.colour.color_hull import ColorHull, reach_of
 from lightpaint.colour.white_range import white_range
-from lightpaint.lighting.constraints import gamut_bounds as near_sides
+from lightpaint.lighting.constraints import gamut_bounds
 from lightpaint.lighting.constraints.gamut_bounds import solve_near_sides
 from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
 from lightpaint.lighting.constraints.reduced_problem import solve_reduced
@@ -44,7 +44,7 @@ def test_sides_lead_to_the_optimum_over_whole_gamuts(
     make_basis: Any, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
     """That of mixes of all corners, which is certified."""
-    monkeypatch.setattr(near_sides, "MAX_TURNS", 60)
+    monkeypatch.setattr(gamut_bounds, "MAX_TURNS", 60)
     equations, reduction, present = _problem(make_basis, seed)
     whole, best = next_whites(equations, reduction, present)
     assert best.converged

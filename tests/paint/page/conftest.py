@@ -10,8 +10,8 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 import pytest
-from accessible import axe_source
-from interface import Painter
+from axe import axe_source
+from painter_page import Painter
 from renderer import REPOSITORY
 
 PAGE = REPOSITORY / "lightpaint" / "paint" / "page"

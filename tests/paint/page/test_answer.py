@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from interface import Painter
+from painter_page import Painter
 
 
 def test_what_was_said_of_the_answer_before_is_marked(painter: Painter) -> None:

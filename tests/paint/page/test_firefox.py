@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from neighbour import Neighbour
+from foreign_server import Neighbour
 from websockets.sync.client import ClientConnection, connect
 
 import lightpaint as lp

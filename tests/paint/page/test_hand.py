@@ -4,7 +4,7 @@ import re
 from typing import Any
 
 import pytest
-from interface import Painter
+from painter_page import Painter
 
 
 def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(opened: Any) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from neighbour import Neighbour
+from foreign_server import Neighbour
 
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import MemoryStore

@@ -3,8 +3,8 @@
 from typing import Any
 
 import pytest
-from accessible import violations
-from interface import Painter
+from axe import violations
+from painter_page import Painter
 
 
 def test_a_button_that_is_on_is_seen_under_the_pointer(painter: Painter) -> None:

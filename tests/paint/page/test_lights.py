@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from interface import Finger, Painter
+from painter_page import Finger, Painter
 
 
 def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from interface import Painter
+from painter_page import Painter
 
 
 def test_a_tab_that_comes_second_says_where_the_painter_is(opened: Any) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from accessible import violations
-from interface import Finger
+from axe import violations
+from painter_page import Finger
 
 import lightpaint as lp
 from lightpaint.colour.color import kelvin_to_rgb

@@ -6,7 +6,7 @@ And no picture is called what it does not show yet.
 from typing import Any
 
 import pytest
-from interface import Painter
+from painter_page import Painter
 
 
 def progress(painter: Painter, what: str, done: int, total: int = 16) -> None:

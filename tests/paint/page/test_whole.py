@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from accessible import violations
-from interface import Painter
+from axe import violations
+from painter_page import Painter
 
 SIZES = ((1280, 720), (1440, 900))
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damage import Case, damaged, outcomes, wrong
+from damaged_files import Case, damaged, outcomes, wrong
 from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError

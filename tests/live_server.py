@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from fake_session import FakeSession
-from keys import bearer, key_of, offered
 from raw_message import RawMessage
+from server_key import bearer, key_of, offered
 from websockets.client import ClientProtocol
 from websockets.datastructures import Headers
 from websockets.typing import Subprotocol

@@ -1,6 +1,6 @@
 """`solve` and `relight` over an earlier result, killed: the folder is the earlier or the new one.
 
-    python tests/kills.py --kills 40 --seed 1
+    python tests/killed_commands.py --kills 40 --seed 1
 
 kills real processes at random moments, half of them around the one at which results appear, and
 prints what was found; some minutes. A handful is among the tests (cli/test_kills.py).
