@@ -25,8 +25,8 @@ from lightpaint.paint.server.address import DEFAULT_PORT
 from lightpaint.paint.server.client import MAX_QUEUED, MAX_QUEUED_BYTES
 from lightpaint.paint.server.http_connections import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
-from lightpaint.scene.lights.similar_emitters import FEW
-from lightpaint.scene.presets import PRESETS
+from lightpaint.scene.lights.similar_emitters import MAX_SEPARATE
+from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.template import PLAIN
 from lightpaint.validation import MAX_NAME
@@ -183,7 +183,7 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
         f"preview: {preview.spp} samples per pixel on some {pixels:,} pixels",
         f"final: {final.spp} on the whole film",
         f"white: {LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K",
-        f"more than {FEW} are alike",
+        f"more than {MAX_SEPARATE} are alike",
     ):
         assert said in texts
 
@@ -289,7 +289,7 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
     assert f"by default {', '.join(most)} and {last}" in text("batch.md")
     assert f"chooses the port ({DEFAULT_PORT}, or any if that is taken)" in text("painter.md")
     assert f"Of such connections {MAX_UNAUTHENTICATED} may be open" in text("painter.md")
-    assert f"More than {FEW} emitters that are alike" in text("lights.md")
+    assert f"More than {MAX_SEPARATE} emitters that are alike" in text("lights.md")
     assert f"{LARGEST // 2**30} GiB at most" in text("solving.md")
     limits = text("limits.md")
     for said in (

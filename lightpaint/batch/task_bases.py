@@ -18,7 +18,7 @@ from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import Listener
-from lightpaint.scene.presets import on_film, samples
+from lightpaint.scene.quality_presets import on_film, samples
 
 
 def has_basis(task: Task, known: WorkerCache) -> bool:

@@ -65,7 +65,7 @@ class LazyScene:
 
     def _load(self) -> Scene:
         # The renderer, and what goes with it, comes with the first scene.
-        from lightpaint.scene.presets import on_film
+        from lightpaint.scene.quality_presets import on_film
 
         self._began_s, self._clock_s = time.time(), _clock_s()
         scene = on_film(self.file.content, self.settings.quality, self.settings.resolution)

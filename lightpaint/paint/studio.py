@@ -298,7 +298,7 @@ class Studio:
         """Obtain the bases, better and better, and denoise each."""
         lower_priority()
         try:
-            with MITSUBA.at_leisure():
+            with MITSUBA.low_priority():
                 for bases in obtain_bases(self.subjects, self.report_progress):
                     self._use_bases(bases)
                     self._denoiser.denoise(self.session.views)

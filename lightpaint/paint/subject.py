@@ -17,7 +17,7 @@ from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.presets import samples
+from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene
 
 #: Samples per pixel after which a basis that is still being rendered is shown, and shown again.

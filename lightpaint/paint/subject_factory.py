@@ -27,7 +27,7 @@ from lightpaint.pipeline.sources import (
     check_nothing_unused,
     content,
 )
-from lightpaint.scene.presets import on_film
+from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 
 #: What can be painted: files, which are read when they are needed, and what has been read.

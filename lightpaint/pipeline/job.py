@@ -43,7 +43,7 @@ from lightpaint.pipeline.sources import (
 )
 from lightpaint.placement.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
-from lightpaint.scene.presets import on_film
+from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import short_repr
 from lightpaint.target.target import Target

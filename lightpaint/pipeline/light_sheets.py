@@ -11,7 +11,7 @@ from lightpaint.images.denoiser import denoiser_text
 from lightpaint.images.formats.png import png_bytes, png_has_text
 from lightpaint.progress import Progress, silent
 from lightpaint.report.light_sheet import light_sheet
-from lightpaint.scene.presets import Preset
+from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 

@@ -27,7 +27,7 @@ from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import verify
 from lightpaint.report.basis_memo import make_ahead
 from lightpaint.report.page.page import prepare_page
-from lightpaint.scene.presets import samples
+from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene
 
 
@@ -200,5 +200,5 @@ def _verification_text(budget: VerificationBudget, basis: Basis, *, is_fixed: bo
         duration = f"{seconds} s" if seconds < 120 else f"{math.ceil(seconds / 60)} min"
         return f"{subject}: at most {duration} {hint}"
     if budget.share <= 1:
-        return f"{subject}: as long as that many samples of the basis at most {hint}"
+        return f"{subject}: no longer than that many samples of the basis took {hint}"
     return f"{subject}: at most {budget.share:.2g} times as long as the basis took {hint}"

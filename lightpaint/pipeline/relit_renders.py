@@ -14,7 +14,7 @@ from lightpaint.pipeline.answer_folder import answer_files, new_answer
 from lightpaint.pipeline.remarks import remarks_of_pictures
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.progress import Progress, listener, silent
-from lightpaint.scene.presets import on_film
+from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_features

@@ -5,7 +5,7 @@ from lightpaint.basis.render.render import memory_needed
 from lightpaint.images.denoiser import MISSING_REMARK, oidn_is_installed
 from lightpaint.images.pixel_blocks import Size, left_over, whole_factor
 from lightpaint.pipeline.settings import Settings
-from lightpaint.scene.presets import PRESETS
+from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names

@@ -9,7 +9,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
 from lightpaint.scene.film import MAX_SPP, check_resolution
-from lightpaint.scene.presets import Quality
+from lightpaint.scene.quality_presets import Quality
 from lightpaint.validation import SWITCH, Check, a, number, one_of, whole
 
 #: Most rounds of rendering and solving again: a larger number is a typing error.

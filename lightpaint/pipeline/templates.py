@@ -18,7 +18,7 @@ from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.remarks import remarks_of_pictures
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Listener, Progress, listener, silent
-from lightpaint.scene.presets import Preset
+from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_features, render_surfaces

@@ -184,7 +184,7 @@ def relit_files(
     changed = dict(settings_of(scene, emission))
     kept = [emitter for emitter in scene.emitters if emitter not in changed]
     # Mitsuba refuses a scene in which no emitter may be sampled.
-    sampled = any(any(rgb) and not emitter.by_chance for emitter, rgb in changed.items())
+    sampled = any(any(rgb) and not emitter.hit_by_chance for emitter, rgb in changed.items())
     sampled = sampled or any(emitter.sampling_weight for emitter in kept)
     for emitter, rgb in changed.items():
         file = scene.files[emitter.file]
@@ -241,7 +241,7 @@ def _sampling_weight(emitter: Emitter, rgb: RGB, sampled: bool) -> float | None:
 
     sampled: whether any emitter is sampled: Mitsuba refuses a scene in which none may be.
     """
-    if any(rgb) and not (emitter.by_chance and sampled):
+    if any(rgb) and not (emitter.hit_by_chance and sampled):
         return 1.0 if emitter.sampling_weight == 0 else None
     return 0.0 if sampled else None
 

@@ -1,1 +1,1 @@
-"""Which lights are there? A Mitsuba scene XML becomes a `Scene` with named lights."""
+"""Scenes: a Mitsuba XML becomes a `Scene` with named lights."""

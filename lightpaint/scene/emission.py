@@ -1,4 +1,4 @@
-"""The emission of each kind of emitter: what "one unit" of it means, how it is read and set."""
+"""The emission of each kind of emitter: its unit, and how it is read and set."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -9,12 +9,12 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 
-#: A light as the scene has it, where its emission is a multiple of that.
+#: The emission of an unchanged light, if the unit is a multiple of the scene's own.
 AS_AUTHORED: RGB = (1.0, 1.0, 1.0)
 
 
 class Scaling(Enum):
-    """What in the scene file carries the emission of a light.
+    """The part of the scene file that carries the emission of a light.
 
     COLOUR: one RGB colour; its unit is white, whatever the scene says.
     IMAGE: a bitmap, scaled per channel; its unit is the image as authored.
@@ -28,7 +28,7 @@ class Scaling(Enum):
 
 @dataclass(frozen=True)
 class EmissionKind:
-    """How a light is scaled, by which parameter of its plugin, and the unit of its emission.
+    """The scaling of a light, the parameter of its plugin, and the unit of its emission.
 
     factors: names of the numbers that scale it, for FACTORS.
     """
@@ -40,14 +40,14 @@ class EmissionKind:
 
     @property
     def is_scalar(self) -> bool:
-        """Whether the light has one weight for all channels instead of three."""
+        """True if the light has one weight for all channels instead of three."""
         return self.scaling is Scaling.FACTORS
 
 
-#: Unit of emission of lights that are multiples of what the scene has.
+#: Unit of lights whose emission is a multiple of the scene's own.
 MULTIPLE = "× as authored"
 
-#: (parameter, unit) of the emitters that are supported; the first is what carries emission.
+#: (parameter of the emission, unit) of the supported emitters.
 PLUGINS = {
     "area": ("radiance", "W/(m² sr)"),
     "constant": ("radiance", "W/(m² sr)"),
@@ -59,12 +59,12 @@ PLUGINS = {
     "sunsky": ("radiance", "W/(m² sr)"),
 }
 
-#: Of these, those that surround the scene.
+#: The emitters that surround the scene.
 ENVIRONMENTS = ("constant", "envmap", "sunsky")
 
 
 def emission_kind(emitter: Any, plugin: str) -> EmissionKind | None:
-    """How a loaded emitter is scaled; None where lightpaint cannot scale it."""
+    """Return how a loaded emitter is scaled; None if lightpaint cannot scale it."""
     import mitsuba as mi
 
     if plugin not in PLUGINS:
@@ -83,10 +83,10 @@ def emission_kind(emitter: Any, plugin: str) -> EmissionKind | None:
 
 
 def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
-    """The emission of a loaded Mitsuba emitter, as linear RGB in the unit of `kind`.
+    """Return the emission of a loaded Mitsuba emitter, as linear RGB in the unit of `kind`.
 
-    Read from the loaded object and not from the XML text, where a spectrum, a preset or
-    nothing at all may stand. Raises SceneError for values that are no RGB colour.
+    It is read from the loaded object, since the XML may contain a spectrum, a preset or nothing at
+    all. Raises SceneError for values that are not an RGB colour.
     """
     import mitsuba as mi
 
@@ -94,7 +94,9 @@ def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
         return AS_AUTHORED
     value = np.array(mi.traverse(emitter)[f"{kind.parameter}.value"], dtype=float).ravel()
     if value.size not in (1, 3):
-        raise SceneError(f"light {name!r} has a {kind.parameter} of {value.size} values, not RGB")
+        raise SceneError(
+            f"light {name!r} has a {kind.parameter} of {value.size} values: expected RGB"
+        )
     r, g, b = np.broadcast_to(value, 3).tolist()
     if not np.isfinite(value).all():
         raise SceneError(f"light {name!r} has the {kind.parameter} {[r, g, b]}: not finite")
@@ -102,12 +104,12 @@ def read_emission(emitter: Any, kind: EmissionKind | None, name: str) -> RGB:
 
 
 def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> str:
-    """What keeps a light from being solved for, in words behind its name; "" if nothing."""
+    """Return why a light cannot be solved for, in words that follow its name; "" if it can."""
     if plugin not in PLUGINS:
         return f"is a {plugin} emitter, which lightpaint cannot scale"
     if kind is None:
         parameter = PLUGINS[plugin][0]
-        return f"has a textured {parameter} that is neither a bitmap nor one colour"
+        return f"has a textured {parameter} that is neither a bitmap nor a single colour"
     if min(emission) < 0:
         return f"has a negative {kind.parameter}, {' '.join(f'{v:g}' for v in emission)}"
     return ""
@@ -115,9 +117,9 @@ def why_not_adjusted(plugin: str, kind: EmissionKind | None, emission: RGB) -> s
 
 @dataclass(frozen=True)
 class EmitterSetting:
-    """What an emitter is set to: emission in the unit of `kind`, and how often it is sampled.
+    """A setting of an emitter: emission in the unit of `kind`, and sampling weight.
 
-    kind: None for an emitter that cannot be scaled, only taken out: its emission is black.
+    kind: None for an emitter that cannot be scaled, only removed: its emission is black.
     """
 
     kind: EmissionKind | None
@@ -126,7 +128,7 @@ class EmitterSetting:
 
 
 def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bool) -> None:
-    """Set the emitter `node` of a parser's state, before a scene is made of it."""
+    """Set the emitter `node` of a parser's state, before a scene is built of it."""
     import mitsuba as mi
 
     kind, rgb = setting.kind, setting.emission
@@ -139,34 +141,36 @@ def set_emission(state: Any, node: int, setting: EmitterSetting, *, on_shape: bo
     if kind.scaling is Scaling.COLOUR:
         props[kind.parameter] = mi.ScalarColor3f(*rgb)
     elif kind.scaling is Scaling.FACTORS:
-        # The numbers stand in the emitter itself or in its texture.
+        # The factors are in the emitter itself or in its texture.
         texture = child_named(state, node, kind.parameter)
-        holder = props if texture is None else state.nodes[texture].props
+        owner = props if texture is None else state.nodes[texture].props
         for factor in kind.factors:
-            holder[factor] = float(holder.get(factor, 1.0)) * rgb[0]
+            owner[factor] = float(owner.get(factor, 1.0)) * rgb[0]
     elif not any(rgb):
-        # Where a bitmap is chosen, a scale stands beside it, but for area lights.
+        # Emitters with a bitmap have a scale beside it, except area lights.
         if props.plugin_name() == "area":
             props[kind.parameter] = mi.ScalarColor3f(0)
         else:
             props["scale"] = 0.0
     elif rgb != AS_AUTHORED:
-        raise SceneError(f"an image of light can be loaded black or as it is, not times {rgb}")
+        raise SceneError(
+            f"an image light can be loaded black or unchanged, not multiplied by {rgb}"
+        )
 
 
 def _darken(props: Any, *, on_shape: bool) -> None:
-    """Put a black emitter in the place of one that has no numbers to turn."""
+    """Replace an emitter that has no numbers to change with a black one."""
     import mitsuba as mi
 
     for key in list(props):
         del props[key]
-    # An emitter stays: without one, the shape would get another surface.
+    # The shape keeps an emitter: without one it would get another surface.
     props.set_plugin_name("area" if on_shape else "point")
     props["radiance" if on_shape else "intensity"] = mi.ScalarColor3f(0)
 
 
 def child_named(state: Any, node: int, name: str) -> int | None:
-    """The node that is referenced by `node` under `name`."""
+    """Return the node that `node` references under `name`; None if there is none."""
     import mitsuba as mi
 
     props = state.nodes[node].props

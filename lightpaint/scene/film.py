@@ -1,9 +1,9 @@
-"""The film of a sensor, whole or reduced so that each pixel is a block of the whole's pixels.
+"""The film of a sensor, whole or reduced so that each pixel is a block of full-size pixels.
 
-Only then is a box-filtered render on the small film the block mean of one on the large, and a
-painting or a verification of full size can be compared with it exactly. Where film, crop window
-and offset are whole multiples of the blocks, Mitsuba's own film is made smaller. Any other stays
-as it is, its crop window cut down to whole blocks, and a pixel is what is rendered in a block.
+Only then is a box-filtered render on the small film the block mean of one on the large film, so
+that a painting or a verification of full size can be compared with it exactly. If film, crop window
+and offset are whole multiples of the blocks, Mitsuba's own film is made smaller. Any other film
+keeps its size, its crop window is cut to whole blocks, and a pixel is the mean of a block.
 """
 
 import math
@@ -17,20 +17,20 @@ from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import blocks_in, left_over, whole_factor
 from lightpaint.screen import some_names
 
-#: Pixels of a film and its samples per pixel beyond which each is a mistake.
+#: Most pixels of a film, and most samples per pixel: larger numbers are mistakes.
 MAX_PIXELS = 2**28
 MAX_SPP = 2**20
 
-#: How many sizes a refusal names.
-NAMED = 8
+#: Sizes that an error lists.
+LISTED_SIZES = 8
 
 
 @dataclass(frozen=True)
 class Film:
-    """The film of a sensor: size of the whole and of the crop window within, in pixels.
+    """The film of a sensor: sizes of the whole and of its crop window, in pixels.
 
-    sensor: its index among the scene's own. block: side of the blocks of its pixels that are the
-    pixels of the picture. All pairs are (x, y).
+    sensor: its index in the scene. block: side of the blocks of film pixels that form a pixel of
+    the picture. All pairs are (x, y).
     """
 
     sensor: int
@@ -41,7 +41,7 @@ class Film:
 
     @classmethod
     def of(cls, camera: Any, sensor: int) -> "Film":
-        """Of a loaded sensor, and its index."""
+        """Return the film of a loaded sensor. sensor: its index."""
         film = camera.film()
         size, crop_size, offset = (
             (int(pair[0]), int(pair[1]))
@@ -56,16 +56,16 @@ class Film:
 
     @property
     def left_out(self) -> tuple[int, int]:
-        """Columns at the right and rows at the bottom that make no whole block."""
+        """Columns at the right and rows at the bottom that form no whole block."""
         return left_over(self.crop_size, self.block)
 
     @property
     def block_pixels(self) -> int:
-        """Pixels of Mitsuba's film in a pixel of the picture: so many samples it takes at least."""
+        """Pixels of Mitsuba's film in a pixel of the picture: also its least number of samples."""
         return self.block**2
 
     def load(self) -> Any:
-        """A box-filtered RGB float32 film of all blocks, as Mitsuba has it."""
+        """Load a box-filtered RGB float32 film of all blocks into Mitsuba."""
         import mitsuba as mi
 
         width, height = (side * self.block for side in self.pixels)
@@ -86,13 +86,13 @@ class Film:
 
 
 def even_reductions(film: Film) -> list[int]:
-    """The factors that leave nothing of film and crop window over, ascending from 1."""
+    """Return the factors that divide film and crop window without remainder, ascending from 1."""
     common = math.gcd(*film.size, *film.crop_size, *film.crop_offset)
     return [factor for factor in range(1, common + 1) if common % factor == 0]
 
 
 def reduction_to(film: Film, pixels: int) -> int:
-    """The smallest factor that brings `film` to so many pixels, or one near that leaves no rest."""
+    """Return the smallest factor that reduces `film` to `pixels`, or a near one without rest."""
     width, height = film.pixels
     enough = math.isqrt(max(width * height - 1, 0) // pixels) + 1
     smallest = min(enough, width, height)
@@ -101,21 +101,21 @@ def reduction_to(film: Film, pixels: int) -> int:
 
 
 def check_resolution(resolution: str) -> re.Match[str]:
-    """Its numbers. Raises SceneError for what is neither a part, `1/4`, nor a size, `320x180`."""
-    given = re.fullmatch(r"1/(\d{1,9})|(\d{1,9})x(\d{1,9})", resolution)
-    if given is None:
-        raise SceneError(f"{resolution!r} is not a resolution: give one like 1/4 or 320x180")
-    return given
+    """Return the match of a part, `1/4`, or a size, `320x180`. Raises SceneError otherwise."""
+    match = re.fullmatch(r"1/(\d{1,9})|(\d{1,9})x(\d{1,9})", resolution)
+    if match is None:
+        raise SceneError(f"{resolution!r} is not a resolution: expected one like 1/4 or 320x180")
+    return match
 
 
 def reduction(film: Film, resolution: str) -> int:
-    """The factor that `resolution`, `1/4` or `320x180`, means for `film`.
+    """Return the factor that `resolution`, `1/4` or `320x180`, means for `film`.
 
-    A size is that of the picture. Raises SceneError if no blocks of pixels are that many.
+    A size is that of the picture. Raises SceneError if no square blocks give that size.
     """
-    given = check_resolution(resolution)
-    part, width, height = (int(number or 0) for number in given.groups())
-    factor = part if given[1] else None
+    match = check_resolution(resolution)
+    part, width, height = (int(number or 0) for number in match.groups())
+    factor = part if match[1] else None
     if width and height:
         factor = whole_factor(film.pixels, (width, height))
     if not factor or factor > min(film.pixels):
@@ -128,9 +128,9 @@ def reduction(film: Film, resolution: str) -> int:
 
 
 def _possible(film: Film, width: int) -> str:
-    """Sizes that `film` can be reduced to: near a `width` if it is not 0, and without a rest."""
+    """Return sizes that `film` can be reduced to: near a `width` > 0, and without remainder."""
     near = film.pixels[0] // width if width else 2
-    factors = [*range(max(near, 2), near + 3), *even_reductions(film)[1 : NAMED + 1]]
+    factors = [*range(max(near, 2), near + 3), *even_reductions(film)[1 : LISTED_SIZES + 1]]
     sizes = {
         k: f"{'x'.join(map(str, blocks_in(film.pixels, k)))} (1/{k})"
         for k in factors
@@ -140,7 +140,7 @@ def _possible(film: Film, width: int) -> str:
 
 
 def reduced(film: Film, factor: int) -> Film:
-    """`film` in blocks of factor x factor pixels, or in the largest that are as many."""
+    """Return `film` in blocks of factor x factor pixels, or in the largest of the same number."""
     small = blocks_in(film.pixels, factor)
     factor = whole_factor(film.pixels, small) or factor
     if film.block > 1 or factor not in even_reductions(film):
@@ -154,7 +154,7 @@ def reduced(film: Film, factor: int) -> Film:
 
 
 def check_film(path: Path, film: Film, spp: int) -> None:
-    """Raise SceneError for a film, or samples per pixel, that nobody can mean."""
+    """Raise SceneError for an absurd film, or absurd samples per pixel."""
     width, height = film.crop_size
     if min(width, height) < 1:
         raise SceneError(
@@ -162,34 +162,36 @@ def check_film(path: Path, film: Film, spp: int) -> None:
         )
     if width * height > MAX_PIXELS:
         raise SceneError(
-            f"{path} has a film of {width}x{height} pixels: no more than {MAX_PIXELS} can be "
-            "rendered; make its width and height smaller"
+            f"{path} has a film of {width}x{height} pixels: expected at most {MAX_PIXELS}; "
+            "make its width and height smaller"
         )
     if spp > MAX_SPP:
         raise SceneError(
-            f"{path} asks for {spp} samples per pixel: no more than {MAX_SPP} can be rendered; "
+            f"{path} asks for {spp} samples per pixel: expected at most {MAX_SPP}; "
             "make its sample_count smaller"
         )
 
 
 def camera_named(loaded: Any, name: str) -> Any:
-    """The sensor of that name in a loaded scene."""
+    """Return the sensor of that name in a loaded scene."""
     return next(sensor for sensor in loaded.sensors() if sensor.id() == name)
 
 
-def sensor_index(wanted: int | str | None, names: Sequence[str], path: Path) -> int:
-    """Of the sensor with that index or name, the first by default. Raises SceneError."""
+def sensor_index(sensor: int | str | None, names: Sequence[str], path: Path) -> int:
+    """Return the index of the sensor with that index or name, by default the first. Raises
+    SceneError.
+    """
     if not names:
         raise SceneError(f"{path} has no sensor: add one to look through")
-    if wanted is None:
+    if sensor is None:
         return 0
-    if isinstance(wanted, str) and wanted in names:
-        return names.index(wanted)
+    if isinstance(sensor, str) and sensor in names:
+        return names.index(sensor)
     try:
-        index = int(wanted)
+        index = int(sensor)
     except ValueError:
         index = -1
     if not 0 <= index < len(names):
         listed = some_names(f"{k} ({name})" for k, name in enumerate(names))
-        raise SceneError(f"{path} has no sensor {wanted!r}: it has {listed}")
+        raise SceneError(f"{path} has no sensor {sensor!r}: it has {listed}")
     return index

@@ -1,4 +1,4 @@
-"""The integrator of a scene: which light paths there are, and another one in its place."""
+"""The integrator of a scene, which decides its light paths, and its replacement."""
 
 import re
 from collections.abc import Mapping
@@ -8,16 +8,16 @@ from typing import Any
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 
-#: What the scene's own integrator says that goes on to hold for another that knows it, too.
-KEPT = {
+#: Parameters of the scene's own integrator that a replacement inherits, by the replacement.
+INHERITED = {
     **dict.fromkeys(("path", "volpath", "volpathmis"), ("max_depth", "rr_depth", "hide_emitters")),
     "direct": ("hide_emitters",),
 }
 
-#: Integrators that only hand on what others render, which stand inside them.
+#: Integrators that only pass on the render of another one inside them.
 WRAPPERS = ("aov", "moment")
 
-#: How long paths are where nobody says, if not without end.
+#: Default path lengths of integrators with a limit.
 DEPTHS = {"prb": 6, "prb_basic": 6, "prb_projective": 6, "prbvolpath": 6}
 
 _CHOICE = re.compile(r"([a-z]\w*)(?::(.*))?", re.DOTALL)
@@ -26,10 +26,10 @@ _OPTION = re.compile(r"([a-z]\w*)=(\S+)")
 
 @dataclass(frozen=True)
 class Integrator:
-    """The part of the scene's integrator that decides which light paths there are.
+    """The parameters of the scene's integrator that decide its light paths.
 
-    plugin: of the integrator that renders light, inside those that wrap it (`aov`, `moment`).
-    samples: what `direct` draws per surface point of emitters and of the BSDF.
+    plugin: that of the integrator that renders light, inside wrappers (`aov`, `moment`). samples:
+    of `direct`, per surface point, of emitters and of the BSDF.
     """
 
     plugin: str
@@ -41,59 +41,59 @@ class Integrator:
 
 @dataclass(frozen=True)
 class IntegratorChoice:
-    """An integrator to render with instead of the scene's own: its plugin, and its options."""
+    """A replacement for the scene's integrator: plugin and options."""
 
     plugin: str
     options: Mapping[str, bool | int | float | str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, text: str) -> "IntegratorChoice":
-        """From `path` or `path:max_depth=8,hide_emitters=true`. Raises SceneError."""
-        found = _CHOICE.fullmatch(text)
-        given = [] if found is None or found[2] is None else found[2].split(",")
-        options = [_OPTION.fullmatch(one.strip()) for one in given]
-        if found is None or not all(options):
+        """Read a choice like `path` or `path:max_depth=8,hide_emitters=true`. Raises SceneError."""
+        match = _CHOICE.fullmatch(text)
+        parts = [] if match is None or match[2] is None else match[2].split(",")
+        options = [_OPTION.fullmatch(one.strip()) for one in parts]
+        if match is None or not all(options):
             raise SceneError(
-                f"{one_line(repr(text))} is no integrator: give one of Mitsuba's by name, with or "
-                "without options, like 'path' or 'path:max_depth=8,rr_depth=5'"
+                f"{one_line(repr(text))} is not an integrator: expected the name of one of "
+                "Mitsuba's, with or without options, like 'path' or 'path:max_depth=8,rr_depth=5'"
             )
-        return cls(found[1], {one[1]: _value(one[2]) for one in options if one is not None})
+        return cls(match[1], {one[1]: _value(one[2]) for one in options if one is not None})
 
     def __str__(self) -> str:
-        options = ",".join(f"{key}={_written(value)}" for key, value in self.options.items())
+        options = ",".join(f"{key}={_xml_value(value)}" for key, value in self.options.items())
         return f"{self.plugin}:{options}" if options else self.plugin
 
     @property
     def xml(self) -> str:
-        """As an element of a scene."""
-        # It brings half of the network's protocols along.
+        """XML element for a scene file."""
+        # Imported late, since it imports many network modules.
         from xml.sax.saxutils import quoteattr
 
         inner = "".join(
-            f"<{_element(value)} name={quoteattr(key)} value={quoteattr(_written(value))}/>"
+            f"<{_element(value)} name={quoteattr(key)} value={quoteattr(_xml_value(value))}/>"
             for key, value in self.options.items()
         )
         return f'<integrator type="{self.plugin}">{inner}</integrator>'
 
     def over(self, own: Mapping[str, Any]) -> "IntegratorChoice":
-        """With what the scene's `own` says of the paths, where nothing else is asked."""
-        kept = {key: own[key] for key in KEPT.get(self.plugin, ()) if key in own}
-        return IntegratorChoice(self.plugin, {**kept, **self.options})
+        """Return the choice with parameters inherited from the scene's `own` integrator."""
+        inherited = {key: own[key] for key in INHERITED.get(self.plugin, ()) if key in own}
+        return IntegratorChoice(self.plugin, {**inherited, **self.options})
 
 
 def read_integrator(state: Any, path: Any) -> Integrator:
-    """That of a parsed scene, whose references are resolved. Raises SceneError."""
+    """Return the integrator of a parsed scene with resolved references. Raises SceneError."""
     nodes = integrator_nodes(state)
     if not nodes:
-        # Mitsuba's own choice for a scene that names none.
+        # Mitsuba's own default.
         return Integrator("path", -1, 5, False)
     outermost = state.nodes[nodes[0]].props.plugin_name()
     while state.nodes[nodes[0]].props.plugin_name() in WRAPPERS:
         nodes = integrator_nodes(state, nodes[0])
         if not nodes:
             raise SceneError(
-                f"{path} has an {outermost!r} integrator with none inside that renders light: put "
-                "a path integrator into it"
+                f"{path} has an {outermost!r} integrator without one inside that renders light: "
+                "put a path integrator into it"
             )
     props = state.nodes[nodes[0]].props
     shading = int(props.get("shading_samples", 1))
@@ -108,9 +108,10 @@ def read_integrator(state: Any, path: Any) -> Integrator:
 
 
 def replace_integrator(state: Any, choice: IntegratorChoice) -> IntegratorChoice:
-    """Put another integrator in the place of all that a parsed scene has.
+    """Replace all integrators of a parsed scene with another one.
 
-    Returns it with what it keeps of them: of the first one that says it, from outside inwards.
+    Returns the choice with inherited parameters: each from the first integrator that sets it, from
+    outside inwards.
     """
     import mitsuba as mi
 
@@ -118,7 +119,7 @@ def replace_integrator(state: Any, choice: IntegratorChoice) -> IntegratorChoice
     nodes = integrator_nodes(state)
     while nodes:
         props = state.nodes[nodes[0]].props
-        own = {**{key: props[key] for key in KEPT["path"] if key in props}, **own}
+        own = {**{key: props[key] for key in INHERITED["path"] if key in props}, **own}
         nodes = nodes[1:] + integrator_nodes(state, nodes[0])
     choice = choice.over(own)
     node = mi.parser.SceneNode()
@@ -127,7 +128,7 @@ def replace_integrator(state: Any, choice: IntegratorChoice) -> IntegratorChoice
     for key, value in choice.options.items():
         node.props[key] = value
     replaced = [key for key, _ in _references(state, 0, mi.ObjectType.Integrator)]
-    state.nodes.append(node)  # which moves the others: no reference to one may be held meanwhile
+    state.nodes.append(node)  # this moves the others: keep no reference to a node
     root = state.nodes[0].props
     for key in replaced:
         del root[key]
@@ -136,7 +137,7 @@ def replace_integrator(state: Any, choice: IntegratorChoice) -> IntegratorChoice
 
 
 def integrator_nodes(state: Any, parent: int = 0) -> list[int]:
-    """The integrators that stand directly in a node, in the scene itself by default."""
+    """Return the integrators directly inside a node, by default the scene itself."""
     import mitsuba as mi
 
     return [node for _, node in _references(state, parent, mi.ObjectType.Integrator)]
@@ -162,11 +163,11 @@ def _value(text: str) -> bool | int | float | str:
     return text
 
 
-def _written(value: bool | int | float | str) -> str:
+def _xml_value(value: bool | int | float | str) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _element(value: bool | int | float | str) -> str:
-    """The XML element that holds such a value."""
+    """Return the name of the XML element for a value."""
     kinds = {bool: "boolean", int: "integer", float: "float", str: "string"}
     return kinds[type(value)]

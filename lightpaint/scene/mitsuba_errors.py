@@ -1,4 +1,4 @@
-"""Errors of Mitsuba, told in one line: while it loads a scene, and while it renders one."""
+"""Errors of Mitsuba in one line: while it loads a scene, and while it renders one."""
 
 import re
 from collections.abc import Iterator
@@ -12,30 +12,30 @@ from lightpaint.scene.integrator import (
 )
 from lightpaint.scene.runtime.plugins import UnknownPluginError
 
-#: Characters that are repeated of what Mitsuba says: the cause may stand at the end.
-MAX_SAID = 2000
+#: Longest text of Mitsuba that is quoted: the cause may be at its end.
+MAX_QUOTED_ERROR = 2000
 
 
 @contextmanager
 def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Iterator[None]:
-    """Turn what Mitsuba throws into one line: its own words, without its source places.
+    """Turn exceptions of Mitsuba into one line: its own words, without positions in its source.
 
-    instead: the integrator that was put in.
+    instead: the integrator that replaces the scene's own.
     """
     try:
         yield
     except MemoryError:
-        raise SceneError(f"{path} takes more memory than there is") from None
+        raise SceneError(f"{path} needs more memory than there is") from None
     except UnicodeDecodeError as error:
         raise SceneError(
             f"{path}, or a file that it refers to, has text that is not UTF-8: {error.reason}"
         ) from None
     except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
-        text = one_line(_without_places(str(error), path), limit=MAX_SAID)
+        text = one_line(_without_places(str(error), path), limit=MAX_QUOTED_ERROR)
         undefined = re.search(r"undefined parameter: \$(\w+)", text)
         hint = f"; set it with parameters={{'{undefined[1]}': ...}}" if undefined else ""
         if "integrator plugin" in text:
-            hint = f"; that is the integrator that was asked for, {instead}"
+            hint = f"; the requested integrator is {instead}"
             hint = hint if instead else '; integrator="path" renders it with another'
         lead = "" if isinstance(error, UnknownPluginError) else "Mitsuba refuses "
         raise SceneError(f"{lead}{path}: {text}{hint}") from error
@@ -43,27 +43,27 @@ def mitsuba_errors(path: Path, instead: IntegratorChoice | None = None) -> Itera
 
 @contextmanager
 def render_errors(path: Path) -> Iterator[None]:
-    """Turn what Mitsuba throws while it renders into one line: the reason, and not what it led to.
+    """Turn exceptions of Mitsuba during a render into one line: the first cause.
 
-    Some scenes load, and cannot be rendered: a sensor that is never hit by particles, say.
+    Some scenes load but cannot be rendered: particles may never hit their sensor, for example.
     """
     try:
         yield
     except RuntimeError as error:
-        # Python's own kinds of it, such as RecursionError, are faults, whoever raises them.
+        # Python's own subclasses, such as RecursionError, are bugs and pass through.
         if type(error) is not RuntimeError or not _is_native(error):
             raise
         first: BaseException = error
         while first.__cause__ is not None:
             first = first.__cause__
-        text = one_line(_without_places(str(first), path), limit=MAX_SAID)
+        text = one_line(_without_places(str(first), path), limit=MAX_QUOTED_ERROR)
         raise SceneError(
             f'Mitsuba cannot render {path}: {text}; integrator="path" renders most scenes'
         ) from error
 
 
 def _is_native(error: BaseException) -> bool:
-    """Return whether Mitsuba threw it, and not a listener that heard of the progress."""
+    """Return True if Mitsuba raised it, and not a listener of the progress."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
@@ -71,13 +71,13 @@ def _is_native(error: BaseException) -> bool:
     return str(module).partition(".")[0] in ("drjit", "lightpaint", "mitsuba")
 
 
-def _without_places(said: str, path: Path) -> str:
-    """Mitsuba's words without places in its source, and without the file where that is `path`."""
-    if "str_from_cstr" in said:  # the binding's word for it
+def _without_places(text: str, path: Path) -> str:
+    """Return Mitsuba's text without positions in its source, and without the file `path`."""
+    if "str_from_cstr" in text:  # raised by the Python binding
         return "it, or a file that it refers to, has a name that is not UTF-8"
-    said = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", said)
+    text = re.sub(r"\[\w+\.cpp:\d+\]\s*", "", text)
     file = re.escape(str(path))
-    said = re.sub(rf"(?:At|(?:Error w|W)hile loading) {file} \((line \d+, col \d+)\)", r"\1", said)
-    said = re.sub(rf'Error while loading XML file "{file}": ', "", said)
-    said = re.sub(rf'Parsing of XML file "{file}" failed', "it is no XML", said)
-    return without_path(said, path)
+    text = re.sub(rf"(?:At|(?:Error w|W)hile loading) {file} \((line \d+, col \d+)\)", r"\1", text)
+    text = re.sub(rf'Error while loading XML file "{file}": ', "", text)
+    text = re.sub(rf'Parsing of XML file "{file}" failed', "it is not XML", text)
+    return without_path(text, path)

@@ -18,8 +18,8 @@ from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
-from lightpaint.scene.checks.legacy import words_for_old_scenes
-from lightpaint.scene.checks.xml import MAX_XML
+from lightpaint.scene.checks.old_scenes import explain_old_scene
+from lightpaint.scene.checks.xml_limits import MAX_XML
 from lightpaint.scene.emission import EmitterSetting
 from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.integrator import Integrator, IntegratorChoice
@@ -309,11 +309,11 @@ def load_scene(
         raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")
     values = {key: str(value) for key, value in (parameters or {}).items()}
     instead = None if integrator is None else IntegratorChoice.of(integrator)
-    with words_for_old_scenes(path), mitsuba_errors(path):
+    with explain_old_scene(path), mitsuba_errors(path):
         parsed = ParsedScene(path, values, backend.variant, instead)
     index = sensor_index(sensor, parsed.sensor_names, path)
     said = lights_file_for(path, lights_file, beside=use_lights_file).with_more(lights, groups)
-    with words_for_old_scenes(path), mitsuba_errors(path):
+    with explain_old_scene(path), mitsuba_errors(path):
         seen = _look_at(parsed, index)
     check_film(path, seen["film"], seen["spp"])
     emitters = seen["emitters"]

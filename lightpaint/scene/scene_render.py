@@ -16,16 +16,16 @@ from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 
-#: Camera samples in one pass: a running kernel cannot be interrupted, and a pass is what
-#: memory is taken for, so passes are short.
+#: Camera samples in one pass: a running kernel cannot be interrupted and needs memory for its whole
+#: pass, so passes are short.
 SAMPLES_PER_PASS = 2**21
 
-#: Camera samples of the passes that are added up by themselves.
+#: Camera samples of a range of passes, which is summed separately.
 SAMPLES_PER_RANGE = 2**22
 
 
 class Stream(IntEnum):
-    """What random numbers are drawn for; equal seeds in two streams share none."""
+    """Purposes of random numbers; equal seeds in two streams share no numbers."""
 
     BASIS = 0
     VERIFICATION = 1
@@ -39,33 +39,33 @@ class Stream(IntEnum):
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:
-    """The 32-bit seed of pass `index`: unrelated for any other seed, stream or index."""
+    """Return the 32-bit seed of pass `index`: unrelated for any other seed, stream or index."""
     return int(np.random.SeedSequence([seed, int(stream), index]).generate_state(1)[0])
 
 
 def view_seed(seed: int, sensor: int) -> int:
-    """The seed of a view: no two share random numbers, so that their noise is independent."""
+    """Return the seed of a view: no two share random numbers, so their noise is independent."""
     return seed if sensor == 0 else pass_seed(seed, Stream.VIEW, sensor)
 
 
 def largest_pass(pixels: int, *, shorter: int = 1) -> int:
-    """Samples per pixel of a whole pass. shorter: the part of SAMPLES_PER_PASS it may have."""
+    """Return the samples per pixel of a full pass. shorter: divisor of SAMPLES_PER_PASS."""
     return max(1, SAMPLES_PER_PASS // shorter // pixels)
 
 
 def plan_passes(
     pixels: int, spp: int, *, done: tuple[int, int] = (0, 0), shorter: int = 1, step: int = 1
 ) -> list[tuple[int, int]]:
-    """(half 0 or 1, samples per pixel) of each pass that is left to do, the halves in turn.
+    """Return (half 0 or 1, samples per pixel) of each remaining pass, the halves alternating.
 
-    spp: what both halves come to together, or a little more to make them equal.
-    done: samples per pixel that each half has already. step: they come in multiples of this.
+    spp: total of both halves, or a little more to make them equal. done: samples per pixel that
+    each half has already. step: samples come in multiples of this.
     """
     if spp < 2:
-        raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
+        raise SceneError(f"{spp} samples per pixel are too few for two halves: expected 2 or more")
     largest = max(1, largest_pass(pixels, shorter=shorter) // step)
     lists = []
-    # An interrupt may have left the second half behind: its turn is next.
+    # After an interrupt the second half may be behind: it comes first then.
     for half in (0, 1) if done[0] <= done[1] else (1, 0):
         left = -(-max(0, -(-spp // 2) - done[half]) // step)
         sizes = [largest] * (left // largest) + [left % largest] * (left % largest > 0)
@@ -83,10 +83,10 @@ def render(
     label: str = "render",
     progress: Progress = silent,
 ) -> Estimate:
-    """Render `scene` with its own integrator and the given emissions (its own by default).
+    """Render `scene` with its own integrator and the given emissions, by default its own.
 
-    spp: samples per pixel in all (the scene's own number by default).
-    Returns linear Rec.709 radiance, (h, w, 3).
+    spp: samples per pixel in all, by default the scene's own number. Returns linear Rec.709
+    radiance, (h, w, 3).
     """
 
     def rendered(loaded: Any) -> Estimate:
@@ -107,19 +107,19 @@ def render_loaded(
     label: str = "render",
     progress: Progress = silent,
 ) -> Estimate:
-    """As `render`, for a scene that is already loaded."""
+    """Render a scene that is already loaded, as `render` does."""
     passes = passes_of(scene, spp)
     sums = np.zeros((2, *scene.size, 3), np.float64)
     progress(label, 0, len(passes))
     with tracing() as let_others_through:
-        for some in ranges_of(scene, passes):
-            its = np.zeros_like(sums)
-            for k in some:
+        for numbers in ranges_of(scene, passes):
+            range_sums = np.zeros_like(sums)
+            for k in numbers:
                 half, pass_spp = passes[k]
-                its[half] += pass_sum(loaded, scene, k, pass_spp, seed=seed, stream=stream)
+                range_sums[half] += pass_sum(loaded, scene, k, pass_spp, seed=seed, stream=stream)
                 progress(label, k + 1, len(passes))
                 let_others_through()
-            sums += its
+            sums += range_sums
     return estimate_of(sums, passes)
 
 
@@ -135,8 +135,8 @@ def render_in_stages(
 ) -> tuple[Estimate, int]:
     """Render `scene` stage by stage until `is_enough`, as `render` does.
 
-    stages: samples per pixel at the end of each stage, increasing. is_enough: decides after each
-    but the last, by the picture so far and its samples per pixel. Returns both.
+    stages: samples per pixel at the end of each stage, increasing. is_enough: called after each
+    stage but the last, with the picture so far and its samples per pixel. Returns both.
     """
     height, width = scene.size
     done, plan = (0, 0), []
@@ -144,8 +144,8 @@ def render_in_stages(
         passes = plan_passes(height * width, spp, done=done, step=scene.film.block_pixels)
         plan.append(passes)
         done = (
-            done[0] + sum(its for half, its in passes if half == 0),
-            done[1] + sum(its for half, its in passes if half == 1),
+            done[0] + sum(size for half, size in passes if half == 0),
+            done[1] + sum(size for half, size in passes if half == 1),
         )
     total = sum(map(len, plan))
 
@@ -170,14 +170,16 @@ def render_in_stages(
 
 
 def passes_of(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
-    """(half, samples per pixel) of all passes of an ordinary render, which go by their numbers."""
+    """Return (half, samples per pixel) of all passes of an ordinary render, in the order of their
+    numbers.
+    """
     height, width = scene.size
     step = scene.film.block_pixels
     return plan_passes(height * width, scene.spp if spp is None else spp, step=step)
 
 
 def ranges_of(scene: Scene, passes: Sequence[tuple[int, int]]) -> list[range]:
-    """Ranges of passes that are added up by themselves, so that others may render some of them."""
+    """Return ranges of passes that are summed separately, so that others may render some."""
     height, width = scene.size
     largest = max((spp for _, spp in passes), default=1)
     size = max(1, SAMPLES_PER_RANGE // (height * width * largest))
@@ -187,21 +189,21 @@ def ranges_of(scene: Scene, passes: Sequence[tuple[int, int]]) -> list[range]:
 def pass_sum(
     loaded: Any, scene: Scene, number: int, spp: int, *, seed: int, stream: Stream
 ) -> Doubles:
-    """The undivided sum of a pass, (h, w, 3) float64."""
+    """Return the undivided sum of a pass, (h, w, 3) float64."""
     image = render_pass(loaded, scene, seed=pass_seed(seed, stream, number), spp=spp)
     return spp * image.astype(np.float64)
 
 
 def estimate_of(sums: Doubles, passes: Sequence[tuple[int, int]]) -> Estimate:
-    """The picture of undivided sums of both halves, (2, h, w, 3), which are overwritten."""
+    """Return the estimate of undivided sums of both halves, (2, h, w, 3), which it overwrites."""
     sums /= sum(size for _, size in passes) / 2
     return Estimate.of_halves(as_float32(sums[0]), as_float32(sums[1]))
 
 
 def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
-    """What the scene's own integrator makes of so many samples per pixel, (h, w, 3).
+    """Return the render of one pass by the scene's own integrator, (h, w, 3).
 
-    spp: a multiple of the pixels of a block of the film.
+    spp: a multiple of the film pixels in a block.
     """
     import mitsuba as mi
 
@@ -209,10 +211,10 @@ def render_pass(loaded: Any, scene: Scene, *, seed: int, spp: int) -> Floats:
     spp //= film.block_pixels
     with kernels():
         image = np.array(mi.render(loaded, sensor=scene.camera(loaded), seed=seed, spp=spp))
-    # Integrators that wrap another add channels of their own behind R, G and B.
+    # Wrapping integrators append channels of their own after R, G and B.
     return block_mean(image[..., :3], film.block)
 
 
 def as_float32(image: Floats) -> Floats:
-    """The image in the precision that images are kept and written in."""
+    """Return the image in the precision in which images are stored."""
     return image.astype(np.float32)

@@ -16,7 +16,7 @@ from lightpaint.arrays import Position
 from lightpaint.errors import SceneError
 from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.required import check_required
-from lightpaint.scene.checks.xml import check_nodes, check_xml
+from lightpaint.scene.checks.xml_limits import check_nodes, check_xml
 from lightpaint.scene.emission import EmitterSetting, child_named, set_emission
 from lightpaint.scene.film import Film
 from lightpaint.scene.integrator import (

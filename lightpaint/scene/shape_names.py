@@ -1,4 +1,4 @@
-"""What the shapes of a scene are called."""
+"""Names of the shapes of a scene."""
 
 from collections.abc import Iterator
 from pathlib import PurePath
@@ -6,12 +6,12 @@ from typing import Any
 
 from lightpaint.scene.scene_tree import ParsedScene
 
-#: A shape that is seen only where others refer to it.
+#: A shape that is visible only where instances refer to it.
 GROUP = "shapegroup"
 
 
 def shape_names(parsed: ParsedScene) -> tuple[str, ...]:
-    """Of the shapes of a loaded scene, in its order: id, else mesh file, material or kind."""
+    """Return names of a loaded scene's shapes, in order: id, else mesh file, material or kind."""
     import mitsuba as mi
 
     shapes = parsed.children_of(0, mi.ObjectType.Shape)
@@ -24,7 +24,7 @@ def shape_names(parsed: ParsedScene) -> tuple[str, ...]:
 
 
 def _names_of(parsed: ParsedScene, node: int) -> Iterator[str]:
-    """What a shape may be called by, the best first."""
+    """Yield possible names of a shape, the best first."""
     import mitsuba as mi
 
     def ids(kind: Any) -> Iterator[str]:
@@ -34,7 +34,7 @@ def _names_of(parsed: ParsedScene, node: int) -> Iterator[str]:
     yield str(props.id())
     if "filename" in props:
         yield PurePath(str(props["filename"])).stem
-    # An instance goes by the group that it shows.
+    # An instance has the name of its group.
     yield from ids(mi.ObjectType.Shape)
     yield from ids(mi.ObjectType.BSDF)
     yield str(props.plugin_name())

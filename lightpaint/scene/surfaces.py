@@ -1,4 +1,4 @@
-"""What the camera sees first: colour, direction and distance of surfaces, and whose they are."""
+"""The surfaces that the camera sees first: albedo, normal, depth and object."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, largest_pass, pass_seed
 
-#: Samples of a pixel, each by itself: an index of a shape must not be averaged.
+#: Samples per pixel, one render each: the index of a shape must not be averaged.
 SAMPLES = 16
 
-#: Samples that decide whose a pixel is.
+#: Samples that decide the object of a pixel.
 VOTES = 4
 
-#: Depth where there is nothing, as compositing programs have it.
+#: Depth of the background, as in compositing programs.
 BACKGROUND = 1e10
 
 
@@ -31,11 +31,11 @@ BACKGROUND = 1e10
 class Surfaces:
     """The first surfaces behind each pixel, averaged over its area.
 
-    albedo: (h, w, 3) float32 in [0, 1], share of light that is reflected diffusely, as the
-    materials say it. normal: (h, w, 3), shading normal in world space, of unit length; 0 where
-    there is nothing. depth: (h, w), distance from the camera along its axis in scene units, of
-    the nearest sample; BACKGROUND where there is none. coverage: by name of shape, (h, w) in
-    [0, 1], how much of the pixel it fills. Shapes out of sight are left out.
+    albedo: (h, w, 3) float32 in [0, 1], share of light that the materials reflect diffusely.
+    normal: (h, w, 3), shading normal in world space, of unit length; 0 for the background.
+    depth: (h, w), distance from the camera along its axis in scene units, of the nearest sample;
+    BACKGROUND where there is none. coverage: by name of shape, (h, w) in [0, 1], the part of the
+    pixel that it fills. Invisible shapes are left out.
     """
 
     albedo: Floats
@@ -45,17 +45,17 @@ class Surfaces:
 
 
 def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent) -> Surfaces:
-    """Look at `scene` without its light."""
+    """Render the first surfaces of `scene`, without its light."""
     return scene.while_loaded(lambda loaded: _surfaces(scene, loaded, seed, progress))
 
 
 def render_features(scene: Scene, *, seed: int = 0) -> Features:
-    """What a denoiser asks of `scene`: albedo and normals, as half floats can hold them."""
+    """Return albedo and normals of `scene` for a denoiser, rounded to half floats."""
     return scene.while_loaded(lambda loaded: _features(scene, loaded, seed))
 
 
 def render_first_hits(scene: Scene, *, seed: int = 0) -> tuple[Features, Objects]:
-    """The same, and whose surfaces these are."""
+    """Return features, and the objects that are seen."""
 
     def both(loaded: Any) -> tuple[Features, Objects]:
         return _features(scene, loaded, seed), _objects(scene, loaded, seed)
@@ -82,7 +82,7 @@ def _features(scene: Scene, loaded: Any, seed: int) -> Features:
 
 
 def _objects(scene: Scene, loaded: Any, seed: int) -> Objects:
-    """What most samples of a pixel see, of few."""
+    """Return the object that most of a few samples of each pixel see."""
     import mitsuba as mi
 
     integrator = mi.load_dict({"type": "aov", "aovs": "i:shape_index"})
@@ -102,10 +102,10 @@ def _objects(scene: Scene, loaded: Any, seed: int) -> Objects:
 
 
 def _most_frequent(votes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """The value that most of (k, h, w) have, (h, w); of equals the first."""
+    """Return the most frequent value of (k, h, w), (h, w); of equally frequent ones the first."""
     counts = [(votes == vote).sum(axis=0) for vote in votes[:VOTES]]
-    most = np.argmax(counts, axis=0)
-    return np.asarray(np.take_along_axis(votes, most[None], axis=0)[0])
+    winners = np.argmax(counts, axis=0)
+    return np.asarray(np.take_along_axis(votes, winners[None], axis=0)[0])
 
 
 def _in_half(image: Floats) -> Floats:
@@ -136,20 +136,21 @@ def _surfaces(scene: Scene, loaded: Any, seed: int, progress: Progress) -> Surfa
 def _averaged(
     samples: npt.NDArray[np.float32], to_camera: Floats, names: Mapping[int, str]
 ) -> Surfaces:
-    """samples: (k, h, w, 10): albedo, normal, position, index of shape, 0 where there is none.
+    """Return surfaces averaged over samples.
 
+    samples: (k, h, w, 10): albedo, normal, position, index of shape, 0 for the background.
     to_camera: (4, 4), world to camera, which looks along +z.
     """
     indices = samples[..., 9].astype(np.int64)
-    there = indices > 0
-    # Of materials whose reflection is no share, as of metals, the number has no bound.
-    albedo = np.clip(samples[..., :3], 0, 1) * there[..., None]
-    normal = (samples[..., 3:6] * there[..., None]).sum(axis=0)
+    is_hit = indices > 0
+    # Materials like metals state an albedo without upper bound.
+    albedo = np.clip(samples[..., :3], 0, 1) * is_hit[..., None]
+    normal = (samples[..., 3:6] * is_hit[..., None]).sum(axis=0)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     along = samples[..., 6:9] @ to_camera[2, :3] + to_camera[2, 3]
-    depth = np.where(there, along, BACKGROUND).min(axis=0)
+    depth = np.where(is_hit, along, BACKGROUND).min(axis=0)
     coverage: dict[str, Floats] = {}
-    for index in np.unique(indices[there]).tolist():
+    for index in np.unique(indices[is_hit]).tolist():
         name = names.get(index) or f"shape {index}"
         share = (indices == index).mean(axis=0, dtype=np.float32)
         coverage[name] = coverage.get(name, np.float32(0)) + share
@@ -162,9 +163,9 @@ def _averaged(
 
 
 def _names_by_index(loaded: Any, named: Sequence[str]) -> dict[int, str]:
-    """Name of each shape by the index that the integrator writes.
+    """Return the name of each shape, by the index that the integrator writes.
 
-    named: of the shapes in their order, also of those whose author gave them none.
+    names: those of the shapes in their order, including unnamed ones.
     """
     import drjit as dr
     import mitsuba as mi

@@ -16,7 +16,7 @@ from lightpaint.pipeline.remarks import remarks_of_scene
 from lightpaint.scene.emission import EmissionKind, Scaling
 from lightpaint.scene.lights.emitters import Emitter, point_emitter
 from lightpaint.scene.lights.light_choice import choose_lights
-from lightpaint.scene.lights.similar_emitters import FEW, SAME, alike_groups
+from lightpaint.scene.lights.similar_emitters import MAX_SEPARATE, SIZE_TOLERANCE, alike_groups
 from lightpaint.scene.scene import Scene, load_scene
 
 GLASS = '<bsdf type="twosided" id="glass"><bsdf type="diffuse" id="inner"/></bsdf>'
@@ -109,7 +109,7 @@ def test_few_stay_apart() -> None:
         made = point_emitter(f"point_{k}", k, (k, 0, 0))
         return replace(made, **{"has_name": False, **changes})
 
-    many = [lamp(k) for k in range(FEW + 1)]
+    many = [lamp(k) for k in range(MAX_SEPARATE + 1)]
     assert alike_groups(many[:-1], ()) == {}
     assert alike_groups(many, ()) == {"point_lights": tuple(many)}
     assert alike_groups(many, {"point_lights"}) == {"point_lights_2": tuple(many)}
@@ -124,16 +124,21 @@ def test_few_stay_apart() -> None:
         {"hangs_on": "glass"},
         {"kind": image},
     ):
-        assert alike_groups([*many[:-1], lamp(FEW, **other)], ()) == {}
+        assert alike_groups([*many[:-1], lamp(MAX_SEPARATE, **other)], ()) == {}
     # Sizes that differ by round-off are one; those of the same thing may differ.
-    sizes = [lamp(k, unit_flux=7 * (1 + 1e-6 * (-1) ** k)) for k in range(FEW + 1)]
+    sizes = [lamp(k, unit_flux=7 * (1 + 1e-6 * (-1) ** k)) for k in range(MAX_SEPARATE + 1)]
     assert [*alike_groups(sizes, ())] == ["point_lights"]
-    assert alike_groups([lamp(k, unit_flux=(2 * SAME) ** k) for k in range(FEW + 1)], ()) == {}
-    hung = [lamp(k, unit_flux=2.0**k, hangs_on="glass") for k in range(FEW + 1)]
+    assert (
+        alike_groups(
+            [lamp(k, unit_flux=(2 * SIZE_TOLERANCE) ** k) for k in range(MAX_SEPARATE + 1)], ()
+        )
+        == {}
+    )
+    hung = [lamp(k, unit_flux=2.0**k, belongs_to="glass") for k in range(MAX_SEPARATE + 1)]
     assert alike_groups(hung, {"glass"}) == {"glass_2": tuple(hung)}
     [light] = choose_lights(hung, scene="s.xml")
     assert (light.name, light.is_found) == ("glass", True)
-    assert len(choose_lights(hung, scene="s.xml", group_alike=False)) == FEW + 1
+    assert len(choose_lights(hung, scene="s.xml", group_alike=False)) == MAX_SEPARATE + 1
 
 
 def test_from_the_listing_to_the_relit_scene(tmp_path: Path) -> None:

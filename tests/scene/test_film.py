@@ -16,7 +16,7 @@ from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_target
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import silent
 from lightpaint.scene.film import Film, even_reductions, reduced, reduction, reduction_to
-from lightpaint.scene.presets import PRESETS, on_film, samples
+from lightpaint.scene.quality_presets import PRESETS, on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import load_scene
 from lightpaint.scene.scene_render import Stream, render

@@ -73,7 +73,7 @@ def test_a_choice_as_text_and_as_xml(text: str, xml: str) -> None:
     "text", ["", "Path", "path:", "path:max_depth", "path:=3", "path:a=", 'a"b', "path,x", "a\n"]
 )
 def test_what_is_no_choice(text: str) -> None:
-    with pytest.raises(SceneError, match="is no integrator: give one of Mitsuba's by name"):
+    with pytest.raises(SceneError, match="is not an integrator: expected the name of one of Mitsuba's"):
         IntegratorChoice.of(text)
 
 
@@ -144,7 +144,7 @@ def test_from_solve_to_verify(tmp_path: Path) -> None:
     succeed(tmp_path, "template", path, *chosen, "-o", "t.exr")
     done = run(tmp_path, "solve", path, *chosen, "t.exr", "-o", "out")
     assert done.returncode == 0, done.stderr
-    assert "rendered by path:max_depth=6, not by the scene's own integrator" in done.stderr
+    assert "rendered with path:max_depth=6 instead of the scene's own integrator" in done.stderr
     assert "A render confirms it." in done.stdout
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "path:max_depth=6, not the scene&#x27;s own" in page
@@ -162,10 +162,10 @@ def test_from_solve_to_verify(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("choice", "says"),
     [
-        ("nope", "no integrator plugin 'nope'; that is the integrator that was asked for, nope"),
-        ("path:max_deep=3", "unreferenced property .* the integrator that was asked for"),
+        ("nope", "no integrator plugin 'nope'; the requested integrator is nope"),
+        ("path:max_deep=3", "unreferenced property .* the requested integrator"),
         ("path:max_depth=many", "wrong type"),
-        ("Path", "'Path' is no integrator"),
+        ("Path", "'Path' is not an integrator"),
     ],
 )
 def test_a_choice_that_mitsuba_refuses(tmp_path: Path, choice: str, says: str) -> None:
@@ -204,9 +204,9 @@ OLD = """<scene version="0.6.0">
         (("hdrfilm", "ldrfilm"), r"\(version 0.6.0\).*line 6.*'ldrfilm'.*; write hdrfilm there"),
         (("lookat ", "lookAt "), r"\(version 0.6.0\).*line 3.*<lookAt>.*; write lookat there"),
         (("path", "bdpt"), r"'bdpt'; integrator=\"path\" renders it with another, or"),
-        (("independent", "odd"), r"sampler plugin 'odd'; write what Mitsuba 3 has instead, or"),
-        ((' version="0.6.0"', ""), r"the parameter maxDepth.*; say version 0.6.0 in <scene>"),
-        (("0.6.0", "3.0.0"), r"the parameter maxDepth, not in snake_case\).*; say version 0.6.0"),
+        (("independent", "odd"), r"sampler plugin 'odd'; write its equivalent of Mitsuba 3, or"),
+        ((' version="0.6.0"', ""), r"the parameter maxDepth.*; write version=.0.6.0. in <scene>"),
+        (("0.6.0", "3.0.0"), r"the parameter maxDepth, not in snake_case\).*; write version=.0.6.0"),
     ],
 )
 def test_a_scene_of_mitsuba_0_6_is_told(

@@ -18,7 +18,7 @@ POINT = EmissionKind(Scaling.COLOUR, "intensity", "W/sr")
 IMAGE = EmissionKind(Scaling.IMAGE, "radiance", MULTIPLE)
 FACTORS = EmissionKind(Scaling.FACTORS, "radiance", MULTIPLE, ("scale",))
 ONE: RGB = (1.0, 1.0, 1.0)
-OBSTACLE = "has a textured radiance that is neither a bitmap nor one colour"
+OBSTACLE = "has a textured radiance that is neither a bitmap nor a single colour"
 
 
 def emitters(*kinds: tuple[str, EmissionKind | None, RGB]) -> tuple[Emitter, ...]:
@@ -113,11 +113,11 @@ def test_a_name_that_looks_like_a_pattern_is_a_name() -> None:
     [
         (["keyy"], {}, "has no light 'keyy'; did you mean 'key'"),
         (["no_*"], {}, "has no light 'no_\\*'; it has key, bulb_1"),
-        ([], {}, "name at least one light"),
-        ([""], {}, "name at least one light"),
+        ([], {}, "expected a list of at least one name"),
+        ([""], {}, "expected a list of at least one name"),
         (["screen"], {}, "'screen' has a textured radiance"),
         (["bulb_1"], {"g": ["bulb_1", "key"]}, "'bulb_1' is part of the group 'g'"),
-        (None, {"g": []}, "group 'g': name at least one light"),
+        (None, {"g": []}, "group 'g': expected a list of at least one name"),
         (None, {"g": ["window_3"]}, "group 'g': .* 'window_3'; did you mean 'window_"),
         (None, {"g": ["screen"]}, "'screen' has a textured radiance"),
         (None, {"g": ["key"], "h": ["k*"]}, "'key' is in two groups, 'g' and 'h'"),

@@ -10,7 +10,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.arrays import Floats
-from lightpaint.scene.runtime.render_lock import MITSUBA, PATIENCE_S, Turns
+from lightpaint.scene.runtime.render_lock import MAX_WAIT_S, MITSUBA, Turns
 from lightpaint.scene.scene import load_scene
 from lightpaint.scene.scene_render import Stream, render
 
@@ -40,7 +40,7 @@ class Work:
                 self.piece("urgent")
 
     def leisure(self) -> None:
-        with self.turns.at_leisure(), self.turns.taken(), self.turns.taken():
+        with self.turns.low_priority(), self.turns.taken(), self.turns.taken():
             for _ in range(6):
                 self.piece("leisure")
                 self.turns.let_others()
@@ -84,7 +84,7 @@ def test_nobody_is_passed_over(work: Work):
 
 def test_who_is_at_leisure_comes_now_and_then(work: Work, monkeypatch: pytest.MonkeyPatch):
     """Somebody may render in a notebook one picture after the other."""
-    monkeypatch.setattr("lightpaint.scene.runtime.render_lock.PATIENCE_S", 5 * PIECE_S)
+    monkeypatch.setattr("lightpaint.scene.runtime.render_lock.MAX_WAIT_S", 5 * PIECE_S)
     is_done = threading.Event()
 
     def again() -> None:
@@ -105,7 +105,7 @@ def test_two_who_wait_agree_whose_turn_it_is(work: Work, monkeypatch: pytest.Mon
     monkeypatch.setattr(
         "lightpaint.scene.runtime.render_lock.monotonic",
         lambda: (
-            0.0 if not turns._idle else PATIENCE_S * (0.99 if hasattr(idle, "is_one") else 1.01)
+            0.0 if not turns._idle else MAX_WAIT_S * (0.99 if hasattr(idle, "is_one") else 1.01)
         ),
     )
 
@@ -180,7 +180,7 @@ def test_threads_render_what_one_alone_does(small_room: lp.Scene, monkeypatch: p
 
     with ThreadPoolExecutor(1) as threads:
         others = threads.submit(frames)
-        with MITSUBA.at_leisure():
+        with MITSUBA.low_priority():
             basis = lp.render_basis(small_room, spp=64, progress=hears)
         pictures = others.result(60)
     first, *more = (k for k, what in enumerate(order) if what == "frame")

@@ -17,7 +17,7 @@ from lightpaint.errors import LOOK_ERRORS, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.pipeline.sources import check_nothing_unused, content
-from lightpaint.scene.presets import on_film
+from lightpaint.scene.quality_presets import on_film
 
 
 def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:

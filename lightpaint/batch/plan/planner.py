@@ -32,7 +32,7 @@ from lightpaint.pipeline.result_folder import is_as_written
 from lightpaint.pipeline.results import view_names
 from lightpaint.pipeline.settings import Settings
 from lightpaint.relit.relight import scene_of
-from lightpaint.scene.presets import on_film, samples
+from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 

@@ -20,7 +20,7 @@ from lightpaint.lighting.problem_sums import Sums
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.sources import Painting
 from lightpaint.progress import Listener
-from lightpaint.scene.presets import samples
+from lightpaint.scene.quality_presets import samples
 
 
 def solve_by_sums(

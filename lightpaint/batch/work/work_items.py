@@ -12,7 +12,7 @@ from lightpaint.basis.render.parts import Part
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.lighting.fit import Emitters
 from lightpaint.pipeline.sources import Painting, SceneFile, vars_of
-from lightpaint.scene.presets import Quality
+from lightpaint.scene.quality_presets import Quality
 
 #: Map from a path to that on another machine.
 PathMap = Callable[[str], str]

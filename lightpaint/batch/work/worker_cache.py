@@ -16,7 +16,7 @@ from lightpaint.batch.work.work_items import (
     SumsOfRows,
 )
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
-from lightpaint.scene.presets import on_film
+from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
 

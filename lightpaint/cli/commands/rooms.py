@@ -40,7 +40,7 @@ from lightpaint.pipeline.templates import (
     template_of_basis,
 )
 from lightpaint.relit.relight import scene_of
-from lightpaint.scene.presets import on_film, samples
+from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.storage.staging import finish

@@ -1,1 +1,1 @@
-"""What is looked at in a scene's files before Mitsuba reads them, which trusts them."""
+"""Checks of a scene's files before Mitsuba reads them, since Mitsuba trusts them."""

@@ -1,7 +1,7 @@
-"""What is looked at in the files that a scene refers to before Mitsuba reads them.
+"""Checks of the files that a scene refers to, before Mitsuba reads them.
 
-Mitsuba's own readers never return from a pipe, end the process over a damaged OpenEXR or mesh,
-and take whatever memory a header asks for.
+Mitsuba's own readers never return from a pipe, crash on a damaged OpenEXR or mesh, and allocate as
+much memory as a header demands.
 """
 
 import struct
@@ -17,20 +17,20 @@ from lightpaint.scene.checks.mesh import MeshError, check_ply, check_serialized
 #: Longest file that is read, in bytes.
 MAX_ASSET = 2**32
 
-#: A picture that says it has more bytes than this, four to a pixel, and more than so many for
-#: each of the file's, is not decoded.
+#: A picture that declares more bytes than this, four per pixel, and more than 1000 times the length
+#: of its file, is not decoded.
 MAX_BYTES = 2**29
 MAX_COMPRESSION = 1000
 
 
 def check_assets(scene: Path, state: Any, resolver: Any) -> bool:
-    """Raise SceneError for a file that no plugin of what Mitsuba has parsed should be given.
+    """Raise SceneError if a file of the parsed scene is unfit for the plugin that reads it.
 
-    Returns whether one of them is an OpenEXR file.
+    Returns True if one of them is an OpenEXR file.
     """
     import mitsuba as mi
 
-    seen: set[tuple[Path, str, int]] = set()
+    checked: set[tuple[Path, str, int]] = set()
     for node in state.nodes:
         props = node.props
         for key in props:
@@ -38,19 +38,19 @@ def check_assets(scene: Path, state: Any, resolver: Any) -> bool:
                 continue
             path = Path(str(resolver.resolve(props[key])))
             asset = (path, props.plugin_name(), int(props.get("shape_index", 0)))
-            if path.exists() and asset not in seen:  # what is not there Mitsuba tells of
+            if path.exists() and asset not in checked:  # Mitsuba reports missing files
                 try:
                     check_asset(*asset)
                 except SceneError as error:
                     raise SceneError(f"{scene}: {error}") from None
-                seen.add(asset)
-    return any(path.suffix.lower() == ".exr" for path, _, _ in seen)
+                checked.add(asset)
+    return any(path.suffix.lower() == ".exr" for path, _, _ in checked)
 
 
 def check_asset(path: Path, plugin: str, index: int = 0) -> None:
-    """Raise SceneError unless the file at `path` is one that `plugin` can be given.
+    """Raise SceneError unless `plugin` can read the file at `path` safely.
 
-    index: of the mesh in it. What Mitsuba itself refuses in good order is left to it.
+    index: that of the mesh in it. Faults that Mitsuba itself reports cleanly are left to it.
     """
     length = file_length(path, "file to read", SceneError, limit=MAX_ASSET)
     try:
@@ -69,14 +69,14 @@ def check_asset(path: Path, plugin: str, index: int = 0) -> None:
     except OSError as error:
         raise SceneError(f"cannot read {path}: {error.strerror or error}") from None
     except MemoryError:
-        raise SceneError(f"{path} takes more memory than there is") from None
+        raise SceneError(f"{path} needs more memory than there is") from None
 
 
 def _check_picture(path: Path, length: int) -> None:
     with path.open("rb") as file:
         head = file.read(32)
         if head.startswith(b"\x76\x2f\x31\x01"):
-            # No cheaper look tells whether Mitsuba's reader survives.
+            # Only a full read shows whether Mitsuba's reader survives.
             read_parts(path)
             return
         width = height = 0
@@ -87,22 +87,22 @@ def _check_picture(path: Path, length: int) -> None:
             width, height = _jpeg_size(file.read(2**24))
     if 4 * width * height > max(MAX_BYTES, MAX_COMPRESSION * length):
         raise ImageError(
-            f"{path} says it has {width}x{height} pixels, in {length} bytes: too many to read"
+            f"{path} declares {width}x{height} pixels, in {length} bytes: too many to read"
         )
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int]:
-    """(width, height) as the head says, 0 where it does not; `data` from behind the first mark."""
-    at = 0
-    while at + 9 <= len(data) and data[at] == 0xFF:
-        mark = data[at + 1]
-        if mark == 0xFF:  # which fills
-            at += 1
+    """Return (width, height) from the header, 0 if missing. data: from after the first marker."""
+    position = 0
+    while position + 9 <= len(data) and data[position] == 0xFF:
+        mark = data[position + 1]
+        if mark == 0xFF:  # a fill byte
+            position += 1
             continue
         if 0xC0 <= mark <= 0xCF and mark not in (0xC4, 0xC8, 0xCC):
-            height, width = struct.unpack(">HH", data[at + 5 : at + 9])
+            height, width = struct.unpack(">HH", data[position + 5 : position + 9])
             return width, height
-        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+        position += 2 + int.from_bytes(data[position + 2 : position + 4], "big")
     return 0, 0
 
 
@@ -113,6 +113,6 @@ def _check_volume(path: Path, length: int) -> None:
         kind, width, height, depth, channels = struct.unpack("<5i", head[4:])
         if kind == 1 and min(width, height, depth, channels) < 1:
             size = f"{width}x{height}x{depth} points of {channels} numbers"
-            raise SceneError(f"{path} is damaged: it says it has {size}")
+            raise SceneError(f"{path} is damaged: it declares {size}")
         if kind == 1 and 4 * channels * width * height * depth > length:
-            raise SceneError(f"{path} is damaged: it is shorter than it says")
+            raise SceneError(f"{path} is damaged: it is shorter than it declares")

@@ -1,7 +1,7 @@
-"""Whether a mesh file is as long as it says, and its faces only name vertices that it has.
+"""Checks that a mesh file is as long as it declares, and that its faces use existing vertices.
 
-Mitsuba takes both on trust, and the process ends where they are not so. What it refuses by itself
-(other faces than triangles, unknown types) is left to it.
+Mitsuba checks neither, and the process crashes. Faults that it reports itself (faces other than
+triangles, unknown types) are left to it.
 """
 
 import struct
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-#: Longest head of a PLY, in bytes.
+#: Longest header of a PLY, in bytes.
 MAX_HEAD = 2**16
 #: Longest mesh that is unpacked, in bytes.
 MAX_UNPACKED = 2**31
@@ -27,76 +27,78 @@ _TYPES = {
 _ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDICES = ("vertex_index", "vertex_indices")
 
-#: Name, number of rows and the type of a row, of which `face` has a field `faces`.
+#: Name, number of rows and type of a row; `face` has a field `faces`.
 Element = tuple[str, int, np.dtype[np.void]]
 
 
 class MeshError(Exception):
-    """What is wrong with a mesh, without the name of its file."""
+    """A fault of a mesh, without the name of its file."""
 
 
 def check_ply(path: Path) -> None:
-    """Raises MeshError."""
+    """Check a PLY file. Raises MeshError."""
     length = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(MAX_HEAD)
-    form, elements, at = _ply_head(head)
+    form, elements, position = _ply_head(head)
     vertices = next((count for name, count, _ in elements if name == "vertex"), 0)
     if form == "ascii":
-        _check_ascii(path, at, elements, vertices)
+        _check_ascii(path, position, elements, vertices)
         return
     for name, count, row in elements:
-        if at + count * row.itemsize > length:
+        if position + count * row.itemsize > length:
             raise MeshError(f"it is shorter than its {count} rows of {name!r}")
         if name == "face" and count and "faces" in (row.names or ()):
-            table = np.memmap(path, row, "r", at, (count,))
-            # Other lists than of three Mitsuba refuses.
+            table = np.memmap(path, row, "r", position, (count,))
+            # Mitsuba itself refuses lists of other lengths.
             if (table["sides"] == 3).all():
                 _check_faces(table["faces"], vertices)
-        at += count * row.itemsize
+        position += count * row.itemsize
 
 
 def _ply_head(head: bytes) -> tuple[str, list[Element], int]:
-    """(format, elements, where the rows begin)."""
-    form, at, found = "", 0, False
+    """Return format, elements, and the position of the first row."""
+    format_name, position, is_complete = "", 0, False
     counts: list[tuple[str, int]] = []
     fields: list[list[tuple[str, str, tuple[int, ...]]]] = []
-    while not found:
-        end = head.find(b"\n", at)
-        if end < 0 or (at == 0 and head[:end].split() != [b"ply"]):
-            raise MeshError("it does not have the head of a PLY")
-        words = head[at:end].decode("latin-1").split()
-        at = end + 1
+    while not is_complete:
+        end = head.find(b"\n", position)
+        if end < 0 or (position == 0 and head[:end].split() != [b"ply"]):
+            raise MeshError("it does not have the header of a PLY")
+        words = head[position:end].decode("latin-1").split()
+        position = end + 1
         match words:
             case ["format", name, *_]:
-                form = name
+                format_name = name
             case ["element", name, count] if count.isascii() and count.isdigit():
                 counts.append((name, int(count[:20])))
                 fields.append([])
             case ["property", "list", sides, kind, name] if fields and {sides, kind} <= {*_TYPES}:
                 # As Mitsuba reads them, all lists have three entries.
-                names = ("sides", "faces") if name in _INDICES else (f"#{at}", f"list{at}")
+                names = (
+                    ("sides", "faces") if name in _INDICES else (f"#{position}", f"list{position}")
+                )
                 fields[-1] += [(names[0], _TYPES[sides], ()), (names[1], _TYPES[kind], (3,))]
             case ["property", kind, _] if fields and kind in _TYPES:
-                fields[-1].append((f"field{at}", _TYPES[kind], ()))
+                fields[-1].append((f"field{position}", _TYPES[kind], ()))
             case ["end_header"]:
-                found = True
+                is_complete = True
             case ["ply"] | ["comment", *_] | ["obj_info", *_] | []:
                 pass
             case _:
-                raise MeshError(f"its head has the line {' '.join(words)[:80]!r}")
-    if form not in _ORDERS:
-        raise MeshError(f"it is of no known format, {form[:40]!r}")
-    order = _ORDERS[form]
+                raise MeshError(f"its header has the unknown line {' '.join(words)[:80]!r}")
+    if format_name not in _ORDERS:
+        raise MeshError(f"its format is unknown: {format_name[:40]!r}")
+    order = _ORDERS[format_name]
     try:
         rows = [np.dtype([(n, order + kind, size) for n, kind, size in f]) for f in fields]
     except ValueError:
-        raise MeshError("a face has its vertices twice") from None
-    return form, [(*c, row) for c, row in zip(counts, rows, strict=True)], at
+        raise MeshError("a face lists its vertices twice") from None
+    return format_name, [(*c, row) for c, row in zip(counts, rows, strict=True)], position
 
 
-def _check_ascii(path: Path, at: int, elements: list[Element], vertices: int) -> None:
-    words = path.read_bytes()[at:].split()
+def _check_ascii(path: Path, position: int, elements: list[Element], vertices: int) -> None:
+    words = path.read_bytes()[position:].split()
     first = 0
     for name, count, row in elements:
         sizes = [int(np.prod(row[field].shape)) for field in row.names or ()]
@@ -104,25 +106,25 @@ def _check_ascii(path: Path, at: int, elements: list[Element], vertices: int) ->
         if first + count * width > len(words):
             raise MeshError(f"it is shorter than its {count} rows of {name!r}")
         if name == "face" and count and "faces" in (row.names or ()):
-            behind = sum(sizes[: (row.names or ()).index("faces")])
+            offset = sum(sizes[: (row.names or ()).index("faces")])
             try:
                 table = np.array(words[first : first + count * width], np.float64)
             except ValueError:
-                raise MeshError("a face has something else than numbers") from None
-            _check_faces(table.reshape(count, width)[:, behind : behind + 3], vertices)
+                raise MeshError("a face has values that are not numbers") from None
+            _check_faces(table.reshape(count, width)[:, offset : offset + 3], vertices)
         first += count * width
 
 
 def _check_faces(faces: npt.NDArray[np.generic], vertices: int) -> None:
-    # A comparison that NaN fails.
+    # The comparison is written so that NaN fails it.
     if faces.size and not (faces.min() >= 0 and faces.max() < vertices):
         raise MeshError(
-            f"its faces name vertices from {faces.min()} to {faces.max()}, of {vertices}"
+            f"its faces use vertices from {faces.min()} to {faces.max()}, of {vertices}"
         )
 
 
 def check_serialized(path: Path, index: int) -> None:
-    """Mesh number `index` of a file in Mitsuba's own format. Raises MeshError."""
+    """Check mesh number `index` of a file in Mitsuba's own format. Raises MeshError."""
     data = path.read_bytes()
     try:
         version = struct.unpack_from("<2H", data)[1]
@@ -135,12 +137,12 @@ def check_serialized(path: Path, index: int) -> None:
         stream = zlib.decompressobj()
         mesh = stream.decompress(data[start + 4 :], MAX_UNPACKED)
         flags = struct.unpack_from("<I", mesh)[0]
-        at = 4 if not wide else mesh.index(b"\0", 4) + 1
-        vertices, faces = struct.unpack_from("<2Q", mesh, at)
+        position = 4 if not wide else mesh.index(b"\0", 4) + 1
+        vertices, faces = struct.unpack_from("<2Q", mesh, position)
     except (struct.error, ValueError, zlib.error) as error:
         raise MeshError(str(error)) from None
     numbers = 3 + 3 * bool(flags & 1) + 2 * bool(flags & 2) + 3 * bool(flags & 8)
-    at += 16 + vertices * numbers * (8 if flags & 0x2000 else 4)
-    if vertices >= 2**32 or at + 12 * faces > len(mesh):
+    position += 16 + vertices * numbers * (8 if flags & 0x2000 else 4)
+    if vertices >= 2**32 or position + 12 * faces > len(mesh):
         raise MeshError(f"it is shorter than its {vertices} vertices and {faces} faces")
-    _check_faces(np.frombuffer(mesh, "<u4", 3 * faces, at), vertices)
+    _check_faces(np.frombuffer(mesh, "<u4", 3 * faces, position), vertices)

@@ -1,6 +1,6 @@
-"""What plugins need in a scene, and Mitsuba's own use without looking: without it the process dies.
+"""Checks for parameters that plugins of Mitsuba use without checking: without them it crashes.
 
-Found by loading and rendering each of its plugins with nothing in it; the others refuse that.
+They were found by loading and rendering each plugin without parameters; the others report that.
 """
 
 from pathlib import Path
@@ -10,7 +10,7 @@ from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import place_of_node
 
-#: By plugin: parameters of which it needs one, and how that is written.
+#: By plugin: parameters of which it needs one, and the XML for it.
 REQUIRED = {
     "bitmap": (("filename", "bitmap", "data"), '<string name="filename" value="..."/>'),
     "blendbsdf": (("weight",), '<float name="weight" value="..."/>'),
@@ -19,7 +19,7 @@ REQUIRED = {
 
 
 def check_required(path: Path, state: Any) -> None:
-    """Raise SceneError for a plugin of a parsed scene that lacks what Mitsuba takes for granted."""
+    """Raise SceneError for a plugin of a parsed scene that lacks a required parameter."""
     for node in state.nodes:
         plugin = str(node.props.plugin_name())
         names, form = REQUIRED.get(plugin, ((), ""))

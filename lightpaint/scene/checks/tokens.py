@@ -1,8 +1,8 @@
-"""The tokens of an XML file: tags, comments, declarations and what stands in them.
+"""The tokens of an XML file: tags, comments, declarations and their content.
 
-What Mitsuba's parser (pugixml) puts up with is read here too: a bare `&` or `<` in an attribute,
-`--` in a comment, white space before the XML declaration. Positions are byte offsets into the
-UTF-8 form of the text, byte-order mark included, which is how that parser counts.
+It reads everything that Mitsuba's parser (pugixml) tolerates: a bare `&` or `<` in an attribute,
+`--` in a comment, white space before the XML declaration. Positions are byte offsets into the UTF-8
+form of the text, byte-order mark included, as that parser counts them.
 """
 
 import codecs
@@ -20,7 +20,7 @@ _MARKS = {
     codecs.BOM_UTF32_BE: "utf-32-be",
     codecs.BOM_UTF16_LE: "utf-16-le",
     codecs.BOM_UTF16_BE: "utf-16-be",
-    # Without a mark, by the first character, which is `<`.
+    # Without a byte-order mark, by the first character, which is `<`.
     b"<\0\0\0": "utf-32-le",
     b"\0\0\0<": "utf-32-be",
     b"<\0": "utf-16-le",
@@ -28,11 +28,11 @@ _MARKS = {
 }
 _LATIN = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"'](?:iso-8859-1|latin1)[\"']", re.IGNORECASE)
 
-# Possessive (`*+`): what is broken is given up at once instead of being tried forever.
+# Possessive (`*+`): broken text fails at once instead of backtracking forever.
 _NAME = rb"[A-Za-z_:\x80-\xff][\w:.\-\x80-\xff]*+"
 _QUOTED = rb"""(?:"[^"]*+"|'[^']*+')"""
-_SKIPPED = rb"<!--(?s:.*?)-->|<\?(?s:.*?)\?>"  # XML declarations look like instructions
-#: Of a document type, declarations inside it one level deep.
+_SKIPPED = rb"<!--(?s:.*?)-->|<\?(?s:.*?)\?>"  # XML declarations look like processing instructions
+#: Declarations inside a document type, one level deep.
 _DECLARATION = rb"<!(?:%b|[^\"'>])*+>" % _QUOTED
 _MARKUP = re.compile(
     rb"%b|<!\[CDATA\[(?s:.*?)\]\]>"
@@ -47,7 +47,7 @@ _ENTITIES = {"lt": "<", "gt": ">", "amp": "&", "quot": '"', "apos": "'"}
 
 
 def encoding_of(raw: bytes) -> str:
-    """As Mitsuba's parser sees it: Latin-1 is the only declaration that it heeds."""
+    """Return the encoding as Mitsuba's parser detects it; it heeds no declaration but Latin-1."""
     for mark, name in _MARKS.items():
         if raw.startswith(mark):
             return name
@@ -55,37 +55,37 @@ def encoding_of(raw: bytes) -> str:
 
 
 def markup(text: bytes) -> Iterator[re.Match[bytes]]:
-    """Everything in angle brackets, in order; a `<` that opens nothing raises ValueError.
+    """Yield everything in angle brackets, in order; raise ValueError for a `<` that opens nothing.
 
-    text: in UTF-8, or nearly. Groups: `tag` with `attributes` and `empty`, its `/`, where an
-    element begins; `end`, the name, where one ends.
+    text: in UTF-8, or nearly. Groups of a start tag are `tag`, `attributes` and `empty`, its `/`;
+    that of an end tag is `end`, its name.
     """
-    at = text.find(b"<")
-    while at >= 0:
-        found = _MARKUP.match(text, at)
-        if found is None:
-            start = one_line(decoded(text[at : at + 40]).split("\n")[0])
-            raise ValueError(f"line {line_of(text, at)}: cannot read {start!r} as XML")
-        yield found
-        at = text.find(b"<", found.end())
+    position = text.find(b"<")
+    while position >= 0:
+        match = _MARKUP.match(text, position)
+        if match is None:
+            start = one_line(decoded(text[position : position + 40]).split("\n")[0])
+            raise ValueError(f"line {line_of(text, position)}: cannot read {start!r} as XML")
+        yield match
+        position = text.find(b"<", match.end())
 
 
 def attributes(tag: re.Match[bytes]) -> dict[str, str]:
-    """By name, white space made spaces and references resolved; the first of a name counts."""
-    given: dict[str, str] = {}
+    """Return attributes by name, white space and references resolved; of repeats the first."""
+    values: dict[str, str] = {}
     for key, quoted in _ATTRIBUTE.findall(tag["attributes"]):
         value = re.sub(r"\r\n|[\r\n\t]", " ", decoded(quoted[1:-1]))
-        given.setdefault(decoded(key), _REFERENCE.sub(_character, value))
-    return given
+        values.setdefault(decoded(key), _REFERENCE.sub(_character, value))
+    return values
 
 
 def line_of(text: bytes, offset: int) -> int:
-    """Number of the line, from 1."""
+    """Return the number of the line at a byte offset, from 1."""
     return text.count(b"\n", 0, offset) + 1
 
 
 def decoded(text: bytes) -> str:
-    """As Unicode; bytes that mean nothing are replaced."""
+    """Return text as Unicode; invalid bytes are replaced."""
     return text.decode("utf-8", "replace")
 
 
@@ -98,7 +98,7 @@ def _character(reference: re.Match[str]) -> str:
 
 
 def place_of_node(state: Any, node: Any) -> str:
-    """Return where a node of a parsed scene stands, in words; "" for one that stands in no file."""
+    """Return the place of a node of a parsed scene, in words; "" if it is in no file."""
     try:
         file = Path(str(state.files[node.file_index]))
         line = line_of(file.read_bytes(), int(node.offset))

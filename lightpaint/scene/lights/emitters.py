@@ -25,24 +25,23 @@ from lightpaint.scene.emission import (
 from lightpaint.scene.scene_tree import ParsedScene
 from lightpaint.validation import MAX_NAME
 
-#: Emitters that no RGB variant of Mitsuba renders as they are meant, and what to do about them.
+#: Emitters that no RGB variant of Mitsuba renders correctly, and advice about them.
 NOT_RENDERED = {"timed_sunsky": "use sunsky with the hour you want"}
 
-#: Ids that Mitsuba's own writer and parser make up.
-_MADE_UP = re.compile(r"(__)?elm__\d+|_(unnamed|arg)_\d+")
+#: Ids that Mitsuba's own writer and parser generate.
+_GENERATED_ID = re.compile(r"(__)?elm__\d+|_(unnamed|arg)_\d+")
 
 
 @dataclass(frozen=True)
 class Emitter:
     """One emitter of a scene.
 
-    kind: how it is scaled; None where lightpaint cannot.
-    emission: present linear RGB emission in the unit of `kind`; 1 for what is a multiple.
-    file, offset: where its element's `<` stands: index into Scene.files, byte offset.
-    obstacle: why it cannot be solved for, in words behind its name; "" if it can.
-    unit_flux: watts per channel at an emission of 1; None where there is no such number.
-    has_name: whether somebody chose its name, and it is not made up here.
-    hangs_on: of one that has none, the name of its material, file or parent; "" if there is none.
+    kind: its scaling; None if lightpaint cannot scale it. emission: present linear RGB emission in
+    the unit of `kind`; 1 for a multiple. file, offset: position of its element's `<`: index into
+    Scene.files, byte offset. obstacle: why it cannot be solved for, in words that follow its name;
+    "" if it can. unit_flux: watts per channel at an emission of 1; None if there is no such number.
+    has_name: True if its author named it; False if the name is generated. belongs_to: for one
+    without a name, that of its material, file or parent; "" if there is none.
     """
 
     name: str
@@ -57,24 +56,24 @@ class Emitter:
     obstacle: str = ""
     unit_flux: float | None = None
     has_name: bool = True
-    hangs_on: str = ""
+    belongs_to: str = ""
 
     def __repr__(self) -> str:
         return f"Emitter({self.name!r}, {self.plugin} {self.form})"
 
     @property
-    def by_chance(self) -> bool:
-        """Whether only rays that happen to hit it may find it: it is never sampled.
+    def hit_by_chance(self) -> bool:
+        """True if only rays that happen to hit it find it: it is never sampled.
 
-        Meshes painted by an attribute: Mitsuba's sampling of these and the probability that it
-        states for it do not agree, so that a render would depend on the sampling weights, and
-        with them on which other lights are on.
+        These are meshes with an emission attribute: the probability that Mitsuba states for
+        sampling them is wrong, so that a render would depend on the sampling weights, and with them
+        on which other lights are on.
         """
         return self.plugin == "area" and self.kind is not None and self.kind.is_scalar
 
 
 def point_emitter(name: str, node: int, position: tuple[float, float, float]) -> Emitter:
-    """A point light of intensity 1 that stands in no file."""
+    """Return a point light of intensity 1 that is in no file."""
     parameter, unit = PLUGINS["point"]
     x, y, z = position
     return Emitter(
@@ -92,20 +91,22 @@ def point_emitter(name: str, node: int, position: tuple[float, float, float]) ->
 
 
 def find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
-    """The emitters that take part in the scene, in document order."""
+    """Return the emitters that take part in the scene, in document order."""
     node_of = {name: node for node, name in parsed.names.items()}
-    found = []
+    emitters = []
     for emitter in loaded.emitters():
         name = emitter.id()
         if name not in node_of:
-            raise SceneError(f"emitter {name!r} does not stand in {parsed.path} as itself")
+            raise SceneError(
+                f"emitter {name!r} is not an element of its own in {parsed.path}: give it one"
+            )
         node = parsed.state.nodes[node_of[name]]
         plugin = node.props.plugin_name()
         kind = emission_kind(emitter, plugin)
         if kind is None:
             check_rendered(emitter, plugin, name, parsed.integrator().plugin)
         emission = read_emission(emitter, kind, name)
-        found.append(
+        emitters.append(
             Emitter(
                 name=name,
                 plugin=plugin,
@@ -119,14 +120,14 @@ def find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
                 obstacle=why_not_adjusted(plugin, kind, emission),
                 unit_flux=flux_of_unit(emitter, plugin, kind),
                 has_name=has_name(parsed, node_of[name]),
-                hangs_on=hangs_on(parsed, node_of[name]),
+                belongs_to=belongs_to(parsed, node_of[name]),
             )
         )
-    return tuple(sorted(found, key=lambda emitter: emitter.node))
+    return tuple(sorted(emitters, key=lambda emitter: emitter.node))
 
 
 def check_emitters(path: Path, emitters: Sequence[Emitter]) -> None:
-    """Raise SceneError for a scene without light, and for a name that nobody can mean."""
+    """Raise SceneError for a scene without lights, and for absurdly long names."""
     if not emitters:
         raise SceneError(f"{path} has no lights: add at least one emitter")
     if max(len(emitter.name) for emitter in emitters) > MAX_NAME:
@@ -134,7 +135,7 @@ def check_emitters(path: Path, emitters: Sequence[Emitter]) -> None:
 
 
 def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> None:
-    """Raise SceneError if `integrator` cannot render the emitter, though Mitsuba has loaded it."""
+    """Raise SceneError if `integrator` cannot render an emitter that Mitsuba has loaded."""
     import drjit as dr
     import mitsuba as mi
 
@@ -143,8 +144,7 @@ def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> Non
             f"light {name!r} is a {plugin} emitter, which Mitsuba cannot render here: "
             f"{NOT_RENDERED[plugin]}"
         )
-    # What is not implemented fails when it is first asked for; after a render that failed, the
-    # process would be good for nothing.
+    # Unimplemented methods fail on first use; after a failed render the process would be useless.
     middle = mi.Point2f(0.5)
     try:
         emitter.sample_direction(dr.zeros(mi.SurfaceInteraction3f), middle)
@@ -159,10 +159,10 @@ def check_rendered(emitter: Any, plugin: str, name: str, integrator: str) -> Non
 
 
 def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float | None:
-    """Watts that a loaded emitter of one colour radiates at an emission of 1, by its form.
+    """Return the watts that a loaded emitter of one colour radiates at an emission of 1.
 
-    In W where a unit of the scene is a metre. None for what has no flux of its own (a sky, a
-    sun) and for what is not of one colour in all directions.
+    It is in W if a unit of the scene is a metre; None for emitters without a flux of their own (a
+    sky, a sun) and for those whose colour depends on the direction.
     """
     import mitsuba as mi
 
@@ -178,8 +178,8 @@ def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float 
     axes = np.array(parameters["to_world"].matrix, dtype=float).reshape(4, 4)[:3, :3]
     squares = axes.T @ axes
     texture = np.array(parameters["texture.value"]) if "texture.value" in parameters else None
-    # A cone that is sheared or stretched is no cone, and a picture has no closed form. Both
-    # thresholds are Mitsuba's float32.
+    # A sheared or stretched cone, or one with a picture, has no closed form. The tolerances are
+    # those of Mitsuba's float32.
     is_cone = np.allclose(squares, squares[0, 0] * np.eye(3), atol=1e-4 * squares[0, 0])
     if texture is None or not is_cone or np.ptp(texture) > 1e-6:
         return None
@@ -189,7 +189,7 @@ def flux_of_unit(emitter: Any, plugin: str, kind: EmissionKind | None) -> float 
 
 
 def describe_form(emitter: Any, plugin: str) -> str:
-    """Where a loaded emitter is and how large, in scene units, for people to read."""
+    """Return place and size of a loaded emitter, in scene units, in words."""
     import mitsuba as mi
 
     def at(point: Any) -> str:
@@ -215,15 +215,15 @@ def describe_form(emitter: Any, plugin: str) -> str:
 
 
 def has_name(parsed: ParsedScene, emitter: int) -> bool:
-    """Whether that node, or the shape that it belongs to, has an id that somebody chose."""
+    """Return True if the node, or the shape that it belongs to, has an id chosen by its author."""
     nodes = (emitter, parsed.shape_of.get(emitter))
     return any(node is not None and _id(parsed, node) for node in nodes)
 
 
-def hangs_on(parsed: ParsedScene, emitter: int) -> str:
-    """Name of what that node without one belongs to; "" if nothing there has a name.
+def belongs_to(parsed: ParsedScene, emitter: int) -> str:
+    """Return the name of what an unnamed emitter belongs to; "" if nothing there has a name.
 
-    That is what its shape is part of, the shape's material, or its file.
+    That is the parent of its shape, the shape's material, or its file.
     """
     import mitsuba as mi
 
@@ -232,7 +232,7 @@ def hangs_on(parsed: ParsedScene, emitter: int) -> str:
         return ""
     parents = [parsed.parent_of[shape]] if shape in parsed.parent_of else []
     materials = parsed.children_of(shape, mi.ObjectType.BSDF)
-    # What is under a twosided or a mask, too.
+    # Include materials inside a twosided or a mask.
     materials += [k for m in materials for k in parsed.children_of(m, mi.ObjectType.BSDF)]
     named = (_id(parsed, node) for node in (*parents, *materials))
     props = parsed.state.nodes[shape].props
@@ -241,5 +241,5 @@ def hangs_on(parsed: ParsedScene, emitter: int) -> str:
 
 
 def _id(parsed: ParsedScene, node: int) -> str:
-    said = str(parsed.state.nodes[node].props.id())
-    return "" if _MADE_UP.fullmatch(said) else said
+    own_id = str(parsed.state.nodes[node].props.id())
+    return "" if _GENERATED_ID.fullmatch(own_id) else own_id

@@ -10,26 +10,26 @@ from lightpaint.scene.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Sca
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.screen import some_names
 
-#: What emission scales in a light that is a multiple of what the scene has.
+#: Parameter of a light whose emission is a multiple of the scene's own.
 WHOLE_EMISSION = "emission"
 
 
 def free_names(stem: str, count: int, taken: Collection[str]) -> list[str]:
-    """`stem_1`, `stem_2` … without those that are taken."""
+    """Return `stem_1`, `stem_2` … without names that are taken."""
     numbered = (f"{stem}_{k}" for k in itertools.count(1))
     return list(itertools.islice((name for name in numbered if name not in taken), count))
 
 
 @dataclass(frozen=True)
 class Light:
-    """What a person adjusts: one emitter, or several tied together under one weight.
+    """A light that people adjust: one emitter, or several tied together under one weight.
 
-    parameter, unit: what one unit of weight is. With the unit MULTIPLE the weight multiplies
-    what each member has in the scene; with any other it is the emission of each.
+    parameter, unit: meaning of one unit of weight. With the unit MULTIPLE the weight multiplies
+    each member's own emission; with any other it is the emission of each.
     emission: present RGB emission in `unit`.
-    is_scalar: whether it has one weight for all channels instead of three.
-    is_fixed: whether it is all that stays as it is, with weight 1.
-    is_found: whether nobody tied its members, but that they are many, alike and without names.
+    is_scalar: True if it has one weight for all channels instead of three. is_fixed: True for the
+    light of all emitters that stay as they are, with weight 1. is_found: True if its members were
+    tied automatically, since they are many, similar and unnamed.
     """
 
     name: str
@@ -44,9 +44,9 @@ class Light:
     def __repr__(self) -> str:
         emission = " ".join(f"{v:.4g}" for v in self.emission)
         kept = ", kept" if self.is_fixed else ""
-        of = "" if len(self.members) == 1 else f", {len(self.members)} emitters"
-        what = f"{self.plugin} {self.parameter} {emission} {self.unit}"
-        return f"Light({self.name!r}, {what}{of}{kept})"
+        count_text = "" if len(self.members) == 1 else f", {len(self.members)} emitters"
+        description = f"{self.plugin} {self.parameter} {emission} {self.unit}"
+        return f"Light({self.name!r}, {description}{count_text}{kept})"
 
     @property
     def member_names(self) -> tuple[str, ...]:
@@ -55,12 +55,12 @@ class Light:
 
     @property
     def plugin(self) -> str:
-        """Mitsuba's name of the emitter plugin; `area + point` where members differ."""
+        """Mitsuba's name of the emitter plugin; `area + point` if members differ."""
         return " + ".join(dict.fromkeys(member.plugin for member in self.members))
 
     @property
     def form(self) -> str:
-        """Place and size in words; for several emitters, which."""
+        """Place and size in words; for several emitters, their names."""
         if len(self.members) == 1:
             return self.members[0].form
         return f"{len(self.members)} emitters: {some_names(self.member_names)}"
@@ -69,7 +69,7 @@ class Light:
     def unit_flux(self) -> RGB | None:
         """Watts per channel at an emission of 1, of all members together.
 
-        None where one of them has no flux that is known.
+        None if the flux of any member is unknown.
         """
         total = [0.0, 0.0, 0.0]
         for member in self.members:
@@ -80,7 +80,7 @@ class Light:
         return total[0], total[1], total[2]
 
     def emission_of(self, member: Emitter, emission: RGB) -> RGB:
-        """What `member` emits, in its own unit, where this light has `emission`."""
+        """Return the emission of `member`, in its own unit, if this light has `emission`."""
         if self.unit != MULTIPLE:
             return emission
         r, g, b = (w * own for w, own in zip(emission, member.emission, strict=True))
@@ -88,12 +88,11 @@ class Light:
 
 
 def tie(name: str, members: Sequence[Emitter]) -> Light:
-    """The light `name` made of emitters that share one weight.
+    """Return the light `name` of emitters that share one weight.
 
-    If all have one colour, in the same unit and of the same value, that colour is the
-    unknown; so it is if all are black. Otherwise the unknown is a factor: what they are in
-    proportion to each other, they stay. Raises SceneError if that is nothing, because all
-    are black and differ in kind.
+    If all have the same colour in the same unit, or all are black, that colour is the unknown.
+    Otherwise the unknown is a factor, and they keep their proportions. Raises SceneError if all are
+    black and differ in kind, so that there are no proportions.
     """
     kinds = {member.kind for member in members}
     first = members[0]
@@ -104,8 +103,8 @@ def tie(name: str, members: Sequence[Emitter]) -> Light:
     if not any(any(member.emission) for member in members):
         listed = some_names(f"{m.name} ({m.plugin})" for m in members)
         raise SceneError(
-            f"group {name!r} has only black lights of different kinds, {listed}, so nothing "
-            "says how bright they are relative to each other: give one of them a colour"
+            f"group {name!r} has only black lights of different kinds, {listed}, so their "
+            "relative brightness is unknown: give one of them a colour"
         )
     parameters = {member.kind.parameter for member in members if member.kind is not None}
     return Light(
@@ -123,29 +122,29 @@ def _is_colour(emitter: Emitter) -> bool:
 
 
 def keep(name: str, emitters: Sequence[Emitter]) -> Light:
-    """The fixed light `name` of all `emitters` that stay as they are."""
+    """Return the fixed light `name` of all `emitters` that stay as they are."""
     return Light(name, tuple(emitters), WHOLE_EMISSION, MULTIPLE, AS_AUTHORED, is_fixed=True)
 
 
 def lights_of(
     emitters: Sequence[Emitter], members: Mapping[str, Sequence[str]], fixed: Collection[str]
 ) -> tuple[Light, ...]:
-    """The lights `members` (name → names of its emitters), of which those in `fixed` are kept.
+    """Return the lights `members` (name → names of its emitters); those in `fixed` are kept.
 
-    Raises SceneError if an adjusted one holds an emitter that cannot be scaled.
+    Raises SceneError if an adjusted light has an emitter that cannot be scaled.
     """
     by_name = {emitter.name: emitter for emitter in emitters}
     lights = []
     for name, names in members.items():
-        its = sorted((by_name[n] for n in names), key=lambda emitter: emitter.node)
+        light_emitters = sorted((by_name[n] for n in names), key=lambda emitter: emitter.node)
         if name not in fixed:
-            check_adjustable(its)
-        lights.append(keep(name, its) if name in fixed else tie(name, its))
+            check_adjustable(light_emitters)
+        lights.append(keep(name, light_emitters) if name in fixed else tie(name, light_emitters))
     return tuple(sorted(lights, key=lambda light: (light.is_fixed, light.members[0].node)))
 
 
 def light_named(name: str, lights: Sequence[Light], *, scene: str) -> Light:
-    """The light called `name`. Raises SceneError if there is none."""
+    """Return the light called `name`. Raises SceneError if there is none."""
     for light in lights:
         if light.name == name:
             return light
@@ -159,7 +158,7 @@ def settings_for(
     *,
     scene: str,
 ) -> dict[int, EmitterSetting]:
-    """What emitters are set to, by their nodes, where `emission` is that of lights, by name."""
+    """Return the settings of emitters, by their nodes. emission: that of lights, by name."""
     settings: dict[int, EmitterSetting] = {}
     for name, rgb in emission.items():
         light = light_named(name, lights, scene=scene)
@@ -168,7 +167,9 @@ def settings_for(
         elif not any(rgb):
             settings |= {m.node: _setting(m, rgb) for m in light.members}
         elif tuple(rgb) != AS_AUTHORED:
-            raise SceneError(f"what is kept can be loaded black or as it is, not times {rgb}")
+            raise SceneError(
+                f"the kept light can be loaded black or unchanged, not multiplied by {rgb}"
+            )
     own = {emitter.node: emitter.sampling_weight for emitter in emitters}
     if not any((own | {node: x.sampling_weight for node, x in settings.items()}).values()):
         # Mitsuba refuses a scene in which no emitter may be sampled.
@@ -177,13 +178,13 @@ def settings_for(
 
 
 def _setting(emitter: Emitter, rgb: RGB) -> EmitterSetting:
-    # An emitter the scene keeps switched off is sampled again once it shines.
-    weight = (emitter.sampling_weight or 1.0) if any(rgb) and not emitter.by_chance else 0.0
+    # An emitter that the scene never samples is sampled again once it shines.
+    weight = (emitter.sampling_weight or 1.0) if any(rgb) and not emitter.hit_by_chance else 0.0
     return EmitterSetting(emitter.kind, rgb, weight)
 
 
 def check_adjustable(emitters: Iterable[Emitter]) -> None:
-    """Raise SceneError for the first that cannot be scaled."""
+    """Raise SceneError for the first emitter that cannot be scaled."""
     for emitter in emitters:
         if emitter.obstacle:
             raise SceneError(

@@ -1,6 +1,6 @@
-"""Which emitters go together and which are adjusted, by names and patterns.
+"""The choice of lights: which emitters are tied and which are adjusted, by names and patterns.
 
-Everything is in document order; what is not adjusted comes last, as one light that is fixed.
+Everything is in document order; the emitters that are not adjusted come last, as one fixed light.
 """
 
 import difflib
@@ -15,7 +15,7 @@ from lightpaint.scene.lights.similar_emitters import alike_groups, without
 from lightpaint.screen import some_names
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
-#: Name of the fixed light, with underscores added should another have it.
+#: Name of the fixed light; underscores are added if another light has it.
 REST = "rest"
 
 
@@ -28,57 +28,56 @@ def choose_lights(
     group_alike: bool = True,
     named: Iterable[str] = (),
 ) -> tuple[Light, ...]:
-    """The lights of a scene: its emitters, tied by `groups`, of which `lights` are adjusted.
+    """Return the lights of a scene: its emitters, tied by `groups`; `lights` are adjusted.
 
     lights: names or patterns (`window_*`) of lights and groups; None for all.
-    groups: name → names or patterns of its emitters. scene: what errors call the scene.
-    group_alike: whether many that are alike and without names are one light (`alike_groups`), but
-    those that `lights` or `named`, names or patterns too, mean one by one.
+    groups: name → names or patterns of its emitters. scene: its name in errors. group_alike: True
+    to tie many similar emitters without names to one light (`alike_groups`), except those that
+    `lights` or `named`, names or patterns too, select one by one.
 
-    What is not chosen, and what cannot be scaled, is kept together in one fixed light.
-    Raises SceneError for names that are not there, that clash or that are taken twice, and
-    if nothing is left to adjust.
+    Emitters that are not chosen, or cannot be scaled, form one fixed light. Raises SceneError for
+    names that do not exist, clash or are used twice, and if nothing is left to adjust.
     """
     group_of = _members_of_groups(emitters, groups or {}, scene)
-    found: dict[str, tuple[Emitter, ...]] = {}
+    similar: dict[str, tuple[Emitter, ...]] = {}
     if group_alike:
-        asked = [*([] if lights is None else _listed(lights, "lights")), *named]
-        found = _found_alike(emitters, group_of, {*(groups or {})}, asked)
-        group_of |= {member.name: name for name, its in found.items() for member in its}
+        patterns = [*([] if lights is None else _as_list(lights, "lights")), *named]
+        similar = _similar_lights(emitters, group_of, {*(groups or {})}, patterns)
+        group_of |= {member.name: name for name, members_ in similar.items() for member in members_}
     by_light: dict[str, list[Emitter]] = {}
     for emitter in emitters:
         if not emitter.obstacle:
             by_light.setdefault(group_of.get(emitter.name, emitter.name), []).append(emitter)
     if lights is not None:
-        chosen = _chosen(_listed(lights, "lights"), by_light, group_of, emitters, scene)
+        chosen = _chosen(_as_list(lights, "lights"), by_light, group_of, emitters, scene)
         by_light = {name: members for name, members in by_light.items() if name in chosen}
     if not by_light:
         listed = some_names((f"{e.name!r} {e.obstacle}" for e in emitters), "; ")
         raise SceneError(f"{scene} has no light that can be solved for: {listed}")
     tied = [
-        replace(tie(name, members), is_found=name in found) for name, members in by_light.items()
+        replace(tie(name, members), is_found=name in similar) for name, members in by_light.items()
     ]
     return _with_rest(tied, emitters)
 
 
-def _found_alike(
+def _similar_lights(
     emitters: Sequence[Emitter],
     group_of: Mapping[str, str],
     groups: Collection[str],
-    asked: Iterable[str],
+    patterns: Iterable[str],
 ) -> dict[str, tuple[Emitter, ...]]:
-    """Lights of many emitters that are alike, without those in groups and those asked for alone."""
+    """Return lights of many similar emitters, without those in groups or selected alone."""
     free = [emitter for emitter in emitters if emitter.name not in group_of]
-    found = alike_groups(free, {*groups, *(emitter.name for emitter in emitters)})
-    inside = {member.name for its in found.values() for member in its}
-    lights = {*groups, *found, *(emitter.name for emitter in free)} - inside
-    parted: set[str] = set()
-    for pattern in asked:
+    similar = alike_groups(free, {*groups, *(emitter.name for emitter in emitters)})
+    inside = {member.name for members in similar.values() for member in members}
+    lights = {*groups, *similar, *(emitter.name for emitter in free)} - inside
+    separated: set[str] = set()
+    for pattern in patterns:
         if pattern in inside:
-            parted.add(pattern)
+            separated.add(pattern)
         elif not any(fnmatchcase(name, pattern) for name in lights):
-            parted |= {name for name in inside if fnmatchcase(name, pattern)}
-    return without(found, parted)
+            separated |= {name for name in inside if fnmatchcase(name, pattern)}
+    return without(similar, separated)
 
 
 def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Light, ...]:
@@ -95,29 +94,26 @@ def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Li
 def _members_of_groups(
     emitters: Sequence[Emitter], groups: Mapping[str, Iterable[str]], scene: str
 ) -> dict[str, str]:
-    """The group of each emitter that is in one."""
+    """Return the group of each emitter that is in one."""
     names = [emitter.name for emitter in emitters]
     group_of: dict[str, str] = {}
     for group, patterns in groups.items():
         if not 0 < len(group) <= MAX_NAME:
-            raise SceneError(
-                "a group needs a name, by which its members are given, of at most "
-                f"{MAX_NAME} characters"
-            )
-        listed = _listed(patterns, f"group {group!r}")
+            raise SceneError(f"a group needs a name of at most {MAX_NAME} characters")
+        listed = _as_list(patterns, f"group {group!r}")
         for pattern in listed:
-            found = _matching(pattern, names, f"group {group!r}", scene)
-            its = [e for e in emitters if e.name in found]
+            matches = _matching(pattern, names, f"group {group!r}", scene)
+            members = [e for e in emitters if e.name in matches]
             if pattern not in names:
-                # A pattern takes what can be taken; a name is meant.
-                its = [e for e in its if not e.obstacle] or its
-            check_adjustable(its)
-            for name in (emitter.name for emitter in its):
+                # A pattern skips emitters that cannot be adjusted; a name does not.
+                members = [e for e in members if not e.obstacle] or members
+            check_adjustable(members)
+            for name in (emitter.name for emitter in members):
                 other = group_of.setdefault(name, group)
                 if other != group:
                     raise SceneError(
                         f"light {name!r} is in two groups, {other!r} and {group!r}: "
-                        "an emitter has one weight; leave one of the groups out, or give it other "
+                        "an emitter has one weight; remove one of the groups, or give it other "
                         "members (groups of the lights file count too)"
                     )
     for group in groups:
@@ -135,7 +131,7 @@ def _chosen(
     emitters: Sequence[Emitter],
     scene: str,
 ) -> set[str]:
-    """Names of the lights that the patterns select."""
+    """Return the names of the lights that the patterns select."""
     chosen: set[str] = set()
     for pattern in patterns:
         if pattern not in by_light:
@@ -150,25 +146,25 @@ def _chosen(
 
 
 def _matching(pattern: str, names: Sequence[str], where: str, scene: str) -> set[str]:
-    """The name itself, else all that match it as a pattern. Raises SceneError if none does."""
+    """Return the name itself, else all names that match the pattern. Raises SceneError if none."""
     if pattern in names:
         return {pattern}
-    found = {name for name in names if fnmatchcase(name, pattern)}
-    if not found:
+    matches = {name for name in names if fnmatchcase(name, pattern)}
+    if not matches:
         close = difflib.get_close_matches(pattern, names, n=1)
         hint = f"did you mean {close[0]!r}? It" if close else "it"
         raise SceneError(
             f"{where}: {scene} has no light {pattern!r}; {hint} has {some_names(names)}"
         )
-    return found
+    return matches
 
 
-def _listed(names: Iterable[str], where: str) -> list[str]:
-    """Checked to be a list that names something."""
-    # A text is a list of its letters too, and never what was meant.
+def _as_list(names: Iterable[str], where: str) -> list[str]:
+    """Return names as a list, after checking that there is at least one."""
+    # A string would otherwise count as a list of its letters.
     listed = [names] if isinstance(names, str) else list(names)
     if len(listed) > MAX_LISTED:
-        raise SceneError(f"{where} lists {len(listed)} names: at most {MAX_LISTED} are read")
+        raise SceneError(f"{where} lists {len(listed)} names: expected at most {MAX_LISTED}")
     if not listed or not all(isinstance(name, str) and name for name in listed):
-        raise SceneError(f"{where}: name at least one light, and each by its name")
+        raise SceneError(f"{where}: expected a list of at least one name")
     return listed

@@ -1,7 +1,7 @@
-"""The lights file: which lights to adjust and which go together, in a TOML beside the scene.
+"""The lights file: which lights to adjust and which to tie, in a TOML beside the scene.
 
-For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. What it asks of the
-lights in the solve is kept as it stands; lighting/constraints/constraints_file.py reads it.
+For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. Its constraints are kept
+as they are; lighting/constraints/constraints_file.py reads them.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,9 +16,9 @@ from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
 SUFFIX = ".lights.toml"
-#: What asks for something in the solve.
+#: Keys of constraints for the solve.
 CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
-#: What files called `prefer_current` before, as `prefer = { current = 0.01 }`.
+#: Older key for `prefer_current`, as in `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
 KNOWN = ("lights", "groups", "group_alike", *CONSTRAINTS)
 
@@ -28,9 +28,9 @@ MAX_BYTES = 2**20
 
 @dataclass(frozen=True)
 class SceneRequests:
-    """What a lights file asks of the lights in the solve: CONSTRAINTS, as they stand there.
+    """The constraints of a lights file, as they stand there.
 
-    source: the file, for errors; "" where there is none, and nothing is asked.
+    source: the file, for errors; "" if there is none, and so no constraints.
     """
 
     keys: Mapping[str, Any] = field(default_factory=dict)
@@ -38,21 +38,21 @@ class SceneRequests:
 
     @classmethod
     def of(cls, path: Path, data: Mapping[str, Any]) -> "SceneRequests":
-        """Of all keys of the lights file at `path`."""
+        """Return the constraints among all keys of the lights file at `path`."""
         return cls({key: data[key] for key in (*CONSTRAINTS, *OLDER) if key in data}, str(path))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names and patterns of lights, of which something is asked."""
+        """Names and patterns of lights with constraints."""
         lights, ties = self.keys.get("light"), self.keys.get("tie")
         return (*(lights if isinstance(lights, dict) else ()), *_texts(ties))
 
 
 @dataclass(frozen=True)
 class LightsFile:
-    """What a lights file says. path: None if there is none.
+    """The content of a lights file. path: None if there is none.
 
-    lights, groups, group_alike: as `choose_lights` takes them. requests: the constraints on lights.
+    lights, groups, group_alike: as in `choose_lights`. requests: the constraints on lights.
     """
 
     path: Path | None = None
@@ -64,21 +64,21 @@ class LightsFile:
     def with_more(
         self, lights: Iterable[str] | None, groups: Mapping[str, Iterable[str]] | None
     ) -> "LightsFile":
-        """With what was given along with it: `lights` replaces its own, `groups` are added."""
+        """Return the content with arguments: `lights` replaces its own, `groups` are added."""
         groups = groups or {}
         if lights is None and self.lights is not None:
-            # Who makes a group here and now means to adjust it.
+            # A group given as an argument is meant to be adjusted.
             lights = (*self.lights, *groups)
         return replace(self, lights=lights, groups={**self.groups, **groups})
 
 
 def lights_file_beside(scene: Path) -> Path:
-    """Where the lights file of `scene` lies if it has one."""
+    """Return the path of the lights file of `scene`, whether it exists or not."""
     return scene.with_name(scene.stem + SUFFIX)
 
 
 def lights_file_for(scene: Path, named: str | Path | None, *, beside: bool) -> LightsFile:
-    """What is read for `scene`: the file `named`, else the one beside it, if `beside` allows."""
+    """Return the content of the file `named`, else of the one beside `scene` if allowed."""
     if named is not None:
         return read_lights_file(Path(named))
     path = lights_file_beside(scene)
@@ -88,26 +88,29 @@ def lights_file_for(scene: Path, named: str | Path | None, *, beside: bool) -> L
 def read_lights_file(path: Path) -> LightsFile:
     """Read a lights file.
 
-    Raises SceneError, with the line where the TOML is wrong, or with the key that is.
+    Raises SceneError with the line of the TOML's error, or with the wrong key.
     """
     data = read_keys(path)
     groups, group_alike = data.get("groups", {}), data.get("group_alike", True)
     if not isinstance(group_alike, bool):
-        said = one_line(repr(group_alike))
-        raise SceneError(f"{path}: group_alike is true or false, not {said}")
+        value = one_line(repr(group_alike))
+        raise SceneError(f"{path}: group_alike is true or false, not {value}")
     if not isinstance(groups, dict):
         raise SceneError(f'{path}: groups is a table, [groups], with lines like a = ["b", "c"]')
     return LightsFile(
         path,
         _names(path, "lights", data["lights"]) if "lights" in data else None,
-        {name: _names(path, f"groups.{one_line(name)}", its) for name, its in groups.items()},
+        {
+            name: _names(path, f"groups.{one_line(name)}", members)
+            for name, members in groups.items()
+        },
         SceneRequests.of(path, data),
         group_alike,
     )
 
 
 def read_keys(path: Path) -> dict[str, Any]:
-    """All keys of a lights file, none of them unknown. Raises SceneError."""
+    """Return all keys of a lights file, none of them unknown. Raises SceneError."""
     text = read_text(path, "lights file", SceneError, limit=MAX_BYTES, may_be_empty=True)
     try:
         data = strict_toml(text)
@@ -122,14 +125,14 @@ def read_keys(path: Path) -> dict[str, Any]:
     if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
         raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")
     if (count := sum(1 for _ in _texts_in(data))) > MAX_LISTED:
-        raise SceneError(f"{path} names {count} lights and more: at most {MAX_LISTED} are read")
+        raise SceneError(f"{path} names {count} lights: expected at most {MAX_LISTED}")
     if any(len(text) > MAX_NAME for text in _texts_in(data)):
         raise SceneError(f"{path} has a name of more than {MAX_NAME} characters")
     return data
 
 
 def _texts(value: Any) -> Iterator[str]:
-    """All texts in lists, and in the `lights` of tables."""
+    """Yield all strings in lists, and in the `lights` of tables."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):
@@ -140,7 +143,7 @@ def _texts(value: Any) -> Iterator[str]:
 
 
 def _texts_in(value: Any) -> Iterator[str]:
-    """All keys and texts, however deep."""
+    """Yield all keys and strings, at any depth."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):
@@ -162,6 +165,6 @@ def _integers(value: Any) -> Iterator[int]:
 
 def _names(path: Path, key: str, value: Any) -> tuple[str, ...]:
     if not (isinstance(value, list) and value and all(isinstance(v, str) and v for v in value)):
-        said = one_line(repr(value))
-        raise SceneError(f'{path}: {key} is a list of at least one name, ["a", "b"], not {said}')
+        text = one_line(repr(value))
+        raise SceneError(f'{path}: {key} is a list of at least one name, ["a", "b"], not {text}')
     return tuple(value)

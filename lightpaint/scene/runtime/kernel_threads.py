@@ -1,8 +1,7 @@
-"""On how many threads kernels run: all that there are, or fewer where workers share a machine.
+"""The number of threads of kernels: all, or fewer if workers share a machine.
 
-What a kernel adds up on one thread it adds in the same order each time, to the last bit. The limit
-holds while kernels run, and not for good: with one thread Mitsuba's reader of EXR files waits for
-itself for ever.
+On one thread a kernel adds up in the same order each time, reproducible to the last bit. The limit
+is set only while kernels run: with one thread Mitsuba's reader of EXR files would deadlock.
 """
 
 from collections.abc import Iterator
@@ -14,9 +13,9 @@ _limit: int | None = None
 
 
 def limit_threads(count: int | None) -> None:
-    """Let no kernel of this process run on more threads than `count`; None for all there are.
+    """Limit kernels, and other parallel work, of this process to `count` threads; None for all.
 
-    Nor other work that is done side by side.
+    The limit holds for `parallel_map` too.
     """
     global _limit
     _limit = count
@@ -24,30 +23,30 @@ def limit_threads(count: int | None) -> None:
 
 
 def adds_in_order() -> bool:
-    """Whether all that kernels of this process add up they add in the same order each time."""
+    """Return True if all kernels of this process add up in the same order each time."""
     return _limit == 1
 
 
 @contextmanager
 def kernels(threads: int | None = None) -> Iterator[None]:
-    """Run what is traced in this block on no more threads than the process may have.
+    """Run the kernels of this block on no more threads than the process may use.
 
-    threads: fewer still.
+    threads: a lower limit.
     """
-    asked = min((x for x in (_limit, threads) if x is not None), default=None)
-    if asked is None:
+    limit = min((x for x in (_limit, threads) if x is not None), default=None)
+    if limit is None:
         yield
         return
     import drjit as dr
 
     before = dr.thread_count()
-    if asked >= before:
+    if limit >= before:
         yield
         return
-    dr.set_thread_count(asked)
+    dr.set_thread_count(limit)
     try:
         yield
-        # What is not waited for is still running.
+        # Kernels run asynchronously: wait for them.
         dr.sync_thread()
     finally:
         dr.set_thread_count(before)

@@ -1,7 +1,7 @@
-"""The LLVM that Dr.Jit compiles with: looked for, tried out, and named to it.
+"""Finding and testing the LLVM library for Dr.Jit.
 
-Dr.Jit looks for LLVM when it is first imported, cannot try twice, and one that is too old
-brings the whole process down. So a library is tried out in a process of its own first.
+Dr.Jit looks for LLVM when it is first imported and cannot try twice, and one that is too old
+crashes the process. So each library is first tested in a process of its own.
 """
 
 import ctypes
@@ -24,7 +24,7 @@ INSTALL_LLVM = (
 
 @dataclass(frozen=True)
 class Llvm:
-    """A libLLVM that was found. `version` is None if it cannot be used; `problem` says why."""
+    """A libLLVM on this machine. version: None if it is unusable; `problem` says why."""
 
     path: Path
     origin: str
@@ -33,7 +33,7 @@ class Llvm:
 
 
 def prepare_llvm() -> Llvm | None:
-    """Find a usable LLVM and make Dr.Jit take it. None if there is none."""
+    """Find a usable LLVM and make Dr.Jit use it. Returns None if there is none."""
     usable = next((c for c in llvm_candidates() if c.version is not None), None)
     if usable is not None and "drjit" not in sys.modules:
         _preload_cpp_runtime(usable.path)
@@ -43,7 +43,7 @@ def prepare_llvm() -> Llvm | None:
 
 @cache
 def llvm_candidates() -> tuple[Llvm, ...]:
-    """LLVM libraries in the order they are tried, up to the first usable one."""
+    """Return LLVM libraries in the order they are tried, up to the first usable one."""
     found: list[Llvm] = []
     seen: set[Path] = set()
     for path, origin in _llvm_paths():
@@ -101,7 +101,7 @@ print(*(v.value for v in version))
 
 
 def _probe(path: Path, origin: str) -> Llvm:
-    """Load `path` in a process of its own and ask for its version."""
+    """Load `path` in a process of its own and return its version."""
     if not path.exists():
         return Llvm(path, origin, None, "no such file")
     runtime = [str(p) for p in _cpp_runtime(path)]
@@ -112,10 +112,10 @@ def _probe(path: Path, origin: str) -> Llvm:
             text=True,
             timeout=60,
             check=False,
-            start_new_session=True,  # or Ctrl-C would say that it cannot be used
+            start_new_session=True,  # else Ctrl-C would make it seem unusable
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        return Llvm(path, origin, None, f"cannot be tried: {error}")
+        return Llvm(path, origin, None, f"cannot be tested: {error}")
     if answer.returncode != 0:
         lines = answer.stderr.strip().splitlines()
         reason = lines[-1] if lines else f"exit status {answer.returncode}"
@@ -124,12 +124,12 @@ def _probe(path: Path, origin: str) -> Llvm:
         return Llvm(path, origin, None, reason)
     major, minor, patch = (int(v) for v in answer.stdout.split())
     if major < OLDEST_LLVM:
-        return Llvm(path, origin, None, f"LLVM {major}.{minor}.{patch}, needs {OLDEST_LLVM}")
+        return Llvm(path, origin, None, f"LLVM {major}.{minor}.{patch}, older than {OLDEST_LLVM}")
     return Llvm(path, origin, (major, minor, patch))
 
 
 def _cpp_runtime(llvm: Path) -> list[Path]:
-    """The C++ runtime that some LLVM packages bring along, in loading order."""
+    """Return the C++ runtime that some LLVM packages contain, in loading order."""
     names = ["libunwind.so.1", "libc++abi.so.1", "libc++.so.1"]
     folders = [llvm.parent, *sorted(llvm.parent.glob("*-linux-gnu"))]
     found = [folder / name for name in names for folder in folders if (folder / name).exists()]
@@ -137,8 +137,8 @@ def _cpp_runtime(llvm: Path) -> list[Path]:
 
 
 def _preload_cpp_runtime(llvm: Path) -> None:
-    # The package's own link to its runtime appears only at the second start of Python.
-    # RTLD_LOCAL: seen by all, this runtime would take over Mitsuba's exceptions, and every
-    # one of them would end the process.
+    # The package's own link to its runtime appears only at the second start of Python. RTLD_LOCAL:
+    # a global runtime would take over Mitsuba's exceptions, and every one of them would crash the
+    # process.
     for path in _cpp_runtime(llvm):
         ctypes.CDLL(str(path), ctypes.RTLD_LOCAL)

@@ -1,9 +1,8 @@
-"""Which of Mitsuba's plugins a scene may name, and whose native code is run for them.
+"""The plugins that a scene may use, and the native code that runs for them.
 
-Mitsuba looks for `plugins/NAME.so` in every folder of its file resolver, the working folder and
-the scene's before its own, and runs what it finds. All of its own plugins are therefore loaded
-when it starts, from its own folder; a name that is loaded is never looked for again. Scenes may
-name these, and no others.
+Mitsuba looks for `plugins/NAME.so` in every folder of its file resolver, the working folder and the
+scene's before its own, and runs what it finds. Therefore all of its own plugins are loaded at
+start, from its own folder; Mitsuba never looks for a loaded name again. Scenes may use only these.
 """
 
 import difflib
@@ -19,10 +18,10 @@ from lightpaint.errors import BackendError
 from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import place_of_node
 
-#: Names the folder of plugins that a user adds to Mitsuba's own.
+#: Environment variable with a folder of plugins that the user adds.
 VARIABLE = "LIGHTPAINT_PLUGINS"
 
-#: Integrators that Mitsuba has in Python, where its variant compiles: there is no file of these.
+#: Integrators that Mitsuba implements in Python, for compiling variants: they have no plugin file.
 IN_PYTHON = frozenset(
     ["direct_projective", "prb", "prb_basic", "prb_projective", "prbvolpath", "volprim_rf_basic"]
 )
@@ -33,33 +32,36 @@ ENDINGS = (".so", ".dylib", ".dll")
 
 
 class UnknownPluginError(RuntimeError):
-    """A plugin that a scene names, and that neither Mitsuba nor the user has."""
+    """A plugin of a scene that neither Mitsuba nor the user has."""
 
 
 @cache
 def loaded_plugins() -> frozenset[str]:
-    """Load all of Mitsuba's plugins, and those of the folder that the user names; their names.
+    """Load all plugins of Mitsuba and of the user's folder, and return their names.
 
-    Raises BackendError if that folder is none, or has a file that is no plugin of this Mitsuba.
+    Raises BackendError if that folder does not exist, or has a file that is not a plugin of this
+    Mitsuba.
     """
     import mitsuba as mi
 
     own = Path(mi.__file__).resolve().parent / "plugins"
-    names = _loaded(own)
-    if named := os.environ.get(VARIABLE):
-        folder = Path(named).absolute()
+    names = _load_folder(own)
+    if user_folder := os.environ.get(VARIABLE):
+        folder = Path(user_folder).absolute()
         if not folder.is_dir():
-            raise BackendError(f"{VARIABLE} names {folder}, which is no folder")
+            raise BackendError(
+                f"{VARIABLE} is {folder}, which is not a folder: set it to a folder of plugins"
+            )
         added = {path.stem for path in _files(folder)}
         if taken := sorted(added & (names | IN_PYTHON)):
             raise BackendError(
                 f"{VARIABLE}: {folder} has a plugin {taken[0]!r}, which Mitsuba has itself: give "
                 "it another name"
             )
-        found = _loaded(folder)
-        if lacking := sorted(added - found):
+        found = _load_folder(folder)
+        if missing := sorted(added - found):
             raise BackendError(
-                f"{VARIABLE}: {folder} has {lacking[0]!r}, which this Mitsuba cannot load as a "
+                f"{VARIABLE}: {folder} has {missing[0]!r}, which this Mitsuba cannot load as a "
                 "plugin"
             )
         names |= found
@@ -67,9 +69,9 @@ def loaded_plugins() -> frozenset[str]:
 
 
 def check_plugins(state: Any, resolver: Any) -> None:
-    """Raise UnknownPluginError if a parsed scene names a plugin that is not loaded.
+    """Raise UnknownPluginError if a parsed scene uses a plugin that is not loaded.
 
-    To be called before anything is made of the scene. resolver: where Mitsuba will look for files.
+    Call it before building the scene. resolver: the one in which Mitsuba will look for files.
     """
     known = loaded_plugins()
     for node in _in_use(state):
@@ -79,18 +81,18 @@ def check_plugins(state: Any, resolver: Any) -> None:
         kind = str(node.type).rpartition(".")[2].lower()
         lead = f"{place_of_node(state, node)}Mitsuba has no {kind} plugin {one_line(repr(name))}"
         if name in IN_PYTHON:
-            if file := _in_the_way(name, resolver):
+            if file := _shadowing_file(name, resolver):
                 raise UnknownPluginError(
-                    f"{lead} but in Python, and {file} would be run in its place: move that away"
+                    f"{lead} except in Python, and {file} would run instead: move that file away"
                 )
             continue
         close = difflib.get_close_matches(name, known | IN_PYTHON, n=1, cutoff=0.75)
-        meant = f"; did you mean {close[0]!r}?" if close else ""
-        raise UnknownPluginError(f"{lead}{meant}")
+        suggestion = f"; did you mean {close[0]!r}?" if close else ""
+        raise UnknownPluginError(f"{lead}{suggestion}")
 
 
 def _in_use(state: Any) -> Iterator[Any]:
-    """The nodes that something is made of: not those of an integrator that was replaced."""
+    """Yield the nodes that objects are built from: not those of a replaced integrator."""
     import mitsuba as mi
 
     resolved = mi.Properties.Type.ResolvedReference
@@ -104,8 +106,8 @@ def _in_use(state: Any) -> Iterator[Any]:
         waiting += sorted(below)
 
 
-def _in_the_way(name: str, resolver: Any) -> Path | None:
-    """A file that Mitsuba would take for the plugin `name`; None if there is none."""
+def _shadowing_file(name: str, resolver: Any) -> Path | None:
+    """Return a file that Mitsuba would load as the plugin `name`; None if there is none."""
     folders = [Path(), *(Path(str(resolver[k])) for k in range(len(resolver)))]
     files = (folder / "plugins" / f"{name}{end}" for folder in folders for end in ENDINGS)
     return next(filter(Path.exists, files), None)
@@ -115,22 +117,25 @@ def _files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.iterdir() if path.suffix in ENDINGS and path.is_file())
 
 
-def _loaded(folder: Path) -> frozenset[str]:
-    """Load the plugins in `folder`, wherever others of such names are. Returns their names."""
+def _load_folder(folder: Path) -> frozenset[str]:
+    """Load the plugins in `folder`, even if other folders have such names. Returns their names."""
     import mitsuba as mi
 
     manager = mi.PluginManager.instance()
-    # What is loaded may read Mitsuba's tables at once.
+    # Plugins may read Mitsuba's data files while they load.
     own = Path(mi.__file__).resolve().parent
-    with tempfile.TemporaryDirectory(prefix="lightpaint-") as above, _only_in(Path(above), own):
+    with (
+        tempfile.TemporaryDirectory(prefix="lightpaint-") as above,
+        _resolving_only_in(Path(above), own),
+    ):
         (Path(above) / "plugins").symlink_to(folder, target_is_directory=True)
         kinds = {path.stem: manager.plugin_type(path.stem) for path in _files(folder)}
     return frozenset(name for name, kind in kinds.items() if kind != mi.ObjectType.Unknown)
 
 
 @contextmanager
-def _only_in(*folders: Path) -> Iterator[None]:
-    """Have Mitsuba look for files in these folders alone meanwhile."""
+def _resolving_only_in(*folders: Path) -> Iterator[None]:
+    """Let Mitsuba look for files in these folders alone within the block."""
     import mitsuba as mi
 
     before = mi.file_resolver()

@@ -1,8 +1,9 @@
-"""One thread has Mitsuba at a time: two at once in one process spoil what both of them make.
+"""A lock that gives Mitsuba to one thread at a time.
 
-What Dr.Jit records asks all materials and lights there are, also those of a scene that another
-thread is still loading. So whoever loads or traces waits for whoever does, and goes on in pieces.
-In between, a thread that nobody waits for lets others go first.
+Two threads at once would corrupt each other's results: what Dr.Jit records involves all materials
+and lights of the process, even of a scene that another thread is still loading. So threads take
+turns at loading and tracing, and work in pieces. Between pieces, low-priority threads let others go
+first.
 """
 
 from collections import deque
@@ -13,29 +14,29 @@ from time import monotonic
 
 from lightpaint.signals import interruptible_between_pieces
 
-#: Seconds after which even somebody at leisure gets a turn among others.
-PATIENCE_S = 2.0
+#: Seconds after which even a low-priority thread gets a turn.
+MAX_WAIT_S = 2.0
 
 
 class Turns:
-    """Turns that threads take at something, in the order in which they come.
+    """A fair, reentrant lock with two priorities: threads take turns in the order of arrival.
 
-    One that has its turn may take it again. Who is at leisure comes last, but now and then.
+    Low-priority threads come last, but not never.
     """
 
     def __init__(self) -> None:
         self._changed = Condition()
         self._holder: int | None = None
         self._depth = 0
-        self._waiting = deque[object]()  # of those that are waited for
-        self._idle: dict[object, float] = {}  # those at leisure that wait, and since when
-        self._away = 0  # how many of them let others go on, and come back
-        self._called: object | None = None  # whose turn it is, and who has not taken it yet
+        self._waiting = deque[object]()  # of normal priority
+        self._idle: dict[object, float] = {}  # waiting low-priority threads, and since when
+        self._away = 0  # number of threads that have lent their turn
+        self._called: object | None = None  # the thread whose turn it is, until it takes it
         self._own = local()
 
     @contextmanager
     def taken(self) -> Iterator[None]:
-        """Wait for a turn, and have it."""
+        """Wait for a turn, and hold it within the block."""
         if self._holder == get_ident():
             self._depth += 1
         else:
@@ -43,30 +44,31 @@ class Turns:
         try:
             yield
         finally:
-            if self._holder == get_ident():  # else it was interrupted while others went on
+            if self._holder == get_ident():  # else it was interrupted while its turn was lent
                 self._depth -= 1
                 if not self._depth:
                     self._leave()
 
     @contextmanager
-    def at_leisure(self) -> Iterator[None]:
-        """Nobody waits for what this thread does meanwhile: others go first."""
-        before, self._own.is_at_leisure = self._is_at_leisure, True
+    def low_priority(self) -> Iterator[None]:
+        """Let other threads go before this one within the block."""
+        before, self._own.is_low_priority = self._is_low_priority, True
         try:
             yield
         finally:
-            self._own.is_at_leisure = before
+            self._own.is_low_priority = before
 
     @contextmanager
     def aside(self) -> Iterator[None]:
-        """Let others go on meanwhile, if this thread has its turn: they may wait for one another.
+        """Lend this thread's turn, if it has one, to others within the block.
 
-        Who is at leisure does not come in between one that is not.
+        This avoids deadlock if they wait for one another. A low-priority thread does not get the
+        turn of one that is not.
         """
         if self._holder != get_ident():
             yield
             return
-        depth, urgent = self._depth, not self._is_at_leisure
+        depth, urgent = self._depth, not self._is_low_priority
         self._leave(urgent)
         try:
             yield
@@ -79,19 +81,19 @@ class Turns:
                     self._call()
 
     def let_others(self) -> None:
-        """Between two pieces: whoever is at leisure waits until no other wants a turn."""
-        if self._is_at_leisure and self._waiting:
+        """Between two pieces, let a low-priority thread wait until no other thread wants a turn."""
+        if self._is_low_priority and self._waiting:
             with self.aside():
                 pass
 
     @property
-    def _is_at_leisure(self) -> bool:
-        return getattr(self._own, "is_at_leisure", False)
+    def _is_low_priority(self) -> bool:
+        return getattr(self._own, "is_low_priority", False)
 
     def _take(self, depth: int) -> None:
         ticket = object()
         with self._changed:
-            if self._is_at_leisure:
+            if self._is_low_priority:
                 self._idle[ticket] = monotonic()
             else:
                 self._waiting.append(ticket)
@@ -104,20 +106,18 @@ class Turns:
                     self._waiting.remove(ticket)
                 if self._called is ticket:
                     self._called = None
-                self._call()  # whoever is interrupted keeps nobody waiting
+                self._call()  # an interrupted thread keeps nobody waiting
 
     def _call(self) -> None:
-        """Say whose turn it is, if nobody has one: once, since by the clock of each who waits it
-        might be another's.
-        """
+        """Choose the next thread if nobody has a turn; only once, since that depends on time."""
         if self._holder is None and self._called is None:
             self._called = self._next()
             self._changed.notify_all()
 
     def _next(self) -> object | None:
-        """Whose turn it is, once nobody has one."""
+        """Return the ticket of the next thread; None if none waits."""
         idle = next(iter(self._idle), None)
-        if idle is not None and monotonic() - self._idle[idle] > PATIENCE_S:
+        if idle is not None and monotonic() - self._idle[idle] > MAX_WAIT_S:
             return idle
         if self._waiting:
             return self._waiting[0]
@@ -130,13 +130,13 @@ class Turns:
             self._call()
 
 
-#: At Mitsuba, of all threads of this process.
+#: The lock of Mitsuba for all threads of this process.
 MITSUBA = Turns()
 
 
 @contextmanager
 def tracing() -> Iterator[Callable[[], None]]:
-    """Have Mitsuba, and hold Ctrl-C back; yields what lets both through between two pieces."""
+    """Hold Mitsuba and hold Ctrl-C back; yield a function that lets both through between pieces."""
     with MITSUBA.taken(), interruptible_between_pieces() as let_interrupts_through:
 
         def between() -> None:

@@ -1,4 +1,4 @@
-"""Which Mitsuba runs here: one choice per process, made before Mitsuba is imported.
+"""The variant of Mitsuba: chosen once per process, before Mitsuba is imported.
 
 This is the only module that calls `mi.set_variant`.
 """
@@ -18,12 +18,12 @@ PLAIN_VARIANT = "scalar_rgb"
 
 
 class SlowBackendWarning(UserWarning):
-    """Renders will take many times longer than they need to."""
+    """A warning that renders take many times longer than necessary."""
 
 
 @dataclass(frozen=True)
 class Backend:
-    """The Mitsuba variant of this process and, where it compiles with LLVM, the library."""
+    """The Mitsuba variant of this process and, if it compiles with LLVM, the library."""
 
     variant: str
     llvm: Llvm | None = None
@@ -31,7 +31,7 @@ class Backend:
 
     @property
     def is_jit(self) -> bool:
-        """Whether Python integrators run at full speed: not so in scalar variants."""
+        """True if Python integrators run at full speed, unlike in scalar variants."""
         return not self.variant.startswith("scalar")
 
 
@@ -40,7 +40,7 @@ _current: Backend | None = None
 
 @keywords()
 def use_variant(wanted: str | None = None) -> Backend:
-    """Set up Mitsuba once, as `wanted` or as the fastest RGB variant that works here.
+    """Set up Mitsuba once, with the variant `wanted` or the fastest RGB variant that works here.
 
     Later calls return the same backend.
 
@@ -48,8 +48,8 @@ def use_variant(wanted: str | None = None) -> Backend:
         wanted: Like `llvm_ad_rgb`; None for the fastest.
 
     Raises:
-        BackendError: If Mitsuba is missing, if `wanted` is no RGB variant of this installation, or
-            if another one is already in use.
+        BackendError: If Mitsuba is missing, if `wanted` is not an RGB variant of this installation,
+            or if another one is already in use.
 
     Examples:
         >>> lp.use_variant().variant
@@ -57,7 +57,7 @@ def use_variant(wanted: str | None = None) -> Backend:
     """
     global _current
     if _current is not None:
-        _check_still(_current)
+        _check_unchanged(_current)
         if wanted not in (None, _current.variant):
             raise BackendError(
                 f"this process already renders with {_current.variant}: "
@@ -65,13 +65,13 @@ def use_variant(wanted: str | None = None) -> Backend:
             )
         return _current
 
-    # An interrupt while modules in C++ begin ends the process otherwise than it should.
+    # An interrupt while C++ modules initialise would crash the process.
     with interruptible_between_pieces():
-        _current = _begun(wanted)
+        _current = _start(wanted)
     return _current
 
 
-def _begun(wanted: str | None) -> Backend:
+def _start(wanted: str | None) -> Backend:
     needs_llvm = wanted is None or wanted.startswith("llvm")
     llvm = prepare_llvm() if needs_llvm else None
     try:
@@ -79,7 +79,7 @@ def _begun(wanted: str | None) -> Backend:
     except ImportError as error:
         raise BackendError(f"Mitsuba cannot be imported ({error}): pip install mitsuba") from error
 
-    # Somebody (a notebook, a script) may have set a variant already; it is theirs to choose.
+    # A notebook or a script may have set a variant already; its choice stays.
     present = mi.variant()
     if present is not None and wanted in (None, present):
         _check_is_rgb(present)
@@ -93,17 +93,17 @@ def _begun(wanted: str | None) -> Backend:
     else:
         backend = _set(mi, wanted, llvm)
     mi.set_log_level(mi.LogLevel.Error)
-    loaded_plugins()  # before any scene says where files are
+    loaded_plugins()  # before any scene adds folders to search
     return backend
 
 
-def _check_still(backend: Backend) -> None:
+def _check_unchanged(backend: Backend) -> None:
     import mitsuba as mi
 
     if mi.variant() != backend.variant:
         raise BackendError(
-            f"mi.set_variant({mi.variant()!r}) was called after lightpaint had begun with "
-            f"{backend.variant}: set that before the first scene is loaded, and keep it"
+            f"mi.set_variant({mi.variant()!r}) was called after lightpaint had started with "
+            f"{backend.variant}: set the variant before loading the first scene, and keep it"
         )
 
 
@@ -125,14 +125,14 @@ def _set(mi: Any, variant: str, llvm: Llvm | None) -> Backend:
     _check_is_rgb(variant)
     if variant not in mi.variants():
         raise BackendError(
-            f"Mitsuba here has no variant {variant}: it has {', '.join(mi.variants())}"
+            f"this Mitsuba has no variant {variant}: expected one of {', '.join(mi.variants())}"
         )
     if variant.startswith("llvm") and llvm is None:
         raise BackendError(f"{variant} needs LLVM {OLDEST_LLVM} or newer: {INSTALL_LLVM}")
     try:
         mi.set_variant(variant)
         if not variant.startswith("scalar"):
-            # The first array starts the backend; failing here is better than mid-render.
+            # The first array starts the backend: it should fail here rather than in a render.
             import drjit as dr
 
             _check_llvm_in_use(dr, variant)
@@ -145,11 +145,11 @@ def _set(mi: Any, variant: str, llvm: Llvm | None) -> Backend:
 
 
 def _check_llvm_in_use(dr: Any, variant: str) -> None:
-    """Raise BackendError if Dr.Jit has taken an LLVM that would bring the process down."""
+    """Raise BackendError if Dr.Jit has loaded an LLVM that would crash the process."""
     if variant.startswith("llvm") and (version := dr.detail.llvm_version())[0] < OLDEST_LLVM:
         raise BackendError(
-            f"Mitsuba was imported before lightpaint had a say and took LLVM {version[0]}, which "
-            f"cannot run it: load a scene or call lightpaint.use_variant() before "
+            f"Mitsuba was imported before lightpaint and loaded LLVM {version[0]}, which "
+            f"is too old for it: load a scene or call lightpaint.use_variant() before "
             f"`import mitsuba`, or set DRJIT_LIBLLVM_PATH to LLVM {OLDEST_LLVM} or newer"
         )
 

@@ -97,9 +97,9 @@ def test_lights_that_reach_little_get_their_samples_there(tmp_path: Path) -> Non
     guided = render_basis(scene, spp=512, seed=1)
     chance = np.stack([one_pass(scene, seed=k, spp=16) for k in range(8)])
     variance = np.square(guided.half_differences, dtype=np.float64).mean(axis=(1, 2, 3)) * 512
-    by_chance = chance.var(axis=0, ddof=1).mean(axis=(1, 2, 3)) * 16
+    hit_by_chance = chance.var(axis=0, ddof=1).mean(axis=(1, 2, 3)) * 16
     # At least twice lower for both spots; no claim for a lamp that the wall hides.
-    assert (variance[:2] < 0.5 * by_chance[:2]).all()
+    assert (variance[:2] < 0.5 * hit_by_chance[:2]).all()
 
 
 def test_what_was_learned_goes_through_the_file(tmp_path: Path) -> None:

@@ -402,7 +402,7 @@ def test_wrapped_integrators_hide_what_the_inner_one_hides(tmp_path: Path) -> No
     )
     assert scene.integrator.hide_emitters
     assert not render_basis(scene, spp=4).emitters_seen.any()
-    with pytest.raises(SceneError, match="none inside that renders light"):
+    with pytest.raises(SceneError, match="without one inside that renders light"):
         load_scene(write_room(tmp_path, integrator=f'<integrator type="aov">{aovs}</integrator>'))
 
 

@@ -102,7 +102,7 @@ def test_a_plugin_called_like_one_of_mitsubas_is_never_opened(tmp_path: Path) ->
 def test_nor_one_in_the_place_of_an_integrator_in_python(tmp_path: Path) -> None:
     mark = library(tmp_path, *(f"plugins/{name}" for name in IN_PYTHON))
     path = room_with(tmp_path, "")
-    with pytest.raises(SceneError, match=r"would be run in its place: move that away"):
+    with pytest.raises(SceneError, match=r"would run instead: move that file away"):
         load_scene(path, integrator="prb_projective")
     assert not mark.exists()
 

@@ -1,7 +1,7 @@
-"""Scenes of Mitsuba 0.6, told where Mitsuba 3 refuses them.
+"""Better errors for scenes of Mitsuba 0.6, where Mitsuba 3 refuses them.
 
-Mitsuba 3 renames the parameters of a file that says it is older than 2 (maxDepth to max_depth), and
-knows of nothing else that has changed. There is no converter.
+Mitsuba 3 renames the parameters of a file with a version below 2 (maxDepth to max_depth), and
+handles no other change. There is no converter.
 """
 
 import re
@@ -14,13 +14,13 @@ from lightpaint.file_reading import read_bytes
 from lightpaint.files import one_line
 from lightpaint.scene.checks.tokens import attributes, markup
 
-#: Elements that are a parameter; a `<default>` may be called as people like.
+#: Elements that are a parameter; a `<default>` may have any name.
 _PARAMETERS = frozenset(
     b"boolean float integer string rgb spectrum transform point vector ref texture bsdf".split()
 )
 _CAMEL = re.compile(r"[a-z]+[A-Z][A-Za-z]*")
 
-#: What Mitsuba 3 has instead of elements and plugins of 0.6 that many scenes use.
+#: Successors in Mitsuba 3 of elements and plugins that many scenes of 0.6 use.
 SUCCESSORS = {
     "lookAt": "lookat",
     **dict.fromkeys(("ldrfilm", "mfilm", "tiledhdrfilm"), "hdrfilm"),
@@ -35,47 +35,47 @@ _REFUSED = re.compile(r"unexpected <(\w+)> element|has no \w+ plugin '(\w+)'")
 
 
 @contextmanager
-def words_for_old_scenes(path: Path) -> Iterator[None]:
-    """Where Mitsuba refuses the scene at `path` for its age, say that."""
+def explain_old_scene(path: Path) -> Iterator[None]:
+    """Explain the error if Mitsuba refuses the scene at `path` because it is for 0.6."""
     try:
         yield
     except SceneError as error:
-        # Its cause is Mitsuba's own, where it was that which refused the scene.
-        sign = _sign_of_age(path) if error.__cause__ is not None else ""
-        raise (_of_age(path, sign, str(error)) if sign else error) from error.__cause__
+        # The cause is an exception of Mitsuba's if Mitsuba refused the scene.
+        sign = _sign_of_old_version(path) if error.__cause__ is not None else ""
+        raise (_old_scene_error(path, sign, str(error)) if sign else error) from error.__cause__
 
 
-def _of_age(path: Path, sign: str, said: str) -> SceneError:
-    reason = said.removeprefix("Mitsuba refuses ").removeprefix(f"{path}: ")
-    found = _REFUSED.search(reason)
-    successor = SUCCESSORS.get(found[1] or found[2]) if found else None
-    hint = "write what Mitsuba 3 has instead"
+def _old_scene_error(path: Path, sign: str, message: str) -> SceneError:
+    reason = message.removeprefix("Mitsuba refuses ").removeprefix(f"{path}: ")
+    match = _REFUSED.search(reason)
+    successor = SUCCESSORS.get(match[1] or match[2]) if match else None
+    hint = "write its equivalent of Mitsuba 3"
     if successor is not None:
         hint = f"write {successor} there"
     elif not sign.startswith("version"):
-        hint = "say version 0.6.0 in <scene>, and Mitsuba 3 renames its parameters by itself"
-    if found and "integrator plugin" in reason:
+        hint = 'write version="0.6.0" in <scene>, so that Mitsuba 3 renames its parameters'
+    if match and "integrator plugin" in reason:
         reason, _, hint = reason.partition("; ")
     return SceneError(
-        f"{path} is a scene of Mitsuba 0.6 ({sign}), of which Mitsuba 3 reads only a part, and it "
+        f"{path} is a scene of Mitsuba 0.6 ({sign}), which Mitsuba 3 reads only in part; it "
         f"stops: {reason}; {hint}, or export the scene for Mitsuba 3"
     )
 
 
-def _sign_of_age(path: Path) -> str:
-    """What shows that it is of Mitsuba 0.6; "" if nothing does."""
+def _sign_of_old_version(path: Path) -> str:
+    """Return the evidence that a scene is for Mitsuba 0.6; "" if there is none."""
     try:
         text = read_bytes(path, "scene file", SceneError)
-        tags = [found for found in markup(text) if found["tag"] is not None]
+        tags = [tag for tag in markup(text) if tag["tag"] is not None]
     except (SceneError, ValueError):
         return ""
     version = attributes(tags[0]).get("version", "") if tags else ""
     if re.match(r"\s*0\.", version):
         return f"version {one_line(version)}"
-    for found in tags:
-        if found["tag"] == b"lookAt":
+    for tag in tags:
+        if tag["tag"] == b"lookAt":
             return "it has <lookAt>"
-        name = attributes(found).get("name", "") if found["tag"] in _PARAMETERS else ""
+        name = attributes(tag).get("name", "") if tag["tag"] in _PARAMETERS else ""
         if _CAMEL.fullmatch(name):
             return f"it has the parameter {one_line(name)}, not in snake_case"
     return ""

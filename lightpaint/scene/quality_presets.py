@@ -1,8 +1,8 @@
-"""Presets of samples and resolution, for who would rather not choose numbers.
+"""Presets of samples and resolution.
 
-What they give was measured; docs/benchmarks.md has the table. Noise in the basis makes lights
-too dim, and how much depends on the samples of a pixel, hardly on the number of pixels: so a
-preview saves pixels before it saves samples.
+docs/benchmarks.md has a table of their measured quality. Noise in the basis makes lights too dim,
+depending on the samples per pixel but hardly on the number of pixels, so a preview saves pixels
+rather than samples.
 """
 
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ Quality = Literal["preview", "final"]
 
 @dataclass(frozen=True)
 class Preset:
-    """spp: samples per pixel. pixels: how many a film is reduced to at most, where it can be."""
+    """A preset. spp: samples per pixel. pixels: most pixels of the reduced film, if possible."""
 
     spp: int
     pixels: int | None = None
 
     def reduction(self, film: Film) -> int:
-        """The factor that brings `film` to `pixels`."""
+        """Return the factor that reduces `film` to `pixels`."""
         return 1 if self.pixels is None else reduction_to(film, self.pixels)
 
 
@@ -30,7 +30,7 @@ PRESETS: dict[Quality, Preset] = {"preview": Preset(64, 2**15), "final": Preset(
 
 
 def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Scene:
-    """`scene` on the film that a basis is rendered on: `resolution`, else the preset's.
+    """Return `scene` on the film for its basis: of `resolution`, else of the preset.
 
     Raises SceneError for a resolution that the film cannot be reduced to.
     """
@@ -40,5 +40,5 @@ def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Sc
 
 
 def samples(quality: Quality | None, *, spp: int | None, time_s: float | None) -> int | None:
-    """Samples per pixel of a basis: the preset's where neither they nor a time are given."""
+    """Return the samples per pixel of a basis: the preset's if neither spp nor a time is given."""
     return PRESETS[quality].spp if quality is not None and spp is None and time_s is None else spp
