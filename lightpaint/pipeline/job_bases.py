@@ -12,7 +12,7 @@ from lightpaint.basis.render.render import render_basis, samples_for
 from lightpaint.pipeline.job import Job, PaintedView
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Listener, Progress, labelled, listener
-from lightpaint.scene.presets import samples
+from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene
 
 

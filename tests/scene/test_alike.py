@@ -121,7 +121,7 @@ def test_few_stay_apart() -> None:
         {"unit_flux": None},
         {"unit_flux": 1.0},
         {"obstacle": "is a picture"},
-        {"hangs_on": "glass"},
+        {"belongs_to": "glass"},
         {"kind": image},
     ):
         assert alike_groups([*many[:-1], lamp(MAX_SEPARATE, **other)], ()) == {}

@@ -73,7 +73,9 @@ def test_a_choice_as_text_and_as_xml(text: str, xml: str) -> None:
     "text", ["", "Path", "path:", "path:max_depth", "path:=3", "path:a=", 'a"b', "path,x", "a\n"]
 )
 def test_what_is_no_choice(text: str) -> None:
-    with pytest.raises(SceneError, match="is not an integrator: expected the name of one of Mitsuba's"):
+    with pytest.raises(
+        SceneError, match="is not an integrator: expected the name of one of Mitsuba's"
+    ):
         IntegratorChoice.of(text)
 
 
@@ -206,7 +208,10 @@ OLD = """<scene version="0.6.0">
         (("path", "bdpt"), r"'bdpt'; integrator=\"path\" renders it with another, or"),
         (("independent", "odd"), r"sampler plugin 'odd'; write its equivalent of Mitsuba 3, or"),
         ((' version="0.6.0"', ""), r"the parameter maxDepth.*; write version=.0.6.0. in <scene>"),
-        (("0.6.0", "3.0.0"), r"the parameter maxDepth, not in snake_case\).*; write version=.0.6.0"),
+        (
+            ("0.6.0", "3.0.0"),
+            r"the parameter maxDepth, not in snake_case\).*; write version=.0.6.0",
+        ),
     ],
 )
 def test_a_scene_of_mitsuba_0_6_is_told(
