@@ -36,20 +36,17 @@ from lightpaint.paint.protocol import (
     PictureData,
     PictureUpdate,
     ProgressReport,
-    SampleCount,
     SessionPending,
     SessionState,
-    TableInfo,
     Tone,
-    TransformInfo,
 )
-from lightpaint.paint.session import picture_table
-from lightpaint.paint.session.answer_messages import judge, light_info
+from lightpaint.paint.session.answer_messages import judge
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.session_state import offered_transforms, state_fields
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session.view_pictures import offer_transforms, offer_view, view_info
+from lightpaint.paint.session.view_pictures import offer_transforms, offer_view
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Identity
@@ -174,7 +171,7 @@ class Studio:
             if known is not None and known.version == session.version:
                 found = known.findings
             about |= {"answer": found, "weights": session.weights}
-            return SessionState(**about, **self._session_fields(session), **session.edit_state)
+            return SessionState(**about, **self._state_fields(session), **session.edit_state)
 
     def greet(self, *, is_back: bool) -> Message:
         """Return the state to a page that connects; what another page had begun is kept as it left
@@ -330,7 +327,7 @@ class Studio:
             session = self._session
             for view, clean in zip(session.views, shown, strict=True):
                 offer_view(self.pictures, view, session.transform, clean)
-            offer_transforms(self.pictures, self._transforms(session))
+            offer_transforms(self.pictures, offered_transforms(session))
         self._publish_made(self.state)
         self._solve_loop.notify()
 
@@ -356,34 +353,16 @@ class Studio:
             store.close()  # whoever tries again, as with other constraints, finds it free
             raise
 
-    def _transforms(self, session: Session) -> list[Any]:
-        own = session.transform.name
-        names = [*picture_table.TRANSFORMS, *([own] if own not in picture_table.TRANSFORMS else [])]
-        return [type(session.transform)(name) for name in names]
-
-    def _session_fields(self, session: Session) -> dict[str, Any]:
-        wanted, basis = self.subjects[0].target_spp, session.basis
+    def _state_fields(self, session: Session) -> dict[str, Any]:
+        """Return fields of the state, with what the background knows of it."""
+        assert self._looks is not None
         painted = [view.name for view in session.views if view.is_painted]
         sensors = [""] if len(session.views) == 1 else painted
-        views = tuple(view_info(view) for view in session.views)
         return {
-            "size": views[0].size,
-            "objects": views[0].objects,
-            "lights": tuple(map(light_info, basis.lights, views[0].scales)),
-            "views": views,
-            "transforms": tuple(x.name for x in self._transforms(session)),
-            "transform": TransformInfo(session.transform.name, session.transform.stops),
-            "lut": TableInfo(picture_table.LUT_SIDE, picture_table.LUT_LOW, picture_table.LUT_HIGH),
-            "resources": self.pictures.stable_generations(),
-            "looks": self._looks.infos() if self._looks is not None else (),
-            "basis": SampleCount(
-                spp=basis.origin.spp,
-                wanted=wanted or basis.origin.spp,
-                done=wanted is None or basis.origin.spp >= wanted,
+            **state_fields(
+                session, self.pictures, self._looks, target_spp=self.subjects[0].target_spp
             ),
             "verified": self._jobs.verifications(session.version),
-            "first": not session.store.steps,
-            "stroke": session.stroke,
             "command": self._jobs.solve_command(sensors, session.requests),
         }
 

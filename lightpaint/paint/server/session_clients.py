@@ -14,7 +14,7 @@ from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy.typing as npt
 
@@ -44,6 +44,7 @@ from lightpaint.paint.protocol import (
     VerificationResult,
 )
 from lightpaint.paint.server.client import Client, IncomingMessage
+from lightpaint.paint.server.served_session import ServedSession
 from lightpaint.paint.session_owner import SessionOwner
 from lightpaint.paint.store.store import Store
 from lightpaint.progress import cancellable
@@ -73,24 +74,6 @@ OBSERVED_EVENTS = (
 )
 
 _Result = TypeVar("_Result")
-
-
-class ServedSession(Protocol):
-    """A session, as the server sees it."""
-
-    on_message: Callable[[Message], None] | None
-
-    def handle(self, request: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
-        """Return the answers; the first one replies to the request. Raises LightpaintError."""
-
-    def greet(self, *, is_back: bool) -> Message:
-        """Return the state for a page. is_back: it had the session before, and nobody since."""
-
-    def state(self) -> Message:
-        """Return the state, and change nothing."""
-
-    def resource(self, name: str) -> npt.NDArray[Any]:
-        """Return a picture. Raises PaintError if there is none of that name."""
 
 
 class Connections:

@@ -1,0 +1,29 @@
+"""The interface between a painter's server and the session that it serves."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy.typing as npt
+
+from lightpaint.paint.protocol import (
+    AnyRequest,
+    Message,
+)
+
+
+class ServedSession(Protocol):
+    """A session, as the server sees it."""
+
+    on_message: Callable[[Message], None] | None
+
+    def handle(self, request: AnyRequest, arrays: dict[str, npt.NDArray[Any]]) -> list[Message]:
+        """Return the answers; the first one replies to the request. Raises LightpaintError."""
+
+    def greet(self, *, is_back: bool) -> Message:
+        """Return the state for a page. is_back: it had the session before, and nobody since."""
+
+    def state(self) -> Message:
+        """Return the state, and change nothing."""
+
+    def resource(self, name: str) -> npt.NDArray[Any]:
+        """Return a picture. Raises PaintError if there is none of that name."""

@@ -1,0 +1,48 @@
+"""The state of a session, as a client is told that connects: lights, views, pictures and looks."""
+
+from typing import Any
+
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.paint.protocol import SampleCount, TableInfo, TransformInfo
+from lightpaint.paint.session import picture_table
+from lightpaint.paint.session.answer_messages import light_info
+from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.picture_table import PictureTable
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.view_pictures import view_info
+
+
+def state_fields(
+    session: Session, pictures: PictureTable, looks: LookLibrary, *, target_spp: int | None
+) -> dict[str, Any]:
+    """Return fields of `SessionState`.
+
+    target_spp: the samples per pixel that the basis will have; None for those that it has.
+    """
+    basis = session.basis
+    views = tuple(view_info(view) for view in session.views)
+    return {
+        "size": views[0].size,
+        "objects": views[0].objects,
+        "lights": tuple(map(light_info, basis.lights, views[0].scales)),
+        "views": views,
+        "transforms": tuple(transform.name for transform in offered_transforms(session)),
+        "transform": TransformInfo(session.transform.name, session.transform.stops),
+        "lut": TableInfo(picture_table.LUT_SIDE, picture_table.LUT_LOW, picture_table.LUT_HIGH),
+        "resources": pictures.stable_generations(),
+        "looks": looks.infos(),
+        "basis": SampleCount(
+            spp=basis.origin.spp,
+            wanted=target_spp or basis.origin.spp,
+            done=target_spp is None or basis.origin.spp >= target_spp,
+        ),
+        "first": not session.store.steps,
+        "stroke": session.stroke,
+    }
+
+
+def offered_transforms(session: Session) -> list[ViewTransform]:
+    """Return the view transforms that a page can show, the session's own among them."""
+    own = session.transform.name
+    names = [*picture_table.TRANSFORMS, *([own] if own not in picture_table.TRANSFORMS else [])]
+    return [type(session.transform)(name) for name in names]
