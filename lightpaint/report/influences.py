@@ -25,9 +25,7 @@ def fit_clauses(solution: Solution) -> tuple[str, ...]:
 
 
 def fit_sentence(solution: Solution, *, instead: str = "") -> str:
-    """Return a sentence on the options of the fit. instead: a clause on how to switch them off.
-    instead: what leaves all of it, after what was used.
-    """
+    """Return a sentence on the options of the fit. instead: a clause on how to switch them off."""
     if not (used := fit_clauses(solution)):
         return "The painting is fitted literally: linear light, nothing held, any colour."
     said = "; ".join([*used, *([instead] if instead else [])])

@@ -202,7 +202,7 @@ def spoken_delta_e(seen: Seen, *, known: bool) -> str:
 
 
 def spoken_blindness(verification: Verification) -> str:
-    """Name the least detectable lights: `It would probably have missed an error of 5 % in bulb`."""
+    """Name the least detectable lights: `The render would probably have missed … in bulb`."""
     unseen, power = verification.unseen, verification.power or {}
     others, more = [name for name in power if name not in unseen], len(unseen) - MAX_UNSEEN_NAMES
     if more > 0 and len(others) <= MAX_UNSEEN_NAMES:
@@ -213,7 +213,7 @@ def spoken_blindness(verification: Verification) -> str:
         )
         *most, last = least
         names = f"{', '.join(most)} and {last}" if most else last
-    return f"It would probably have missed an error of {100 * ERROR:.0f} % in {names}"
+    return f"The render would probably have missed an error of {100 * ERROR:.0f} % in {names}"
 
 
 def agreement(verification: Verification | None) -> str:

@@ -50,7 +50,8 @@ def key_brighter(shot: Path) -> np.ndarray:
 def test_light_groups_are_painted_on_and_answered(shot: Path, tmp_path: Path):
     said = succeed(tmp_path, "template", "--lights", "shot.exr")
     first = (
-        "template/template.png: paint over it, in any program, and save the painting beside it\n"
+        "template/template.png: the current look; paint over it in any program, "
+        "save that under another name beside it, and solve for it\n"
     )
     assert first in said
     basis = read_light_groups(shot).basis

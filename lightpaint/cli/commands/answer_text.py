@@ -59,7 +59,7 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
     else:
         _show_short(look)
     terminal.write("")
-    terminal.tell(fit_sentence(look.solution, instead="--literal for none of this"))
+    terminal.tell(fit_sentence(look.solution, instead="--literal turns this off"))
     certificate = look.solution.certificate
     if curve := certificate.curve:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)

@@ -137,21 +137,23 @@ def _shown_template(
 
 
 def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = True) -> list[str]:
-    """Return what is said of the files of a template, those to paint over first."""
+    """Return a line on each file of a template, those to paint over first."""
     is_tree = is_folder(output)
     picture = output / SHOWN if is_tree else output.with_suffix(".png")
-    told = "; it is denoised" if is_denoised else ""
-    lines = [f"{picture}: paint over it, in any program, and save the painting beside it{told}"]
+    look = "the current look, denoised" if is_denoised else "the current look"
+    steps = "paint over it in any program, save that under another name beside it, and solve for it"
+    lines = [f"{picture}: {look}; {steps}"]
     if CLEAN in {file.name for file in files}:
         lines.append(
             f"{output / CLEAN}: the same in linear light, to paint over in programs that know EXR"
         )
-    its = "as it was rendered, with its grain" if is_denoised else "the same in linear light"
+    its = "the look as rendered, with its noise" if is_denoised else "the same in linear light"
     lines.append(f"{output / LIGHT if is_tree else output}: {its}")
     if is_tree and (output / MATTES) in {file.parent for file in files}:
-        lines.append(f"{output}/{MATTES}, {output}/{LIGHTS}: what to select, and what lights do")
+        lines.append(f"{output}/{MATTES}: a mask for each object")
+        lines.append(f"{output}/{LIGHTS}: what each light does alone")
     elif is_tree:
-        lines.append(f"{output}/{LIGHTS}: what lights do")
+        lines.append(f"{output}/{LIGHTS}: what each light does alone")
     return lines
 
 
@@ -162,7 +164,9 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOut
     options += [f"-m {variant}"] if variant else []
     files = shlex.join(map(str, (made.scene, made.painting, "-o", made.answer)))
     command = " ".join(("lightpaint solve", files, *options))
-    terminal.say(f"a gallery, and a painting of it at evening, are in {folder}; what runs is")
+    terminal.say(
+        f"wrote a gallery and a painting of it in the evening to {folder}; this solves for it:"
+    )
     terminal.say(command)
     scene = SceneFile(str(made.scene), variant=variant)
     settings = replace(settings, command=from_any_folder(command))
