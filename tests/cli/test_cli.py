@@ -421,7 +421,7 @@ def test_nothing_is_printed_but_one_line_for_mistakes(basis_file: Path, tmp_path
     assert "must end in .exr" in refused(here, "basis", CORNELL, "-o", "basis.png")
     assert "no such lighting" in refused(here, "relight", CORNELL, "gone.json")
     assert "not a JSON" in refused(here, "relight", CORNELL, "bad/file")
-    assert "no result folder" in refused(here, "verify", "bad")
+    assert "not a result folder" in refused(here, "verify", "bad")
     # Another variant, nothing but parsing, and a scene that is loaded: by processes of their own.
     for arguments, words in (
         (("lights", CORNELL, "-m", "llvm_ad_nonsense_rgb"), "no variant"),
