@@ -1,7 +1,10 @@
 """Names: a class or a module is called like no other, so that a search finds one thing."""
 
 import ast
-from collections import defaultdict
+import io
+import re
+import tokenize
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,3 +48,30 @@ def test_no_two_classes_have_one_name() -> None:
 
 def test_no_two_modules_have_one_name() -> None:
     assert _twice(_modules()).keys() == MODULES_TWICE.keys()
+
+
+#: Names in backticks that are none of the code: files, processors and examples.
+FOREIGN = re.compile(r"Haswell|\w+_\d+|statue_head|ViewLayer\.\w+|shot_key_v1")
+
+
+def _names_in_backticks(token: tokenize.TokenInfo) -> Iterator[str]:
+    """Names with an underscore, a dot or a capital, which are no words of a language."""
+    for name in re.findall(r"`([A-Za-z_]\w*(?:\.\w+)*)(?:\(\))?`", token.string):
+        if ("_" in name or "." in name or name[0].isupper()) and not FOREIGN.fullmatch(name):
+            yield name
+
+
+def test_names_in_docstrings_and_comments_are_there() -> None:
+    """Renamed without its mentions, a thing is looked for in vain."""
+    known: Counter[str] = Counter()
+    told = []
+    for path in HERE.rglob("*.py"):
+        source = io.StringIO(path.read_text(encoding="utf-8"))
+        for token in tokenize.generate_tokens(source.readline):
+            is_docstring = token.type == tokenize.STRING and token.string.endswith('"""')
+            if is_docstring or token.type == tokenize.COMMENT:
+                told += [(name, path.name) for name in _names_in_backticks(token)]
+            else:
+                known.update(re.findall(r"\w+", token.string))
+    lost = {(name, file) for name, file in told if not known[name.rpartition(".")[2]]}
+    assert not lost

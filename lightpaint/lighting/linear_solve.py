@@ -64,9 +64,7 @@ def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
 def solve_reduction(
     problem: _Problem, start: Doubles, reached: Bools | None = None
 ) -> LinearAnswer[_Problem]:
-    """Solve the squares under the present reduction. reached: see `answer_of`. reached: as of
-    `answer_of`.
-    """
+    """Solve the squares under the present reduction. reached: as of `make_answer`."""
     equations, method = problem.with_pull(problem.solved), problem.fit.method
     reduction, optimum = solve_on_locus(equations, problem.reduction, start, method=method)
     return make_answer(problem.with_whites(reduction), optimum, optimum.weights, equations, reached)

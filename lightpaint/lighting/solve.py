@@ -175,9 +175,7 @@ def _solve_squares(problem: Problem, start: Doubles) -> Solution:
 def _solve_under_reduction(
     problem: Problem, start: Doubles, reached: Bools | None = None
 ) -> Solution:
-    """Solve the squares under the present reduction. reached: see `answer_of`. reached: as of
-    `answer_of`.
-    """
+    """Solve the squares under the present reduction. reached: as of `make_answer`."""
     return _solution(solve_reduction(problem, start, reached))
 
 
@@ -195,7 +193,7 @@ def _descend(
 ) -> Solution:
     """Descend from weights (n, 3) to the least loss under the constraints.
 
-    reached: see `answer_of`. blocks: see `_blocks_of`. is_near: whether the start is near the
+    reached: as of `make_answer`. blocks: as of `_blocks_of`. is_near: whether the start is near the
     least. The two whites that lights mix, and the lights that are confined to their gamuts, stay
     the same while the loss falls, and are chosen anew at its minimum.
     """

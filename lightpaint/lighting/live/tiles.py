@@ -265,7 +265,9 @@ def _sum_pyramid(pyramid: list[Doubles], rows: range, columns: range) -> None:
 
 
 def tile_side(n: int, height: int, width: int) -> int:
-    """Return the side of a tile in pixels: `SIDE`, or more to keep all sums within `ROOM`."""
+    """Return the side of a tile in pixels: `TILE_SIDE`, or more to keep all sums within
+    `MAX_SUM_BYTES`.
+    """
     node_bytes = 3 * (n * n + n + 1) * 8
     side = TILE_SIDE
     # There are at most four nodes for each tile, inner ones and unused leaves included.

@@ -3,7 +3,7 @@
 A solve needs two things of any other loss: the loss of some pixels, and squares with the same
 gradient there (`PixelLoss`). `reweighting.py` solves such squares repeatedly, and chooses the
 length of each step by the loss itself. A new loss is a module with a `Loss` and its `PixelLoss`,
-and a line in `painting.loss_of`, which chooses one.
+and a line in `painting.choose_loss`, which chooses one.
 """
 
 from abc import ABC, abstractmethod

@@ -49,8 +49,9 @@ def ignored_paint(target: Target, seen: Bools, emitters: Emitters) -> Bools:
 
 
 def resolve_importance(target: Target, seen: Bools, emitters: Emitters = "auto") -> Target:
-    """Return `target` with the final importance of each pixel. seen, emitters: see `left_out`.
-    seen, emitters: as of `left_out`.
+    """Return `target` with the final importance of each pixel.
+
+    seen, emitters: as of `ignored_paint`.
 
     Raises TargetError if nothing is left.
     """

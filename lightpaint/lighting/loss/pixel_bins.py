@@ -61,7 +61,7 @@ class BinnedPixels:
     @cached_property
     def prior(self) -> NormalEquations:
         """The pull s Σᵢ Nᵢ (wᵢ − presentᵢ)², Nᵢ the noise's power in the blocks of light i, s
-        `PRIOR`.
+        `PRIOR_STRENGTH`.
 
         Samples determine a light as far as its power exceeds its noise; for a light that is all
         noise the present is the best guess. M contains N anyway, where it pulls towards 0.

@@ -6,7 +6,7 @@ it; canvas, requests and answer follow from them alone, so that undoing, loading
 another order lead to the same bits.
 
 One lighting answers the paintings of all its views. While a brush is down the answer is that of
-`Live`; `accept_solution` takes the exact one, which is what `lightpaint solve` finds for the
+`LiveAnswer`; `accept_solution` takes the exact one, which is what `lightpaint solve` finds for the
 exported paintings.
 """
 
