@@ -40,8 +40,9 @@ WHITE_MARGIN = 0.004
 #: twice that of the paint itself from whites, since whoever paints white means white.
 PAINTED_MARGIN = 0.01
 
-#: Distance from whites of all temperatures that a colour may have, relative to that of the paint.
-PAINTED_FACTOR = 3
+#: Distance from whites of all temperatures that a colour may have, relative to that of the paint:
+#: large, so that only paint that is a white of any temperature is taken for one.
+PAINTED_FACTOR = 10
 
 #: Rounding of bounds, in (u', v'): too small to see, and it keeps bounds equal between strokes.
 REACH_STEP = 0.001
@@ -146,7 +147,7 @@ class Gamuts:
             beside = np.clip(2 * (wanted - own + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
             reach = np.maximum(own, wanted + beside)
             # Paint that is cooler or warmer asks for other whites, and for none that is greener.
-            off = max(self._off_white[light], 2 * REACH_STEP)
+            off = max(self._off_white[light], WHITE_MARGIN)
             painted = np.maximum(wanted - self._whites - self._tolerance, 0)
             whites = np.maximum(own, self._whites + off)
             reach = np.minimum(reach, whites + PAINTED_FACTOR * painted)
