@@ -22,13 +22,13 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import BLOCK
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.target.target import Target
 from lightpaint.threads import one_thread
 

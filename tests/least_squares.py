@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.lighting.constraints.knobs import Knob
-from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced
-from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
+from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.target.target import Target
 
 

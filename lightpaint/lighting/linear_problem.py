@@ -8,12 +8,12 @@ from lightpaint.arrays import Bools, Doubles
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.gamuts import Gamuts
-from lightpaint.lighting.constraints.reduction import Reduction, reduce_to
 from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.weight_penalty import weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.gamuts import Gamuts
+from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
 from lightpaint.screen import short_repr
 
 

@@ -10,12 +10,12 @@ from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.software_versions import Software
-from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, reduced_problems
-from lightpaint.lighting.constraints.reduction import only_knobs
-from lightpaint.lighting.constraints.sparse_lights import choose_knobs
-from lightpaint.lighting.constraints.white_neighbours import solve_on_locus
 from lightpaint.lighting.linear_problem import LinearProblem
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, reduced_problems
+from lightpaint.lighting.unknowns.reduction import only_knobs
+from lightpaint.lighting.unknowns.sparse_lights import choose_knobs
+from lightpaint.lighting.unknowns.white_neighbours import solve_on_locus
 
 #: Gradient, with a unit diagonal and relative to b, from which a constraint has an effect.
 MIN_PULL = 1e-7

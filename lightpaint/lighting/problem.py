@@ -16,9 +16,6 @@ from lightpaint.errors import BasisError, ConstraintError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.white_neighbours import tangent_reduction
 from lightpaint.lighting.fit import Fit, Space, resolve_for_targets
 from lightpaint.lighting.linear_problem import LinearProblem, reduce_lights
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -34,6 +31,9 @@ from lightpaint.lighting.loss.painting import (
 )
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.round_off import remove_traces
+from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.white_neighbours import tangent_reduction
 from lightpaint.lighting.views import Views, joint_basis
 from lightpaint.screen import short_repr
 from lightpaint.target.target import Target

@@ -9,11 +9,6 @@ from lightpaint.basis.basis import Basis
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduced_problem import (
-    ReducedOptimum,
-    solve_reduced,
-)
-from lightpaint.lighting.constraints.white_neighbours import next_whites
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.linear_solve import (
     LinearAnswer,
@@ -30,6 +25,11 @@ from lightpaint.lighting.loss.weight_penalty import dimming_factors, pull_to_pre
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns.reduced_problem import (
+    ReducedOptimum,
+    solve_reduced,
+)
+from lightpaint.lighting.unknowns.white_neighbours import next_whites
 from lightpaint.target.target import Target
 
 #: Most steps of lights to other whites, for a loss that is not linear, and the share of the loss

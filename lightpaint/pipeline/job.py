@@ -19,8 +19,8 @@ from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
-from lightpaint.lighting.constraints.reduction import reduce_to
 from lightpaint.lighting.fit import resolve_for_targets
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.pipeline.answer_folder import answer_files
 from lightpaint.pipeline.job_record import decode_job, encode_job
 from lightpaint.pipeline.remarks import (

@@ -16,8 +16,8 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.planes import mix
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
-from lightpaint.lighting.constraints.reduced_problem import ReducedProblem, reduced_problems
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.reduced_problem import ReducedProblem, reduced_problems
 from lightpaint.placement.candidates import Candidates
 
 #: Most promising candidates that the problem is solved again for.

@@ -13,10 +13,10 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import mix
 from lightpaint.errors import SizeError
 from lightpaint.images.pixel_blocks import block_mean, whole_factor
-from lightpaint.lighting.constraints.knobs import Knob
-from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.threads import one_thread
 
 

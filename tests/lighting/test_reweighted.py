@@ -18,7 +18,6 @@ from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduced_problem import solve_reduced
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss import reweighting
 from lightpaint.lighting.loss.loss import image_of, planes_of
@@ -27,6 +26,7 @@ from lightpaint.lighting.normal_equations import inner_products
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve, solve_again
+from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
 from lightpaint.target.target import Target
 
 SIZE = (8, 9)

@@ -19,9 +19,9 @@ from lightpaint.lighting import solve as solve_module
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting_file import write_lighting
-from lightpaint.lighting.constraints import reduced_problem
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
+from lightpaint.lighting.unknowns import reduced_problem
 from lightpaint.pipeline.results import Look, write_report
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.relit.verification import compare

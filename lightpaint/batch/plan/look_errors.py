@@ -15,7 +15,7 @@ from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LOOK_ERRORS, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduction import reduce_to
+from lightpaint.lighting.unknowns.reduction import reduce_to
 from lightpaint.pipeline.sources import check_nothing_unused, content
 from lightpaint.scene.quality_presets import on_film
 

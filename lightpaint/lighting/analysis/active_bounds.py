@@ -12,9 +12,9 @@ from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.lighting.answer.active_bound import Kind, Per
-from lightpaint.lighting.constraints.knobs import Knob, Unknown
-from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum
-from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.unknowns.knobs import Knob, Unknown
+from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum
+from lightpaint.lighting.unknowns.reduction import Reduction
 
 
 @dataclass(frozen=True)

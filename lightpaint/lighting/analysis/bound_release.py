@@ -15,12 +15,12 @@ from lightpaint.lighting.analysis.active_bounds import (
     find_active_bounds,
 )
 from lightpaint.lighting.answer.active_bound import Bound, Tint
-from lightpaint.lighting.constraints.knobs import Knob
-from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.white_neighbours import move_to_best_white, next_whites
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.white_neighbours import move_to_best_white, next_whites
 
 #: The most bounds to release; for large problems, about MAX_UNKNOWNS unknowns in all; the fewest
 #: bounds.

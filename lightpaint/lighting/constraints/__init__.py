@@ -1,1 +1,1 @@
-"""Constraints on lights, and the unknowns that they leave."""
+"""Constraints on lights: what people ask of them."""

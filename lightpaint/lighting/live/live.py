@@ -20,16 +20,6 @@ from typing import Any
 
 from lightpaint.arrays import Doubles
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.gamut_bounds import solve_near_sides
-from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.white_neighbours import (
-    center_windows,
-    clip_to_gamuts,
-    next_whites,
-    snap_to_whites,
-)
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live_sums import MAX_FILM_PIXELS, Films, SmallFilm
@@ -43,6 +33,16 @@ from lightpaint.lighting.loss.weight_penalty import (
     weight_pull,
 )
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
+from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.white_neighbours import (
+    center_windows,
+    clip_to_gamuts,
+    next_whites,
+    snap_to_whites,
+)
 
 #: Most steps between whites for one answer; the next answer goes on.
 WHITE_STEPS = 2

@@ -16,8 +16,8 @@ from lightpaint.colour.white_range import white_range
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.reduced_problem import reduced_problems
 from lightpaint.lighting.solve import solve
+from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
 from lightpaint.target.target import Target
 
 SIZE = (5, 4)

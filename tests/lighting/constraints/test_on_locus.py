@@ -9,13 +9,13 @@ from scipy.optimize import nnls
 
 import lightpaint as lp
 from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
-from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.white_neighbours import next_whites
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
+from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.white_neighbours import next_whites
 
 SIZE = (12, 10)
 

@@ -15,9 +15,6 @@ from lightpaint.arrays import RGB, Doubles, as_rgb
 from lightpaint.colour.color import luminance
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
-from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.reduction import only_knobs
-from lightpaint.lighting.constraints.white_neighbours import next_whites, solve_on_locus
 from lightpaint.lighting.fit import Colors
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -32,6 +29,9 @@ from lightpaint.lighting.loss.weight_penalty import dimming_factors
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem, gamuts_for
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduction import only_knobs
+from lightpaint.lighting.unknowns.white_neighbours import next_whites, solve_on_locus
 from lightpaint.screen import short_repr
 
 #: The least number of pixels in a sample, the pixels for each light, and compared painted pixels.

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Indices
-from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduction import Reduction
 
 #: Relative distance at which a sum counts as at its limit.
 AT_LIMIT = 1e-9

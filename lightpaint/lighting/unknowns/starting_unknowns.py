@@ -5,8 +5,8 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.algebra.optimum import minimise, minimise_each
 from lightpaint.lighting.algebra.quadratic import Cap, clip_to_sums
-from lightpaint.lighting.constraints.knobs import Knob
-from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduction import Reduction
 
 #: Determinant of the colours that a light mixes, relative to their size, below which they are too
 #: alike.

@@ -11,9 +11,9 @@ import numpy as np
 
 from lightpaint.errors import ConstraintError
 from lightpaint.lighting.algebra.optimum import minimise
-from lightpaint.lighting.constraints.knobs import Knob
-from lightpaint.lighting.constraints.reduced_problem import ReducedProblem
-from lightpaint.lighting.constraints.reduction import Reduction
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduced_problem import ReducedProblem
+from lightpaint.lighting.unknowns.reduction import Reduction
 
 #: Sizes beyond K that are tried, so that people see the gain of a few more lights.
 EXTRA_SIZES = 2

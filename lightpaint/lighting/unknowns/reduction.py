@@ -18,8 +18,9 @@ from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.basis.lights import BasisLight
 from lightpaint.lighting.algebra.quadratic import Cap
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.constraints.gamuts import Gamuts
-from lightpaint.lighting.constraints.knobs import (
+from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
+from lightpaint.lighting.unknowns.gamuts import Gamuts
+from lightpaint.lighting.unknowns.knobs import (
     Knob,
     Unknown,
     dimmer_knob,
@@ -27,8 +28,7 @@ from lightpaint.lighting.constraints.knobs import (
     mixing_knob,
     tied_knob,
 )
-from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
-from lightpaint.lighting.constraints.unknown_blocks import (
+from lightpaint.lighting.unknowns.unknown_blocks import (
     AlikeBlocks,
     Block,
     Entries,

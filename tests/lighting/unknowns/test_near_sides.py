@@ -8,15 +8,15 @@ import pytest
 import lightpaint as lp
 from lightpaint.colour.color_hull import ColorHull, reach_of
 from lightpaint.colour.white_range import white_range
-from lightpaint.lighting.constraints import gamut_bounds
-from lightpaint.lighting.constraints.gamut_bounds import solve_near_sides
-from lightpaint.lighting.constraints.gamuts import Gamuts, PaintedLight
-from lightpaint.lighting.constraints.reduced_problem import solve_reduced
-from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.starting_unknowns import nearest_unknowns
-from lightpaint.lighting.constraints.white_neighbours import next_whites
 from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns import gamut_bounds
+from lightpaint.lighting.unknowns.gamut_bounds import solve_near_sides
+from lightpaint.lighting.unknowns.gamuts import Gamuts, PaintedLight
+from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.starting_unknowns import nearest_unknowns
+from lightpaint.lighting.unknowns.white_neighbours import next_whites
 
 SIZE = (9, 8)
 

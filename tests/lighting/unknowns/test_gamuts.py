@@ -10,10 +10,10 @@ from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.color_hull import DIRECTIONS, chromaticity
 from lightpaint.colour.white_range import white_range
 from lightpaint.lighting import problem
-from lightpaint.lighting.constraints.gamuts import PAINTED_MARGIN
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.unknowns.gamuts import PAINTED_MARGIN
 
 SIZE = (24, 30)
 

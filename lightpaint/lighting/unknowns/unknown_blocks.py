@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.lighting.algebra.quadratic import Cap
-from lightpaint.lighting.constraints.knobs import Knob
+from lightpaint.lighting.unknowns.knobs import Knob
 
 
 @dataclass(frozen=True)

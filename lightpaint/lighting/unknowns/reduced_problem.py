@@ -13,10 +13,10 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Indices
 from lightpaint.lighting.algebra.optimum import Method, Optimum, minimise, minimise_each
 from lightpaint.lighting.algebra.quadratic import Cap
-from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.starting_unknowns import nearest_unknowns
-from lightpaint.lighting.constraints.unknown_blocks import Block
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.starting_unknowns import nearest_unknowns
+from lightpaint.lighting.unknowns.unknown_blocks import Block
 from lightpaint.threads import parallel_map
 
 #: Pull towards the start in channels where a light reaches nothing, relative to its other channels.

@@ -10,10 +10,10 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.colour.color_hull import ColorHull
 from lightpaint.lighting.algebra.optimum import Method
-from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced
-from lightpaint.lighting.constraints.reduction import Reduction
-from lightpaint.lighting.constraints.white_neighbours import knobs_outside_gamuts
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
+from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.lighting.unknowns.white_neighbours import knobs_outside_gamuts
 
 #: Times that lights move to other sides for one answer, at most.
 MAX_TURNS = 3

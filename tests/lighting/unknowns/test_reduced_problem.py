@@ -9,8 +9,8 @@ from nightly import seeds
 from scipy.optimize import nnls
 
 from lightpaint.lighting.algebra.quadratic import kkt_residual
-from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum
 
 # The solver stops at a KKT residual of 1e-10, which leaves an error of the weights of at most
 # that times the condition of the Gram matrix: 10 to 100 here, a few hundred at worst, so that

@@ -17,10 +17,10 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
 from lightpaint.colour.white_range import WhiteRange
-from lightpaint.lighting.constraints.knobs import Knob
-from lightpaint.lighting.constraints.reduced_problem import ReducedOptimum, solve_reduced
-from lightpaint.lighting.constraints.reduction import Reduction
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.knobs import Knob
+from lightpaint.lighting.unknowns.reduced_problem import ReducedOptimum, solve_reduced
+from lightpaint.lighting.unknowns.reduction import Reduction
 
 #: Widths of windows, in pieces of the range, before they are of one piece.
 WINDOW_WIDTHS = (8, 2)

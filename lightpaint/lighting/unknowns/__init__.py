@@ -1,0 +1,1 @@
+"""Unknowns that constraints leave of the lights, and the solve in these."""
