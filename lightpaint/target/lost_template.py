@@ -18,14 +18,14 @@ SMOOTH = 0.1
 PIXELS, WHITE = 20_000, 0.998
 
 
-def what_became_of(mine: Floats, its: Floats) -> str:
-    """Return a clause on what happened to the whole template; empty if it was painted.
+def explain_mismatch(mine: Floats, its: Floats) -> str:
+    """Return a clause on why the whole template differs; empty if it was painted over.
 
     mine, its: (h, w, 3), display values of painting and template.
     """
     if _is_function(mine, its):
         return (
-            "all of it by one change of colours: if that is no grading of yours, it was saved "
+            "all of it by one change of colours: unless you graded it, it was saved "
             "through another view or profile (transform=..., mask=...)"
         )
     for how, turned in _turned(its):

@@ -14,7 +14,7 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.images.picture import Picture, read_mask, read_picture
 from lightpaint.keywords import keywords
 from lightpaint.target.look_match import view_of_look
-from lightpaint.target.lost_template import what_became_of
+from lightpaint.target.lost_template import explain_mismatch
 from lightpaint.target.painted_pixels import SHARP_RADIUS, painted_where
 from lightpaint.target.painting_file import painted_of
 from lightpaint.target.target import Target, share_of, spoken_share
@@ -254,7 +254,7 @@ def _of_all(picture: Picture, template: Template) -> str:
     mine, its = (transform.encode(x) for x in (picture.image, template.image))
     if picture.lossy:  # which leaves the means of a few pixels as they are
         mine, its = (box_mean(x, SHARP_RADIUS) for x in (mine, its))
-    return what_became_of(mine, its)
+    return explain_mismatch(mine, its)
 
 
 def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]:

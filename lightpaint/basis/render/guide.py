@@ -1,9 +1,9 @@
 """Which emitter to sample from where, learned from earlier passes.
 
-A path tracer that draws emitters at random asks most of them in vain: a spot whose cone is
+A path tracer that chooses emitters at random samples most of them in vain: a spot whose cone is
 elsewhere, a window behind a wall. Space is divided into cells, and each cell remembers what
 its surface points received from every emitter, shadows included. The next pass draws an
-emitter with a probability that follows it, relative to what the light of that emitter does
+emitter with a probability that follows that light, relative to what the light of that emitter does
 in the whole picture, so that a faint light gets its rays where it matters as well as a
 bright one. A remainder is drawn evenly: no emitter is left out anywhere, so that the mean of
 every image does not depend on what has been learned.
@@ -25,23 +25,23 @@ from lightpaint.basis.render.sobol import hashed
 
 #: Share of the samples that is spread evenly over the emitters of a cell.
 EVEN_SHARE = 0.1
-#: Questions after which there is little left to learn: in all, and for each emitter.
+#: Samples of emitters after which there is little left to learn: in all, and for each emitter.
 ENOUGH, ENOUGH_EACH = 2**23, 2**17
-#: Samples' worth of trust in the mean over all cells, against what a cell has seen itself.
+#: Weight of the mean over all cells, in samples of the cell itself.
 PRIOR_SAMPLES = 0.5
-#: Distance from the camera over the width of a cell, at most; at least half of that.
+#: Largest ratio of a cell's distance from the camera to its width; the least is half of that.
 CELLS_PER_DISTANCE = 24.0
-#: Bounds for the size of the table: entries in all, and cells.
+#: Largest size of the table: entries in all, and cells.
 ENTRIES, CELLS = 2**22, 2**16
 
 
 class Guide:
     """Probabilities of emitters by cell, and what they are learned from.
 
-    scene: an `mi.Scene`; its emitters are what is chosen from.
+    scene: an `mi.Scene`, whose emitters it chooses from.
     light_of: UInt32 array, the light that an emitter belongs to, by its Dr.Jit instance id.
-    eye: where the camera stands; cells are smaller near it.
-    learned: what `learned()` of an earlier one returned; nothing if that cannot be so.
+    eye: position of the camera; cells are smaller near it.
+    learned: table that `learned()` of an earlier guide returned; ignored if it is implausible.
     """
 
     def __init__(self, scene: Any, light_of: Any, eye: Any, learned: Floats | None = None) -> None:
@@ -54,35 +54,35 @@ class Guide:
         index_of = np.zeros(instances.max() + 1, np.uint32)
         index_of[instances] = np.arange(self.count)
         self._index_of = mi.UInt32(index_of)
-        # What the scene says is never to be sampled is dark, if it is a point.
+        # Emitters that the scene never samples are not chosen; point lights among them are dark.
         self._sampled = np.array([emitter.sampling_weight() > 0 for emitter in scene.emitters()])
         shape = (2, self.cells, self.count)
         if learned is None or learned.shape != shape or not _is_sane(learned):
             learned = np.zeros(shape, np.float32)
-        # In double precision the order of additions, which differs between runs, is not felt.
+        # In double precision the order of additions, which differs between runs, has no effect.
         self.received = mi.Float64(learned[0].ravel().astype(np.float64))
         self.asked = mi.UInt32(learned[1].ravel().astype(np.uint32))
         self._learning = True
         self.update()
 
     def learned(self) -> Floats:
-        """(2, cells, emitters) float32: what was received in all, and how often it was asked."""
+        """Return (2, cells, emitters) float32: the light received in all, the number of samples."""
         return np.stack(
             [np.array(x).reshape(self.cells, self.count) for x in (self.received, self.asked)]
         ).astype(np.float32)
 
     def freeze(self) -> None:
-        """Learn nothing more: what is drawn then does not depend on what was rendered before."""
+        """Stop learning, so that later choices do not depend on what has been rendered."""
         self._learning = False
         self._learns = dr.opaque(mi.Bool, False)
 
     def update(self) -> None:
-        """Take what the passes since the last call have learned into the probabilities."""
+        """Update the probabilities by what passes have learned since the last call."""
         if not self._learning:
             return
-        # As it will be read from a file, so that going on from one makes no difference.
+        # Rounded as in a file, so that continuing from a file makes no difference.
         received, asked = self.learned()
-        # Most cells of the table are nowhere: there the choice is even.
+        # Most cells of the table hold no surface: there the choice is even.
         known = asked.any(axis=1)
         even = np.cumsum(self._sampled, dtype=np.float32) / self._sampled.sum()
         cumulative = np.tile(even, (self.cells, 1))
@@ -100,7 +100,7 @@ class Guide:
         dr.eval(self._cumulative)
 
     def cell(self, si):
-        """Index of the cell that a surface point belongs to: by place, and side it is seen from."""
+        """Return the index of a surface point's cell, by its place and the side it is seen from."""
         # The exponent of a float is its logarithm: cells are powers of two wide.
         distance = dr.norm(si.p - self.eye) * (1 / CELLS_PER_DISTANCE)
         exponent = dr.clip(dr.reinterpret_array(mi.UInt32, distance) >> 23, 1, 252)
@@ -118,7 +118,7 @@ class Guide:
         return hashed(key) & (self.cells - 1)
 
     def choose(self, cell, number, active):
-        """(emitter, its probability, `number` made uniform again within it), per path."""
+        """Return per path an emitter, its probability, and `number` made uniform again in it."""
         first = cell * self.count
         emitter = dr.binary_search(
             0,
@@ -129,19 +129,19 @@ class Guide:
         return emitter, probability, dr.minimum((number - below) / probability, _BELOW_1)
 
     def probability(self, cell, emitter, active):
-        """Probability with which `choose` draws `emitter`, given by pointer, in `cell`."""
+        """Return the probability with which `choose` draws `emitter`, a pointer, in `cell`."""
         instance = dr.reinterpret_array(mi.UInt32, emitter)
         index = dr.gather(mi.UInt32, self._index_of, instance, active)
         return self._share(cell * self.count, index, active)[1]
 
     def _share(self, first, emitter, active):
-        """(lower end, length) of the share of the unit interval that an emitter has."""
+        """Return (lower end, length) of an emitter's share of the unit interval."""
         above = dr.gather(mi.Float, self._cumulative, first + emitter, active)
         below = dr.gather(mi.Float, self._cumulative, first + emitter - 1, active & (emitter > 0))
         return below, above - below
 
     def learn(self, cell, emitter, contribution, *, asked, lit):
-        """Note what `emitter` contributed to the picture from `cell`.
+        """Record the light that `emitter` contributed to the picture from `cell`.
 
         contribution: RGB, not divided by the probability of the emitter.
         """
@@ -160,7 +160,7 @@ def _is_sane(learned: Floats) -> bool:
 
 
 def table_cells(emitters: int) -> int:
-    """How many cells the table for that many emitters has: a power of two."""
+    """Return the number of cells, a power of two, for that many emitters."""
     return int(2 ** np.floor(np.log2(np.clip(ENTRIES / emitters, 1, CELLS))))
 
 
@@ -170,7 +170,7 @@ def _probabilities(
     lights: npt.NDArray[np.int_],
     sampled: npt.NDArray[np.bool_],
 ) -> npt.NDArray[np.float64]:
-    """(cells, emitters) probabilities, from what was received and how often it was asked.
+    """Return (cells, emitters) probabilities, from the received light and the number of samples.
 
     lights: the light of each emitter; sampled: whether it may be chosen at all.
     """

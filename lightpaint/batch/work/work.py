@@ -45,10 +45,10 @@ from lightpaint.scene.scene import Scene
 #: Error numbers of a full disk.
 DISK_FULL_ERRNOS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
-#: Characters of a failure's reason, at most.
+#: Longest text of a failure, in characters.
 MAX_REASON_LENGTH = 600
 
-#: Failure of an item that needs too much memory.
+#: Text of the failure of an item that needs too much memory.
 OUT_OF_MEMORY_TEXT = "it takes more memory than there is: use resolution=... or fewer workers"
 
 
@@ -58,7 +58,7 @@ def run_item(item: WorkItem, cache: WorkerCache, listen: Listener) -> ItemResult
 
 
 def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
-    """Run `work`, which does that item, and return the result."""
+    """Call `work`, which runs that item, and return its result or its failure."""
     begun = time.perf_counter()
     failure, full, lost, value = "", False, False, None
     try:
@@ -77,7 +77,7 @@ def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
 
 
 def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
-    """Run an item; return its value, if that is not a folder that was filled."""
+    """Run an item; return its value, or None if it fills a folder instead."""
     if isinstance(item, Lesson):
         cache.release_renderer()
         return lesson(cache.film(item.film), item.spp, item.seed)
@@ -95,7 +95,7 @@ def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
 
 
 def is_disk_full(error: BaseException) -> bool:
-    """Return whether an error goes back to a full disk."""
+    """Return whether a full disk caused an error."""
     return any(isinstance(x, OSError) and x.errno in DISK_FULL_ERRNOS for x in _causes(error))
 
 
@@ -171,7 +171,7 @@ def final_render(
 ) -> None:
     """Render an answered look, once for each view.
 
-    rendered: renders instead of this process, if given.
+    render: renders a scene elsewhere, instead of in this process, if given.
     """
     fields = job_fields(task, cache)
     [lighting] = map(Path, task.lightings)

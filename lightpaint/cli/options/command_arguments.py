@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
-    """The arguments that the function of a command takes. given: as they were typed."""
+    """Return the keyword arguments of a command's function. given: the options as typed."""
     asked, settings = vars(options), settings_of(options, given)
     output = Path(asked["output"]) if asked.get("output") else None
     match options.command:
@@ -60,9 +60,9 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             output = output or Path("lightpaint-demo")
             return {"folder": output, "variant": options.variant, "settings": settings}
         case "solve":
-            return _to_solve(options, settings)
+            return _solve_arguments(options, settings)
         case "batch":
-            return _to_do(options)
+            return _batch_arguments(options)
         case "export":
             return {
                 "lighting": Path(options.lighting),
@@ -74,9 +74,9 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
                 "force": options.force,
             }
         case "paint":
-            return _to_paint(options, settings, given)
+            return _paint_arguments(options, settings, given)
         case "relight":
-            scene = scene_of(options, is_to_solve=False, use_lights_file=False)
+            scene = scene_of(options, is_solve_arguments=False, use_lights_file=False)
             paths = list(map(Path, options.lightings))
             return {"scene": scene, "lightings": paths, "output": output, "settings": settings}
         case "verify":
@@ -88,8 +88,8 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
             return {"variant": options.variant}
 
 
-def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
-    """What `solve` is asked for, with a gallery where it is of several looks."""
+def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
+    """Return the arguments of `solve`, with a gallery if there are several looks."""
     how: dict[str, Any] = {
         "table": options.table,
         "wanted": Wanted(options.max_miss, options.min_fit),
@@ -97,7 +97,7 @@ def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
     if len(options.targets) <= 1 and not options.variations:
         return {"jobs": jobs_of(options, settings), **how}
 
-    # Galleries, which one look has no need of.
+    # Imported late: a single look needs no gallery.
     from lightpaint.batch.manifest.variations import parse_variations
     from lightpaint.cli.solve_variations import several_of
 
@@ -113,8 +113,8 @@ def _to_solve(options: Namespace, settings: Settings) -> dict[str, Any]:
     return {"jobs": jobs, "several": several, **how}
 
 
-def _to_do(options: Namespace) -> dict[str, Any]:
-    """What `batch` is asked for."""
+def _batch_arguments(options: Namespace) -> dict[str, Any]:
+    """Return the arguments of `batch`."""
     return {
         "paths": options.paths,
         "output": Path(options.output) if options.output else None,
@@ -122,19 +122,19 @@ def _to_do(options: Namespace) -> dict[str, Any]:
         "is_dry": options.dry_run,
         "only": options.only,
         "form": options.export,
-        "how": _how(options),
+        "how": _run_options(options),
         "force": options.force,
         "log": Path(options.log) if options.log else None,
     }
 
 
-def _how(options: Namespace) -> "RunOptions":
-    """How a batch is done. Raises BatchError for what does not go together."""
+def _run_options(options: Namespace) -> "RunOptions":
+    """Return the options of a run. Raises BatchError if they exclude each other."""
     from lightpaint.batch.run_options import RunOptions
 
     if options.cluster is None and (options.shared_fs or options.task_limit_s is not None):
         idle = "--shared-fs" if options.shared_fs else "--task-limit"
-        raise BatchError(f"{idle} is about workers of a cluster: give --cluster ADDRESS, too")
+        raise BatchError(f"{idle} concerns workers of a cluster: give --cluster ADDRESS, too")
     if options.cluster is not None and options.workers > 1:
         raise BatchError(
             f"--cluster {options.cluster} and --workers {options.workers}: give one of them"
@@ -150,15 +150,17 @@ def _how(options: Namespace) -> "RunOptions":
     )
 
 
-def _to_paint(options: Namespace, settings: Settings, given: Sequence[str]) -> dict[str, Any]:
-    """What `paint` is asked for."""
+def _paint_arguments(
+    options: Namespace, settings: Settings, given: Sequence[str]
+) -> dict[str, Any]:
+    """Return the arguments of `paint`."""
     sources, asked = painted_of(options), constraints_of(options)
     source = sources[0]
     if options.lights_file and not isinstance(source, SceneFile):
         asked = read_constraints(options.lights_file).and_then(asked)
     named = f"{scene_name(Path(source.path))}.paint"
     [folder] = folders_of(options.output and Path(options.output), [named])
-    # Those that `solve` has too, for the command that answers what was exported.
+    # The command that the page shows for exported paintings has only options that `solve` knows.
     dropped = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
     dropped += ["as_json", "is_quiet", "is_verbose"]
     dropped += ["lights"] * isinstance(source, GroupsFile) + ["sensors"] * (len(sources) > 1)

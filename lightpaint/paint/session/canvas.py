@@ -14,7 +14,7 @@ from lightpaint.paint.session.open_stroke import OpenStroke
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.steps import Patch, Step, replay
 
-#: Importance of a pixel beyond which it is a slip, and light, beside the present look's brightest.
+#: Largest importance, and largest light, that a page may paint.
 MAX_IMPORTANCE, MAX_LIGHT = 1e4, 1e9
 
 
@@ -121,10 +121,10 @@ class Canvas:
         region, before = self._open_stroke.region, self._open_stroke.pixels_before(self.painting)
         after = self.pixels(region)
         if before.at_least is not None:
-            # A stroke changes its mind as long as it lasts: what it left alone means what it did.
+            # A stroke may take pixels back while it lasts: unchanged ones keep their marks.
             after = _with_marks(after, before)
             self.put(region, after)
-        # What is sent again, since its answer was lost, is there already.
+        # A page sends a stroke again if its answer was lost; that changes nothing.
         if before.equals(after):
             return None
         return Patch(region, before, after, self.view)
@@ -134,9 +134,7 @@ class Canvas:
         self._open_stroke = OpenStroke()
 
     def check_pixels(self, region: Region, arrays: Mapping[str, npt.NDArray[Any]]) -> Pixels:
-        """Return the pixels that a page sent for a region. Raises PaintError for what cannot be
-        painted.
-        """
+        """Return the pixels that a page sent for a region. Raises PaintError if invalid."""
         top, bottom, left, right = region
         height, width = self.size
         if not (0 <= top <= bottom <= height and 0 <= left <= right <= width):
@@ -155,7 +153,7 @@ class Canvas:
         if importance.size and not (importance.min() >= 0 and importance.max() <= MAX_IMPORTANCE):
             raise PaintError(f"importance beyond 0 to {MAX_IMPORTANCE:g}")
         if image.size and not (image.min() >= 0 and image.max() <= MAX_LIGHT):
-            # A target of a cell may hold such light, which a stroke beside it carries along.
+            # A target set in a notebook may hold such light, and a stroke beside it resends it.
             beyond = (image < 0) | (image > MAX_LIGHT)
             if not np.array_equal(image[beyond], self.image[slices(region)][beyond]):
                 raise PaintError(f"light beyond 0 to {MAX_LIGHT:g}")
