@@ -52,7 +52,11 @@ class Reader:
             from lightpaint.basis.file import read_basis, read_origin
 
             basis = read_basis(path)
-            assert read_origin(path) == (basis.origin, basis.size, len(basis.lights))
+            assert read_origin(path) == (
+                basis.origin,
+                basis.size,
+                tuple(light.identity for light in basis.lights),
+            )
             arrays = (basis.images, basis.half_differences, basis.emitters_seen)
             return basis.lights, basis.origin, [(a.shape, a.tobytes()) for a in arrays]
         if self.kind == "groups":

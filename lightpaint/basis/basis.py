@@ -35,9 +35,12 @@ class Origin:
     """Where a basis comes from: what makes two of them comparable, and one go on.
 
     halves: samples per pixel of each of the two halves; passes: how many passes made them.
-    each_light: where an interrupt left the lights of separate renders unequal, samples of half
-    A and B and passes of A and B of each; `halves` and `passes` are then what all have at least.
+    each_light: where lights have unequal numbers of samples, because an interrupt ended separate
+    renders or because they come from several runs, samples of half A and B and passes of A and B of
+    each; `halves` and `passes` are then what all have at least.
     integrator: what was put in the place of the scene's own; "" where it rendered with that.
+    is_composed: whether planes come from several renders, of which some were of another state of
+    the scene, so that no other render comes to just the same.
     """
 
     scene: str
@@ -50,6 +53,7 @@ class Origin:
     lightpaint: str = __version__
     each_light: tuple[tuple[int, int, int, int], ...] = ()
     integrator: str = ""
+    is_composed: bool = False
 
     def __post_init__(self) -> None:
         if max(max(own) for own in (self.halves, self.passes, *self.each_light)) > MAX_SAMPLES:

@@ -40,7 +40,7 @@ class Entry:
     """One cached basis.
 
     size: in bytes, with what is kept beside it. image_size: (height, width), lights: how many.
-    origin and these are None if the file cannot be read.
+    origin and these are None if the file cannot be read. identities: of its planes, where known.
     """
 
     path: Path
@@ -48,13 +48,21 @@ class Entry:
     origin: Origin | None
     image_size: tuple[int, int] | None = None
     lights: int | None = None
+    identities: frozenset[str] = frozenset()
 
 
 def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Basis | None:
     """The basis kept for that, or None: also of a damaged one, whose place the next one takes."""
     path = _path(scene_identity, sensor, seed, size)
-    if not is_own(path):
-        return None
+    return _read(path) if is_own(path) else None
+
+
+def read(entry: Entry) -> Basis | None:
+    """The basis of an entry, or None if it is damaged, or gone since it was listed."""
+    return _read(entry.path)
+
+
+def _read(path: Path) -> Basis | None:
     try:
         basis = read_basis(path)
         if path != _path_of(basis):
@@ -227,7 +235,8 @@ def _path_of(basis: Basis) -> Path:
 def _entry(path: Path) -> Entry:
     size = sum(file.stat().st_size for file in (path, *beside(path)))
     try:
-        origin, image_size, lights = read_origin(path)
+        origin, image_size, identities = read_origin(path)
     except LightpaintError:
         return Entry(path, size, None)
-    return Entry(path, size, origin, image_size, lights)
+    known = frozenset(identities) - {""}
+    return Entry(path, size, origin, image_size, len(identities), known)

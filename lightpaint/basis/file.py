@@ -88,8 +88,9 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     seen, learned = others[0].channels, ""
     if basis.learned is not None:
         learned = checksum("", others[1].channels)
-    # Without `each_light` and `integrator` as in files from before there was any.
-    of_origin = json.dumps(fields_of(basis.origin, "each_light", "integrator"), ensure_ascii=False)
+    # Without what says no more than by default, as in files from before there was any.
+    later = ("each_light", "integrator", "is_composed")
+    of_origin = json.dumps(fields_of(basis.origin, *later), ensure_ascii=False)
     checksums = Checksums(sums, checksum(of_origin, {}), checksum("", seen), learned)
     head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
     heads[0] = replace(heads[0], texts={**head, **heads[0].texts})
@@ -272,14 +273,17 @@ def _assembled(
     return basis
 
 
-def read_origin(path: Path) -> tuple[Origin, tuple[int, int], int]:
-    """Origin, (height, width) and number of lights of the basis at `path`, without its pixels."""
+def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
+    """Origin, (height, width) and identity of each light of the basis at `path`, without its
+    pixels.
+    """
     file_length(path, "basis", BasisError, limit=MAX_BYTES)
     try:
         headers, size = read_headers(path)
-        lights = sum(LIGHT_KEY in header for header in headers)
+        lit = [strict_json(header[LIGHT_KEY]) for header in headers if LIGHT_KEY in header]
+        identities = tuple(str(light.get("identity", "")) for light in lit)
         text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
-        return read_record(Origin, strict_json(text)), size, lights
+        return read_record(Origin, strict_json(text)), size, identities
     except (*_DAMAGES, BasisError, StopIteration) as error:
         said = one_line(str(error)) or "it does not say where it comes from"
         raise BasisError(f"{path} is no basis this version can read: {said}") from error

@@ -38,7 +38,7 @@ def light_texts(
     light: BasisLight, encodings: tuple[PlaneEncoding, PlaneEncoding]
 ) -> dict[str, str]:
     """Return the attributes of the part of a light."""
-    data = fields_of(light, "is_fixed", "unit_flux")
+    data = fields_of(light, "is_fixed", "unit_flux", "identity")
     if light.members == (light.name,):
         del data["members"]  # which goes without saying for one emitter
     texts = {LIGHT_KEY: json.dumps(data, ensure_ascii=False)}

@@ -43,7 +43,8 @@ COARSE_S = 2.0
 VARIABLES = ("MI_", "MITSUBA")
 
 #: Code that reads scenes and makes identities of them; of others the libraries as well.
-OURS, OTHERS = ("scene", "scene/checks", "basis", "basis/render"), ("mitsuba", "drjit")
+OURS = ("scene", "scene/checks", "scene/lights", "basis", "basis/render")
+OTHERS = ("mitsuba", "drjit")
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ class BasisLight:
     is_fixed: whether it is what stays as it is: its weight is 1, whatever is painted.
     members: names of the emitters it consists of; itself if none are given.
     unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
+    identity: of its plane, which another light of the same identity has as well, but for noise
+    (see `Light.identity`); "" where that is not known.
     """
 
     name: str
@@ -38,6 +40,7 @@ class BasisLight:
     is_fixed: bool = False
     members: tuple[str, ...] = ()
     unit_flux: RGB | None = None
+    identity: str = ""
 
     def __post_init__(self) -> None:
         if len(self.name) > MAX_NAME:
@@ -104,6 +107,10 @@ class Lights(Sequence[BasisLight]):
     def with_requests(self, requests: SceneRequests) -> "Lights":
         """Return these lights with these requests."""
         return self if self.requests == requests else replace(self, requests=requests)
+
+    def identity(self, i: int) -> str:
+        """Return the identity of plane i; "" where that is not known."""
+        return self.each[i].identity
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -30,13 +30,22 @@ def obtain(
     samples.
     """
     listen = listener(progress)
-    is_rendered = is_all_rendered = False
+    is_rendered = is_all_rendered = is_reused = False
 
     def report(label: str, done: int, total: int, unit: str = "passes") -> None:
         nonlocal is_rendered, is_all_rendered
         is_all_rendered |= not is_rendered and done == 0
         is_rendered = True
         listen(label, done, total, unit)
+
+    def report_reuse(count: int, of: int) -> None:
+        nonlocal is_reused
+        is_reused = True
+        left = of - count
+        listen.say(
+            f"{count} of {of} lights come from an earlier run; "
+            f"{left} {'is' if left == 1 else 'are'} rendered (use_cache=False renders all again)"
+        )
 
     spp = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
     began_s = time.perf_counter()
@@ -49,8 +58,9 @@ def obtain(
         exact_spp=settings.exact_spp,
         progress=report,
         render=render,
+        report_reuse=report_reuse,
     )
-    if is_all_rendered:
+    if is_all_rendered and not is_reused:
         basis = replace(basis, render_s=time.perf_counter() - began_s)
     if settings.use_cache and not cache.is_kept(basis):
         listen.say(

@@ -20,7 +20,7 @@ from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.old_scenes import explain_old_scene
 from lightpaint.scene.checks.xml_limits import MAX_XML
-from lightpaint.scene.emission import EmitterSetting
+from lightpaint.scene.emission import ENVIRONMENTS, EmitterSetting
 from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduction, sensor_index
 from lightpaint.scene.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.lights.emitters import Emitter, check_emitters, find_emitters, point_emitter
@@ -28,6 +28,7 @@ from lightpaint.scene.lights.light import Light, free_names, light_named, lights
 from lightpaint.scene.lights.light_choice import REST, choose_lights
 from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside, lights_file_for
 from lightpaint.scene.mitsuba_errors import mitsuba_errors, render_errors
+from lightpaint.scene.plane_identity import SceneHasher
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_tree import ParsedScene
@@ -57,8 +58,11 @@ class Scene(Shown):
         files: All XML files.
         content: Hash of all XML files and assets, the parameters and the sensor; the same on a
             reduced film.
+        unlit_content: Hash of all that the image of each light depends on but for that light
+            itself: of the scene without its lights, but with the shapes of area lights.
         lights_file: The lights file that went into `lights`, if one did.
         requests: The constraints that it asks for.
+        chosen: Names of the lights that `only` left; none where all are there.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -81,9 +85,11 @@ class Scene(Shown):
     lights: tuple[Light, ...]
     files: tuple[Path, ...]
     content: str
+    unlit_content: str
     lights_file: Path | None
     requests: SceneRequests
     _parsed: ParsedScene
+    chosen: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("lights", "emitters"):
@@ -102,6 +108,11 @@ class Scene(Shown):
             return self.content
         tied = [(x.name, x.member_names, x.is_fixed) for x in self.lights]
         return hashlib.sha256(repr((self.content, tied)).encode()).hexdigest()[:32]
+
+    @property
+    def light_identities(self) -> tuple[str, ...]:
+        """Identity of the image of each light, see `Light.identity`."""
+        return tuple(light.identity(self.unlit_content) for light in self.lights)
 
     @property
     def plane_of(self) -> Mapping[str, int]:
@@ -187,6 +198,40 @@ class Scene(Shown):
             content=lit_by,
             requests=SceneRequests(),
             _parsed=parsed,
+        )
+
+    def only(self, names: Collection[str]) -> "Scene":
+        """This scene with the lights `names` alone.
+
+        The other emitters stay where they are, black and in no light, and are asked for no light:
+        what blocks or reflects light still does. Raises SceneError for a light that is not there.
+        """
+        chosen = {self.light(name).name for name in names}
+        lights = tuple(light for light in self.lights if light.name in chosen)
+        its = {member.name for light in lights for member in light.members}
+        others = [x for x in self.emitters if x.name not in its]
+        # Where nothing else may be asked for light, black ones are: some emitter has to be.
+        is_asked = any(not m.hit_by_chance for light in lights for m in light.members)
+        black = (0.0, 0.0, 0.0)
+        dark = {
+            x.node: EmitterSetting(x.kind, black, 0.0 if is_asked else x.sampling_weight)
+            for x in others
+        }
+        emitters = tuple(
+            replace(x, emission=black, sampling_weight=dark[x.node].sampling_weight)
+            if x.node in dark
+            else x
+            for x in self.emitters
+        )
+        names = tuple(light.name for light in lights)
+        content = hashlib.sha256(repr((self.content, names)).encode()).hexdigest()[:32]
+        return replace(
+            self,
+            emitters=emitters,
+            lights=lights,
+            content=content,
+            chosen=names,
+            _parsed=self._parsed.darkened(dark),
         )
 
     @property
@@ -338,16 +383,18 @@ def load_scene(
 
 def _look_at(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
     """What only the loaded scene tells, and the parsed one, as fields of a `Scene`."""
-    loaded = parsed.instantiate({})
+    loaded, hasher = parsed.instantiate({}), SceneHasher(parsed)
     camera = camera_named(loaded, parsed.sensor_names[sensor])
+    emitters, film = find_emitters(parsed, loaded, hasher), Film.of(camera, sensor)
     seen = {
-        "emitters": find_emitters(parsed, loaded),
-        "film": Film.of(camera, sensor),
+        "emitters": emitters,
+        "film": film,
         "spp": int(camera.sampler().sample_count()),
-        "has_null": _has_null_surfaces(loaded),
+        "has_null": (has_null := _has_null_surfaces(loaded)),
     }
     del loaded, camera
     gc.collect()
+    has_environment = any(emitter.plugin in ENVIRONMENTS for emitter in emitters)
     return {
         **seen,
         "sensor_names": parsed.sensor_names,
@@ -356,6 +403,9 @@ def _look_at(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
         "has_media": parsed.has_media(),
         "files": parsed.files,
         "content": parsed.content(sensor),
+        "unlit_content": hasher.unlit_content(
+            film, has_environment=has_environment, has_null=has_null
+        ),
     }
 
 

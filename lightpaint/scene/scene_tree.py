@@ -158,6 +158,16 @@ class ParsedScene:
         settle_normals(scene)
         return scene
 
+    def darkened(self, dark: Mapping[int, EmitterSetting]) -> "ParsedScene":
+        """This scene with the settings `dark` made, by the nodes of emitters."""
+        import mitsuba as mi
+
+        other = copy(self)
+        other.state = mi.parser.ParserState(self.state)
+        for node, setting in dark.items():
+            set_emission(other.state, node, setting, on_shape=node in self.shape_of)
+        return other
+
     def lit_by_points(
         self, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
     ) -> "ParsedScene":
@@ -168,10 +178,7 @@ class ParsedScene:
         """
         import mitsuba as mi
 
-        other = copy(self)
-        other.state = mi.parser.ParserState(self.state)
-        for node, setting in dark.items():
-            set_emission(other.state, node, setting, on_shape=node in self.shape_of)
+        other = self.darkened(dark)
         other.emitter_nodes, other.names = [*self.emitter_nodes], dict(self.names)
         for name, position in positions.items():
             node = mi.parser.SceneNode()

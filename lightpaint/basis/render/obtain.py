@@ -2,11 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import as_stored, is_large
-from lightpaint.basis.render.render import basis_lights, is_of, is_on_the_way, render_basis
+from lightpaint.basis.render.compose import counts_of, gather, lights_behind, merged, part_of
+from lightpaint.basis.render.render import (
+    ONE_PASS,
+    basis_lights,
+    is_of,
+    is_on_the_way,
+    method_of,
+    render_basis,
+)
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.progress import Progress, silent
@@ -15,6 +24,8 @@ from lightpaint.screen import some_names
 
 #: `render_basis`, or another that takes and gives the same.
 Render = Callable[..., Basis]
+#: Hears how many of how many lights are taken from earlier runs.
+ReuseReport = Callable[[int, int], None]
 
 
 def obtain_basis(
@@ -27,14 +38,22 @@ def obtain_basis(
     exact_spp: bool = False,
     progress: Progress = silent,
     render: Render = render_basis,
+    report_reuse: ReuseReport = lambda count, of: None,
 ) -> Basis:
-    """The basis of `scene`: what an earlier run kept, with the samples that are missing.
+    """The basis of `scene`: planes that earlier runs kept, with the samples that are missing.
 
-    time_s: instead of spp, seconds of rendering to add to what was kept.
+    A plane serves every scene of which it has the identity (`Scene.light_identities`): of one in
+    which a lamp was moved, that lamp alone is rendered. Its samples follow the camera paths that
+    they would in a render of all lights, but choose among other emitters: the planes have the same
+    means, and other noise, than those of a render from nothing.
+
+    time_s: instead of spp, seconds of rendering to add to what was kept. Where some lights have
+    fewer samples than others, the time is theirs.
     use_cache: False neither looks for one nor keeps it.
     exact_spp: whether it has just as many samples as are asked for, and the same ones, whatever
-    was kept. One with more samples stays kept.
+    was kept: then nothing is taken of another state of the scene. One with more samples stays kept.
     render: who renders what is missing.
+    report_reuse: told how many of the lights are taken, and of how many, where others are rendered.
 
     Raises SceneError for exact_spp with a time, which asks for no number.
     """
@@ -45,37 +64,71 @@ def obtain_basis(
     kept = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     if kept is not None and not is_of(scene, kept, seed):
         kept = None
+    asked = scene.spp if spp is None else spp
     start = kept
-    if (
-        start is not None
-        and exact_spp
-        and not is_on_the_way(scene, start, spp, is_in_parts=render is not render_basis)
-    ):
-        start = None
+    if exact_spp:
+        in_parts = render is not render_basis
+        if start is not None and not is_on_the_way(scene, start, spp, is_in_parts=in_parts):
+            start = None
+    elif time_s is None and (kept is None or kept.origin.spp < asked):
+        start = gather(scene, kept, spp=asked, seed=seed)
+    elif kept is None:
+        start = gather(scene, None, spp=None, seed=seed)
+
+    is_composed = start is not None and start.origin.is_composed
 
     def keep(basis: Basis) -> bool:
-        return (kept is None or basis.origin.spp >= kept.origin.spp) and cache.keep(basis)
+        return (kept is None or basis.origin.spp >= kept.origin.spp) and cache.keep(
+            _marked(basis, is_composed=is_composed)
+        )
 
     if start is not None:
         # One kept by an earlier version may know less of the same lights.
         start = replace(start, lights=basis_lights(scene), source=str(scene.path))
-    basis = render(
-        scene,
-        spp=spp,
-        time_s=time_s,
-        seed=seed,
-        start=start,
-        keep=keep,
-        progress=progress,
-    )
+        enough = [sum(its[:2]) >= (1 if time_s is not None else asked) for its in counts_of(start)]
+        if 0 < sum(enough) < len(enough):
+            report_reuse(sum(enough), len(enough))
+    how = {"time_s": time_s, "seed": seed, "keep": keep, "progress": progress}
+    basis = _completed(scene, start, spp=asked if time_s is None else None, render=render, how=how)
     if basis is start:
         return basis
+    basis = _marked(basis, is_composed=is_composed)
     if keep(basis) and is_large(len(basis.lights), basis.size):
         of_file = cache.find(scene.identity, basis.origin.sensor, seed, basis.size)
         if of_file is not None and of_file.origin == basis.origin:
             return replace(basis, planes=of_file.planes, noise=of_file.noise)
     # As from its file, so that the next run finds the same.
     return as_stored(basis)
+
+
+def _completed(
+    scene: Scene, start: Basis | None, *, spp: int | None, render: Render, how: dict[str, Any]
+) -> Basis:
+    """Return `start` with the samples that are missing, of lights that have fewest first.
+
+    how: other arguments of `render`, which adds as many samples to all lights in one pass.
+    """
+    while start is not None and method_of(scene) == ONE_PASS:
+        names, goal = lights_behind(start, spp)
+        if not names:
+            break
+        alone, whole = scene.only(names), start
+
+        def keep(part: Basis, whole: Basis = whole) -> bool:
+            return bool(how["keep"](merged(scene, whole, part)))
+
+        part = render(alone, **how | {"spp": goal, "start": part_of(whole, alone), "keep": keep})
+        start = merged(scene, whole, part)
+        if spp is None:
+            return start
+    return render(scene, **how, spp=spp, start=start)
+
+
+def _marked(basis: Basis, *, is_composed: bool) -> Basis:
+    """Return `basis`, which says whether it went on from planes of other states of its scene."""
+    if basis.origin.is_composed or not is_composed:
+        return basis
+    return replace(basis, origin=replace(basis.origin, is_composed=True))
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:

@@ -123,7 +123,8 @@ def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
     instances = np.array(dr.reinterpret_array(mi.UInt32, scene.emitters_dr())).tolist()
     table = np.zeros(max(instances) + 1, dtype=np.uint32)
     for instance, emitter in zip(instances, scene.emitters(), strict=True):
-        table[instance] = plane_of[emitter.id()]
+        # What is in no light is black, so that it does not matter to which it adds nothing.
+        table[instance] = plane_of.get(emitter.id(), 0)
     return mi.UInt32(table)
 
 

@@ -80,9 +80,14 @@ def render_basis(
     if start is not None and budget.met_by(start.origin.spp):
         return with_first_hits(start.with_requests(scene.requests), scene, seed)
     method = method_of(scene)
-    if start is not None and not goes_on(start, method):
+    if start is not None and not goes_on(start.origin.method, method):
         # Nothing to go on from, but nothing to be replaced by less either.
         start, keep = None, None
+    if start is not None and method == ONE_PASS and start.origin.each_light:
+        raise BasisError(
+            "the lights of the basis to go on from have unequal numbers of samples, and one pass "
+            "adds as many to each: render the others first, with scene.only([...])"
+        )
     render_all = _render_together if method == ONE_PASS else _render_one_by_one
     with render_errors(scene.path):
         made = render_all(scene, budget, seed, start, Keeper(keep), progress)
@@ -91,9 +96,8 @@ def render_basis(
     return with_first_hits(made, scene, seed)
 
 
-def goes_on(basis: Basis, method: str) -> bool:
-    """Whether samples by that method can be added to those of `basis`."""
-    its = basis.origin.method
+def goes_on(its: str, method: str) -> bool:
+    """Whether samples by `method` can be added to those of a basis by the method `its`."""
     return (ONE_PASS if its == IN_PARTS else its) == method
 
 
@@ -138,8 +142,12 @@ def _free_memory() -> int | None:
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
     """Whether `basis` was made of `scene` as it is, through its sensor and film, under `seed`."""
     of = basis.origin
-    mine = origin_of(scene, seed, of.method, of.halves, of.passes)
-    return of == replace(mine, each_light=of.each_light) and basis.size == scene.size
+    mine = replace(
+        origin_of(scene, seed, of.method, of.halves, of.passes),
+        each_light=of.each_light,
+        is_composed=of.is_composed,
+    )
+    return of == mine and basis.size == scene.size
 
 
 def is_on_the_way(
@@ -152,6 +160,8 @@ def is_on_the_way(
     parts.py, which comes by nothing but its end.
     """
     origin = basis.origin
+    if origin.is_composed:
+        return False
     if is_in_parts and method_of(scene) == ONE_PASS:
         return origin.method == IN_PARTS and origin.spp == samples_for(scene, spp)
     if origin.method != method_of(scene):
@@ -217,8 +227,9 @@ def basis_lights(scene: Scene) -> Lights:
             x.is_fixed,
             x.member_names,
             x.unit_flux,
+            identity,
         )
-        for x in scene.lights
+        for x, identity in zip(scene.lights, scene.light_identities, strict=True)
     )
     return Lights(lights, scene.requests)
 
@@ -240,6 +251,7 @@ def _render_together(
     sums = HalfSums(len(scene.lights), scene.size) if start is None else HalfSums.of(start)
     numbers = view_seed(seed, scene.sensor)
     tracer = Tracer(scene, numbers, start.learned if start is not None else None)
+    knows_nothing = start is None or start.learned is None
 
     def basis(*, is_last: bool = False) -> Basis:
         images, half_differences = sums.mean_and_half_difference(is_last=is_last)
@@ -257,7 +269,8 @@ def _render_together(
     try:
         with tracing() as let_others_through:
             for half, spp in passes(height * width, budget, sums.spp, progress):
-                if start is None and not any(sums.spp):
+                if knows_nothing:
+                    knows_nothing = False
                     tracer.rehearse(max(1, REHEARSAL // (height * width)))
                 let_others_through()
                 tracer.add_pass(sums, half, spp)

@@ -1,5 +1,6 @@
 """Bases that an engine renders in parts."""
 
+from dataclasses import replace
 from typing import Any
 
 from lightpaint.arrays import Floats
@@ -49,17 +50,22 @@ class PartwiseRender:
         spp = scene.spp if spp is None else spp
         if start is not None and start.origin.spp >= spp:
             return with_first_hits(start.with_requests(scene.requests), scene, seed)
-        if start is not None and not goes_on(start, method_of(scene)):
+        if start is not None and not goes_on(start.origin.method, method_of(scene)):
             start = None
         check_memory(scene)
         parts = plan_parts(scene, spp, start=start)
         spool = Spool(scene, parts, seed=seed, start=start)
-        learned = obtain_lesson(self._engine, self._film, scene, spp, seed, start, spool)
+        film = self._film_of(scene)
+        learned = obtain_lesson(self._engine, film, scene, spp, seed, start, spool)
         sums = PartSums(scene, parts, seed=seed, start=start)
         self._add_all(scene, parts, sums, seed, spool, progress)
         basis = sums.basis(learned)
         spool.drop()
         return basis
+
+    def _film_of(self, scene: Scene) -> SceneFilm:
+        """Return the film of `scene`, which may have only some of the lights."""
+        return replace(self._film, only=scene.chosen)
 
     def _add_all(
         self,
@@ -81,7 +87,7 @@ class PartwiseRender:
             pixels = (part.bottom - part.top) * scene.size[1]
             lights = len(scene.lights) if part.light is None else 1
             expected_s = render_seconds(pixels * part.spp, lights)
-            item = PartOfBasis(f"part {k}", self._film, part, seed, learned, expected_s)
+            item = PartOfBasis(f"part {k}", self._film_of(scene), part, seed, learned, expected_s)
             left[item.name] = item
         progress("basis", len(parts) - len(left), len(parts), "parts")
         for count, done in enumerate(self._engine.run(list(left.values()))):

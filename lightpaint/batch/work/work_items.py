@@ -79,13 +79,14 @@ class ItemResult:
 @dataclass(frozen=True)
 class SceneFilm:
     """A scene by its file, on the film that its basis is rendered on. files: all files of the
-    scene.
+    scene. only: names of the lights that are rendered, if not all.
     """
 
     scene: SceneFile
     quality: Quality | None = None
     resolution: str | None = None
     files: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
 
     def with_paths(self, move: PathMap) -> "SceneFilm":
         """Return the same with other paths."""
@@ -100,7 +101,7 @@ class SceneFilm:
     @property
     def key(self) -> str:
         """Key that two equal ones share."""
-        return json.dumps([vars_of(self.scene), self.quality, self.resolution])
+        return json.dumps([vars_of(self.scene), self.quality, self.resolution, self.only])
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,8 @@ class WorkerCache:
 
     def film(self, film: SceneFilm) -> Scene:
         """Return the scene on a film."""
-        return on_film(self.scene(film.scene).content, film.quality, film.resolution)
+        scene = on_film(self.scene(film.scene).content, film.quality, film.resolution)
+        return scene.only(film.only) if film.only else scene
 
     def renderer(self, item: PartOfBasis | SumsOfRows) -> PartRenderer:
         """Return the renderer of a part; it stays loaded until the next item is another basis's."""

@@ -22,6 +22,7 @@ from lightpaint.scene.emission import (
     read_emission,
     why_not_adjusted,
 )
+from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
 from lightpaint.scene.scene_tree import ParsedScene
 from lightpaint.validation import MAX_NAME
 
@@ -41,7 +42,8 @@ class Emitter:
     Scene.files, byte offset. obstacle: why it cannot be solved for, in words that follow its name;
     "" if it can. unit_flux: watts per channel at an emission of 1; None if there is no such number.
     has_name: True if its author named it; False if the name is generated. belongs_to: for one
-    without a name, that of its material, file or parent; "" if there is none.
+    without a name, that of its material, file or parent; "" if there is none. digest: hashes of
+    what its light depends on, beside the scene; None for one in no file.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Emitter:
     unit_flux: float | None = None
     has_name: bool = True
     belongs_to: str = ""
+    digest: EmitterDigest | None = None
 
     def __repr__(self) -> str:
         return f"Emitter({self.name!r}, {self.plugin} {self.form})"
@@ -90,8 +93,11 @@ def point_emitter(name: str, node: int, position: tuple[float, float, float]) ->
     )
 
 
-def find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
-    """Return the emitters that take part in the scene, in document order."""
+def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tuple[Emitter, ...]:
+    """Return the emitters that take part in the scene, in document order.
+
+    hasher: hashes nodes of that scene.
+    """
     node_of = {name: node for node, name in parsed.names.items()}
     emitters = []
     for emitter in loaded.emitters():
@@ -121,6 +127,7 @@ def find_emitters(parsed: ParsedScene, loaded: Any) -> tuple[Emitter, ...]:
                 unit_flux=flux_of_unit(emitter, plugin, kind),
                 has_name=has_name(parsed, node_of[name]),
                 belongs_to=belongs_to(parsed, node_of[name]),
+                digest=hasher.emitter(node_of[name], kind),
             )
         )
     return tuple(sorted(emitters, key=lambda emitter: emitter.node))

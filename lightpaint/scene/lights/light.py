@@ -8,6 +8,7 @@ from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 from lightpaint.scene.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.plane_identity import combined_identity
 from lightpaint.screen import some_names
 
 #: Parameter of a light whose emission is a multiple of the scene's own.
@@ -78,6 +79,22 @@ class Light:
             for k, emission in enumerate(self.emission_of(member, (1.0, 1.0, 1.0))):
                 total[k] += emission * member.unit_flux
         return total[0], total[1], total[2]
+
+    def identity(self, unlit_content: str) -> str:
+        """Identity of its image at unit emission in a scene of that `unlit_content`.
+
+        Equal for lights whose images are equal but for noise, whatever they are called and however
+        bright they are; "" where a member stands in no file.
+        """
+        if self.is_fixed:
+            own = [m.digest and m.digest.as_is for m in self.members]
+        elif self.unit == MULTIPLE:
+            own = [m.digest and f"{m.digest.unit} {m.emission}" for m in self.members]
+        else:
+            own = [m.digest and m.digest.unit for m in self.members]
+        if None in own:
+            return ""
+        return combined_identity(unlit_content, self.is_fixed, self.unit, sorted(map(str, own)))
 
     def emission_of(self, member: Emitter, emission: RGB) -> RGB:
         """Return the emission of `member`, in its own unit, if this light has `emission`."""

@@ -1,0 +1,77 @@
+"""What moving one lamp costs: the processor's time of a solve after it, against the first one.
+
+    python benchmarks/moved_light.py [--light spot_vase] [--rounds 3]
+
+Each round copies the gallery, solves it with an empty cache, moves one spot by 10 cm in the XML,
+solves again, and once more with nothing changed. Times are of whole processes, user and system, all
+threads, ratios of neighbours in time; medians are taken over the rounds.
+"""
+
+import argparse
+import os
+import re
+import resource
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+GALLERY = ROOT / "scenes" / "gallery"
+PAINTING = ROOT / "targets" / "gallery" / "evening.exr"
+
+
+def main() -> None:
+    """Print the times of each round, and the medians of their ratios."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--light", default="spot_vase")
+    parser.add_argument("--rounds", type=int, default=3)
+    options = parser.parse_args()
+    print("round   first s   moved s   again s   moved / first   again / first")
+    ratios = []
+    for k in range(options.rounds):
+        with tempfile.TemporaryDirectory() as folder:
+            first, moved, again = one_round(Path(folder), options.light)
+        ratios.append((moved / first, again / first))
+        shares = "   ".join(f"{ratio:13.2f}" for ratio in ratios[-1])
+        print(f"{k + 1:5d}   {first:7.1f}   {moved:7.1f}   {again:7.1f}   {shares}", flush=True)
+    medians = [statistics.median(its) for its in zip(*ratios, strict=True)]
+    print("median" + " " * 33 + "   ".join(f"{ratio:13.2f}" for ratio in medians))
+
+
+def one_round(folder: Path, light: str) -> tuple[float, float, float]:
+    """Return seconds of the first solve, after the move, and with nothing changed."""
+    shutil.copytree(GALLERY, folder / "gallery")
+    scene = folder / "gallery" / "scene.xml"
+    first = solve_s(folder, scene)
+    scene.write_text(moved(scene.read_text(encoding="utf-8"), light), encoding="utf-8")
+    return first, solve_s(folder, scene), solve_s(folder, scene)
+
+
+def moved(text: str, light: str) -> str:
+    """Return the scene with that spot 10 cm along x."""
+
+    def further(found: re.Match[str]) -> str:
+        return f"{found[1]}{float(found[2]) + 0.1}"
+
+    pattern = rf'(id="{light}">\s*<transform name="to_world">\s*<lookat origin=")([-\d.]+)'
+    edited, count = re.subn(pattern, further, text)
+    assert count == 1, f"{light} is no spot of the gallery"
+    return edited
+
+
+def solve_s(folder: Path, scene: Path) -> float:
+    """Return the processor's seconds of one solve without verification."""
+    command = [sys.executable, "-m", "lightpaint", "solve", str(scene), str(PAINTING)]
+    command += ["--no-verify", "--force", "-o", str(folder / "answer")]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    environment = os.environ | {"LIGHTPAINT_CACHE": str(folder / "cache")}
+    subprocess.run(command, check=True, capture_output=True, env=environment)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+if __name__ == "__main__":
+    main()

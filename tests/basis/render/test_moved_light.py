@@ -1,0 +1,416 @@
+"""Lights that were moved, added or removed: only they are rendered, the others' planes are kept."""
+
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, same_basis, write_room
+
+from lightpaint.basis import cache, file
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.file import read_basis, write_basis
+from lightpaint.basis.file_planes import FilePlanes
+from lightpaint.basis.render import obtain as obtain_module
+from lightpaint.basis.render.obtain import obtain_basis
+from lightpaint.basis.render.parts import render_in_parts
+from lightpaint.basis.render.render import render_basis
+from lightpaint.errors import BasisError
+from lightpaint.pipeline.job_bases import obtain
+from lightpaint.pipeline.settings import Settings
+from lightpaint.progress import Interrupted
+from lightpaint.scene.scene import Scene, load_scene
+
+#: Edits of the XML of the test room.
+MOVED = ('x="-0.5" y="1" z="0.5"', 'x="-0.2" y="1.2" z="0.4"')
+NAMES = tuple(LIGHTS)
+
+#: (names of lights that were rendered, samples per pixel that they came to, whether from nothing).
+Rendered = list[tuple[tuple[str, ...], int, bool]]
+
+
+@pytest.fixture(autouse=True)
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+
+
+@pytest.fixture
+def rendered(monkeypatch: pytest.MonkeyPatch) -> Rendered:
+    """What is rendered from now on."""
+    log: Rendered = []
+
+    def render(scene: Scene, **how: Any) -> Basis:
+        done: list[int] = []
+        how["progress"] = lambda _label, now, _total, *_: done.append(now)
+        basis = render_basis(scene, **how)
+        if done:
+            log.append((basis.names, basis.origin.spp, how.get("start") is None))
+        return basis
+
+    # What `obtain_basis` takes for its own must stay the same object.
+    monkeypatch.setattr(obtain_module, "render_basis", render)
+    monkeypatch.setitem(obtain_basis.__kwdefaults__, "render", render)
+    return log
+
+
+def room(folder: Path, *edits: tuple[str, str], **how: Any) -> Scene:
+    """The test room after some edits of its XML."""
+    path = write_room(folder, **how)
+    text = path.read_text(encoding="utf-8")
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    return load_scene(path)
+
+
+def taken(basis: Basis, of: Basis) -> set[str]:
+    """Names of the lights whose planes are those of the other basis to the bit."""
+    return {
+        name
+        for name in {*basis.names} & {*of.names}
+        if all(
+            getattr(basis, planes).plane(basis.names.index(name)).tobytes()
+            == getattr(of, planes).plane(of.names.index(name)).tobytes()
+            for planes in ("planes", "noise")
+        )
+    }
+
+
+def agrees(a: Basis, b: Basis) -> None:
+    """Assert that two bases of other random numbers show the same, and know their noise.
+
+    Pixels are independent. Four standard errors: of the sum of differences, and of the squares
+    that half differences say these have.
+    """
+    assert a.names == b.names
+    for name, x, y, u, v in zip(
+        a.names, a.images, b.images, a.half_differences, b.half_differences, strict=True
+    ):
+        error, noise = (x - y).astype(float), u.astype(float) ** 2 + v.astype(float) ** 2
+        error, noise = error.sum(axis=-1), noise.sum(axis=-1)
+        bound = ((u.sum(axis=-1) ** 2) + (v.sum(axis=-1) ** 2)).astype(float)
+        assert abs(error.sum()) <= 4 * np.sqrt(bound.sum()), name
+        excess = ((x - y).astype(float) ** 2).sum(axis=-1) - noise
+        assert abs(excess.sum()) <= 4 * np.sqrt((excess**2).sum()), name
+
+
+def test_a_moved_lamp_is_rendered_alone(tmp_path: Path, rendered: Rendered) -> None:
+    first = obtain_basis(room(tmp_path), spp=64)
+    scene = room(tmp_path, MOVED)
+    assert rendered == [(NAMES, 64, True)]
+    second = obtain_basis(scene, spp=64)
+    assert rendered[1:] == [(("bulb",), 64, True)]
+    assert taken(second, first) == {*NAMES} - {"bulb"}
+    assert (second.origin.halves, second.origin.each_light) == ((32, 32), ())
+    assert second.origin.is_composed
+    assert second.origin.scene_identity == scene.identity
+    agrees(second, render_basis(scene, spp=64, seed=5))
+    # The camera sees emitters where it did.
+    np.testing.assert_array_equal(second.emitters_seen, first.emitters_seen)
+    assert second.features is not None
+    # And again: then it is kept as a whole. Moved back, the first is.
+    same_basis(obtain_basis(scene, spp=64), second)
+    same_basis(obtain_basis(room(tmp_path), spp=64), first)
+    assert len(rendered) == 2
+
+
+def test_two_moved_lamps_are_one_pass_and_planes_come_from_several_files(
+    tmp_path: Path, rendered: Rendered
+) -> None:
+    turn = ('origin="0.8 1.8 1.5"', 'origin="0.6 1.8 1.5"')
+    first = obtain_basis(room(tmp_path), spp=16)
+    both = obtain_basis(room(tmp_path, MOVED, turn), spp=16)
+    assert rendered[1:] == [(("bulb", "beam"), 16, True)]
+    # The bulb from the one and the beam from the other.
+    last = obtain_basis(room(tmp_path, MOVED), spp=16)
+    assert len(rendered) == 2
+    assert taken(last, both) == {*NAMES} - {"beam"}
+    assert taken(last, first) == {*NAMES} - {"bulb"}
+
+
+def test_edits_of_colour_and_name_render_nothing(tmp_path: Path, rendered: Rendered) -> None:
+    first = obtain_basis(room(tmp_path), spp=16)
+    scene = room(tmp_path, ("0.5 0.6 0.7", "0 0 3"), ('id="beam"', 'id="ray"'))
+    second = obtain_basis(scene, spp=16)
+    assert len(rendered) == 1
+    assert second.names == ("panel", "bulb", "ray", "sun", "sky")
+    assert second.lights[1].emission == (0, 0, 3)
+    assert second.images.tobytes() == first.images.tobytes()
+    # Names of shapes are those of now.
+    assert second.objects is not None
+    third = obtain_basis(room(tmp_path, ('id="panel"', 'id="lid"')), spp=16)
+    assert third.objects is not None
+    assert {"panel"} ^ {*second.objects.names} == {"lid"} ^ {*third.objects.names}
+
+
+def test_lamps_that_come_and_go(tmp_path: Path, rendered: Rendered) -> None:
+    lights = LIGHTS["panel"] + LIGHTS["bulb"]
+    first = obtain_basis(room(tmp_path, lights=lights), spp=32)
+    more = obtain_basis(scene := room(tmp_path, lights=lights + LIGHTS["sky"]), spp=32)
+    assert rendered[1:] == [(("sky",), 32, True)]
+    assert taken(more, first) == {"panel", "bulb"}
+    agrees(more, render_basis(scene, spp=32, seed=5))
+    assert more.emitters_seen.sum() > first.emitters_seen.sum()  # where there is sky
+    fewer = obtain_basis(scene := room(tmp_path, lights=lights[: len(LIGHTS["panel"])]), spp=32)
+    assert len(rendered) == 2
+    assert taken(fewer, first) == {"panel"}
+    np.testing.assert_array_equal(fewer.emitters_seen, first.emitters_seen)
+    agrees(fewer, render_basis(scene, spp=32, seed=5))
+
+
+def test_an_area_lamp_that_moves_is_another_room(tmp_path: Path, rendered: Rendered) -> None:
+    obtain_basis(room(tmp_path), spp=4)
+    obtain_basis(room(tmp_path, ('<translate y="1.9"/>', '<translate y="1.7"/>')), spp=4)
+    assert rendered == [(NAMES, 4, True)] * 2
+
+
+def test_lights_with_fewer_samples_catch_up(tmp_path: Path, rendered: Rendered) -> None:
+    obtain_basis(room(tmp_path), spp=16)
+    scene = room(tmp_path, MOVED)
+    basis = obtain_basis(scene, spp=64)
+    # First to what the others have, then all together.
+    assert rendered[1:] == [(("bulb",), 16, True), (NAMES, 64, False)]
+    assert (basis.origin.halves, basis.origin.each_light) == ((32, 32), ())
+    assert basis.origin.is_composed
+    agrees(basis, render_basis(scene, spp=64, seed=5))
+
+
+def test_unequal_numbers_of_samples(tmp_path: Path, rendered: Rendered) -> None:
+    first = obtain_basis(room(tmp_path), spp=64)
+    scene = room(tmp_path, MOVED)
+    basis = obtain_basis(scene, spp=16)
+    assert taken(basis, first) == {*NAMES} - {"bulb"}
+    assert [its[:2] for its in basis.origin.each_light] == [
+        (8, 8) if name == "bulb" else (32, 32) for name in NAMES
+    ]
+    assert basis.origin.spp == 16
+    assert basis.knows_noise
+    agrees(basis, render_basis(scene, spp=64, seed=5))
+    write_basis(tmp_path / "b.exr", basis)
+    same_basis(read_basis(tmp_path / "b.exr"), basis)
+    # The one that lags behind goes on by itself; nobody else's call does as if all were equal.
+    with pytest.raises(BasisError, match="unequal numbers of samples"):
+        render_basis(scene, spp=64, start=basis)
+    more = obtain_basis(scene, spp=64)
+    assert rendered[1:] == [(("bulb",), 16, True), (("bulb",), 64, False)]
+    assert (more.origin.halves, more.origin.each_light) == ((32, 32), ())
+    agrees(more, render_basis(scene, spp=64, seed=5))
+
+
+def test_a_time_is_spent_on_what_lacks(tmp_path: Path, rendered: Rendered) -> None:
+    obtain_basis(room(tmp_path), spp=4)
+    basis = obtain_basis(room(tmp_path, MOVED), time_s=0.01)
+    assert [its[0] for its in rendered[1:]] == [("bulb",)]
+    assert {its[:2] for its in basis.origin.each_light} > {(2, 2)}
+
+
+def test_exactly_what_is_asked_for_is_rendered_as_a_whole(
+    tmp_path: Path, rendered: Rendered
+) -> None:
+    obtain_basis(room(tmp_path), spp=16)
+    scene = room(tmp_path, MOVED)
+    fresh = obtain_basis(scene, spp=16, use_cache=False)
+    obtain_basis(scene, spp=16)  # which is composed, and kept
+    del rendered[:]
+    same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh)
+    assert rendered == [(NAMES, 16, True)]
+    assert not obtain_basis(scene, spp=16).origin.is_composed
+
+
+@pytest.mark.parametrize("other", [{"seed": 1}, {"half": True}, {"sensor": True}])
+def test_nothing_of_another_view_size_or_seed_is_taken(
+    tmp_path: Path, rendered: Rendered, other: dict[str, Any]
+) -> None:
+    sensor = """<sensor type="perspective" id="other"><film type="hdrfilm">
+        <integer name="width" value="24"/><integer name="height" value="20"/></film></sensor>"""
+    obtain_basis(room(tmp_path, sensors=sensor), spp=4)
+    scene = room(tmp_path, MOVED, sensors=sensor)
+    scene = scene.reduced("1/2") if "half" in other else scene
+    scene = load_scene(scene.path, sensor="other") if "sensor" in other else scene
+    obtain_basis(scene, spp=4, seed=other.get("seed", 0))
+    assert [its[0] for its in rendered] == [NAMES] * 2
+
+
+def test_a_reduced_film_has_planes_of_its_own(tmp_path: Path, rendered: Rendered) -> None:
+    first = obtain_basis(room(tmp_path).reduced("1/3"), spp=36)
+    scene = room(tmp_path, MOVED).reduced("1/3")
+    second = obtain_basis(scene, spp=36)
+    assert rendered[1:] == [(("bulb",), 36, True)]
+    assert taken(second, first) == {*NAMES} - {"bulb"}
+    agrees(second, render_basis(scene, spp=36, seed=5))
+
+
+def test_groups_and_what_is_kept(tmp_path: Path, rendered: Rendered) -> None:
+    how: dict[str, Any] = {"lights": ["pair", "panel"], "groups": {"pair": ["bulb", "beam"]}}
+    first = obtain_basis(load_scene(room(tmp_path).path, **how), spp=32)
+    assert first.names == ("panel", "pair", "rest")
+    scene = load_scene(room(tmp_path, MOVED).path, **how)
+    second = obtain_basis(scene, spp=32)
+    assert rendered[1:] == [(("pair",), 32, True)]
+    agrees(second, render_basis(scene, spp=32, seed=5))
+    scene = load_scene(room(tmp_path, ('x="0.3" y="-1"', 'x="0.5" y="-1"')).path, **how)
+    third = obtain_basis(scene, spp=32)
+    assert rendered[2:] == [(("rest",), 32, True)]
+    assert taken(third, first) == {"panel", "pair"}
+    agrees(third, render_basis(scene, spp=32, seed=5))
+
+
+def test_separate_renders(tmp_path: Path, rendered: Rendered) -> None:
+    how: dict[str, Any] = {"integrator": '<integrator type="volpathmis"/>'}
+    first = obtain_basis(room(tmp_path, **how), spp=16)
+    passes: list[str] = []
+    scene = room(tmp_path, MOVED, **how)
+
+    def count(label: str, done: int, *_: object) -> None:
+        passes.extend([label] * (done > 0))
+
+    second = obtain_basis(scene, spp=16, render=render_basis, progress=count)
+    assert {*passes} == {"basis: bulb"}
+    # Up to half floats: sums are taken apart and put together again.
+    scale = 2.0**-10 * first.images.max()
+    others = [k for k, name in enumerate(NAMES) if name != "bulb"]
+    assert np.abs(second.images[others] - first.images[others]).max() <= scale
+    agrees(second, render_basis(scene, spp=16, seed=5))
+    assert second.origin.is_composed
+
+
+def test_what_is_rendered_in_parts(tmp_path: Path) -> None:
+    log: list[tuple[tuple[str, ...], bool]] = []
+
+    def render(scene: Scene, *, spp: int, seed: int, start: Basis | None, **_: Any) -> Basis:
+        if start is not None and start.origin.spp >= spp:
+            return start
+        log.append((tuple(x.name for x in scene.lights), start is None))
+        return render_in_parts(scene, spp=spp, seed=seed, start=start)
+
+    first = obtain_basis(room(tmp_path), spp=16, render=render)
+    scene = room(tmp_path, MOVED)
+    second = obtain_basis(scene, spp=16, render=render)
+    third = obtain_basis(scene, spp=32, render=render)
+    assert log == [(NAMES, True), (("bulb",), True), (NAMES, False)]
+    assert taken(second, first) == {*NAMES} - {"bulb"}
+    agrees(second, render_basis(scene, spp=16, seed=5))
+    agrees(third, render_basis(scene, spp=32, seed=5))
+
+
+def test_what_is_larger_than_memory(
+    tmp_path: Path, rendered: Rendered, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = obtain_basis(room(tmp_path), spp=16)
+    expected = obtain_basis(room(tmp_path, MOVED), spp=16)
+    cache.drop([entry for entry in cache.entries() if entry.origin == expected.origin])
+    monkeypatch.setattr(file, "IN_MEMORY", 0)
+    large = obtain_basis(room(tmp_path, MOVED), spp=16)
+    assert [its[0] for its in rendered] == [NAMES, ("bulb",), ("bulb",)]
+    assert isinstance(large.planes, FilePlanes)
+    assert taken(large, first) == {*NAMES} - {"bulb"}
+    assert large.lights == expected.lights
+    # Where it cannot be kept it stays in several files.
+    cache.drop([entry for entry in cache.entries() if entry.origin == large.origin])
+    monkeypatch.setattr(cache, "keep", lambda basis: False)
+    apart = obtain_basis(room(tmp_path, MOVED), spp=16)
+    assert taken(apart, large) >= {*NAMES} - {"bulb"}
+    weights = np.linspace(0, 1, 15).reshape(5, 3)
+    np.testing.assert_allclose(apart.mix(weights), large.mix(weights), atol=2e-3)
+    some = slice(100, 333)
+    np.testing.assert_array_equal(apart.planes.pixels(some)[2:], large.planes.pixels(some)[2:])
+
+
+@pytest.mark.parametrize("damage", ["cut", "gone"])
+def test_a_damaged_file_costs_its_planes(
+    tmp_path: Path, rendered: Rendered, damage: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    obtain_basis(room(tmp_path), spp=16)
+    [entry] = cache.entries()
+    listed = cache.entries
+    if damage == "cut":
+        whole = entry.path.read_bytes()
+        entry.path.write_bytes(whole[: len(whole) * 3 // 4])
+    else:  # between being listed and being read
+
+        def and_gone() -> list[cache.Entry]:
+            found = listed()
+            entry.path.unlink(missing_ok=True)
+            return found
+
+        monkeypatch.setattr(cache, "entries", and_gone)
+    basis = obtain_basis(scene := room(tmp_path, MOVED), spp=16)
+    assert [its[0] for its in rendered] == [NAMES] * 2
+    assert basis.origin.scene_identity == scene.identity
+    assert not basis.origin.is_composed
+
+
+def test_planes_without_an_identity_are_none_of_anybodys(
+    tmp_path: Path, rendered: Rendered
+) -> None:
+    """As in files of versions that knew of none."""
+    first = obtain_basis(room(tmp_path), spp=16)
+    lights = tuple(replace(light, identity="") for light in first.lights)
+    cache.drop(cache.entries())
+    assert cache.keep(replace(first, lights=lights))
+    obtain_basis(room(tmp_path, MOVED), spp=16)
+    assert [its[0] for its in rendered] == [NAMES] * 2
+    same_basis(obtain_basis(room(tmp_path), spp=16), first)
+    assert len(rendered) == 2
+
+
+def test_an_interrupt_keeps_what_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rendered: Rendered
+) -> None:
+    monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 24 * 20)
+    obtain_basis(room(tmp_path), spp=32)
+    scene = room(tmp_path, MOVED)
+
+    def press_ctrl_c(_label: str, done: int, _total: int) -> None:
+        if done == 4:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(Interrupted, match="16 of 32"):
+        obtain_basis(scene, spp=32, render=render_basis, progress=press_ctrl_c)
+    basis = obtain_basis(scene, spp=32)
+    assert rendered[1:] == [(("bulb",), 32, False)]
+    agrees(basis, render_basis(scene, spp=32, seed=5))
+
+
+def test_two_scenes_in_one_folder_share_what_is_the_same(
+    tmp_path: Path, rendered: Rendered
+) -> None:
+    first = obtain_basis(room(tmp_path), spp=16)
+    path = write_room(tmp_path, name="hall.xml", lights=LIGHTS["panel"] + LIGHTS["sun"])
+    second = obtain_basis(load_scene(path), spp=16)
+    assert len(rendered) == 1
+    assert taken(second, first) == {"panel", "sun"}
+    assert (second.origin.scene, second.source) == ("hall.xml", str(path))
+
+
+def test_a_person_is_told(tmp_path: Path, make_listener: Callable[[], Any]) -> None:
+    obtain(room(tmp_path), Settings(spp=4), make_listener())
+    hears = make_listener()
+    obtain(room(tmp_path, MOVED), Settings(spp=4), hears)
+    assert hears.said == [
+        "4 of 5 lights come from an earlier run; 1 is rendered (use_cache=False renders all again)"
+    ]
+    hears = make_listener()
+    obtain(room(tmp_path, MOVED), Settings(spp=4), hears)
+    assert hears.said == [
+        "basis of 4 samples per pixel kept from an earlier run (use_cache=False renders it again)"
+    ]
+
+
+@pytest.fixture
+def make_listener() -> Callable[[], Any]:
+    class Hears:
+        def __init__(self) -> None:
+            self.said: list[str] = []
+
+        def __call__(self, *_: object) -> None: ...
+
+        def say(self, text: str) -> None:
+            self.said.append(text)
+
+    return Hears
