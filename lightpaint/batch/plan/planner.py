@@ -119,16 +119,18 @@ class _Planner:
         self, entry: LookEntry, reads: Sequence[Path], *, is_possible: bool
     ) -> tuple[PlanStep, ...]:
         """Return the steps of a look: its answer, and its render and exports if they are wanted."""
-        options: dict[str, Any] = {"force": self._force, "command": self._command, "reads": reads}
-        tasks = [answer_task(entry, self._folders, **options)]
+        folder = self._folders[entry.name]
+        answer = answer_task(
+            entry, self._folders, reads=reads, force=self._force, command=self._command
+        )
+        tasks = [answer]
         made_of = [self._fingerprints.answer(entry, reads)]
         if "render" in entry.want:
-            tasks.append(render_task(entry, self._folders, **options))
+            tasks.append(render_task(answer, entry, folder))
             made_of.append(self._fingerprints.render(entry))
         if "export" in entry.want:
-            tasks.append(export_task(entry, self._folders, **options))
+            tasks.append(export_task(answer, entry, folder))
             made_of.append(self._fingerprints.export(entry))
-        folder = self._folders[entry.name]
         is_whole = is_possible and is_as_written(folder)
         steps = []
         for task, its in zip(tasks, made_of, strict=True):

@@ -123,7 +123,6 @@ def answer_task(
     """Return the task of a look's answer. folders: of all looks, by name. reads: its input
     files.
     """
-    settings = {**_plain(entry.settings), "force": force, "command": command}
     lightings = [str(folders[name] / "lighting.json") for name in entry.of]
     return Task(
         entry.name,
@@ -133,7 +132,7 @@ def answer_task(
             entry.paintings,
             entry.basis,
             entry.constraints,
-            Settings(**settings),
+            replace(entry.settings, force=force, command=command),
             folder=str(folders[entry.name]),
             by_sensor=entry.by_sensor,
         ),
@@ -150,31 +149,15 @@ def answer_task(
     )
 
 
-def render_task(
-    entry: LookEntry,
-    folders: Mapping[str, Path],
-    *,
-    reads: Sequence[Path] = (),
-    force: bool,
-    command: str,
-) -> Task:
-    """Return the task of a look's final render."""
-    answer = answer_task(entry, folders, reads=reads, force=force, command=command)
-    lighting = str(folders[entry.name] / "lighting.json")
+def render_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
+    """Return the task of a look's final render. answer: that of its answer, in `folder`."""
+    lighting = str(folder / "lighting.json")
     return Task(entry.name, "render", answer.job, (lighting,), answer.reads, final=entry.final)
 
 
-def export_task(
-    entry: LookEntry,
-    folders: Mapping[str, Path],
-    *,
-    reads: Sequence[Path] = (),
-    force: bool,
-    command: str,
-) -> Task:
-    """Return the task of a look's exports for other programs."""
-    answer = answer_task(entry, folders, reads=reads, force=force, command=command)
-    lighting = str(folders[entry.name] / "lighting.json")
+def export_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
+    """Return the task of a look's exports. answer: that of its answer, in `folder`."""
+    lighting = str(folder / "lighting.json")
     # Of light groups it needs what they are called.
     bases = answer.bases if isinstance(entry.basis, GroupsFile) else ()
     how: dict[str, Any] = {"handover": entry.handover, "bases": bases}
@@ -209,7 +192,3 @@ def _map_paths(given: Any, move: PathMap) -> Any:
     if isinstance(given, list):
         return [_map_paths(value, move) for value in given]
     return move(given) if isinstance(given, str) else given
-
-
-def _plain(settings: Settings) -> dict[str, Any]:
-    return {name: getattr(settings, name) for name in Settings.expected}
