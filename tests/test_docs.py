@@ -17,7 +17,7 @@ from lightpaint.batch.cluster.cluster import LIMIT_FACTOR, MIN_LIMIT_S
 from lightpaint.batch.manifest.checks import SOLVE_STEPS
 from lightpaint.batch.manifest.entries import MAX_LOOKS
 from lightpaint.batch.manifest.keys import MAX_FRAMES
-from lightpaint.cli.commands.rooms import template_lines
+from lightpaint.cli.commands.render_commands import template_lines
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.lighting.constraints.white_lights import LAMP_KELVINS
 from lightpaint.lighting.fit import DEFAULT_HOLD
@@ -153,10 +153,10 @@ def _options() -> set[str]:
 
 #: Of options whose help has a number that is not that of the parser itself: what the code has.
 DEFAULTS = {
-    "--hold": f"{DEFAULT_HOLD:g} where it was painted over the current look, else 0",
-    "--port": f"{DEFAULT_PORT}, or any if that is taken",
+    "--hold": f"{DEFAULT_HOLD:g} if the current look was painted over, else 0",
+    "--port": f"{DEFAULT_PORT}, or any free one if that is taken",
     "--exposure": "0",
-    "--space": "8 and 16 bits",
+    "--space": "8 or 16 bits",
     "--task-limit": f"{LIMIT_FACTOR:g} times what it is expected to take, at least {MIN_LIMIT_S:g}",
 }
 
@@ -180,7 +180,7 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
     preview, final = PRESETS["preview"], PRESETS["final"]
     pixels = round(preview.pixels or 0, -4)
     for said in (
-        f"preview: {preview.spp} samples per pixel on some {pixels:,} pixels",
+        f"preview: {preview.spp} samples per pixel on about {pixels:,} pixels",
         f"final: {final.spp} on the whole film",
         f"white: {LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K",
         f"more than {MAX_SEPARATE} are alike",

@@ -1,10 +1,10 @@
 # PYTHON_ARGCOMPLETE_OK
-"""The command line: one sub-command per room. Parses, calls, prints; no more.
+"""The command line: it parses, calls the library and prints; no more.
 
 Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: done, but not as asked
-(`verify` found a disagreement, an answer is not close enough); 2: something the user can mend, said
-in one line; 70: a fault of lightpaint's own; 130: interrupted, 143: told to end, 129: its terminal
-has closed.
+(`verify` found a disagreement, an answer is not close enough); 2: an error that the user can fix,
+in one line; 70: a bug in lightpaint; 130: interrupted; 143: terminated; 129: its terminal has
+closed.
 """
 
 from collections.abc import Sequence
@@ -12,25 +12,25 @@ from collections.abc import Sequence
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code."""
-    came: list[int] = []
+    received: list[int] = []
     try:
-        # What takes time to import is imported where an interrupt is heard, and waits.
+        # Slow imports happen where an interrupt is caught, and held back until they end.
         from lightpaint.signals import interruptible_between_pieces, signals_as_interrupts
 
-        with signals_as_interrupts(came):
+        with signals_as_interrupts(received):
             with interruptible_between_pieces():
                 from lightpaint.cli.dispatcher import run_command
-            code = run_command(arguments, came)
+            code = run_command(arguments, received)
     except KeyboardInterrupt:
         import sys
 
         sys.stderr.write("lightpaint: interrupted\n")
         code = 130
-    except Exception as error:  # before there was a command to answer for it
+    except Exception as error:  # before any command ran
         import sys
 
         from lightpaint.cli.crash_report import report_fault
 
         given = list(sys.argv[1:] if arguments is None else arguments)
         code = report_fault("lightpaint", error, given)
-    return 128 + came[0] if came and code == 130 else code
+    return 128 + received[0] if received and code == 130 else code

@@ -1,4 +1,4 @@
-"""A fault of lightpaint's own: one line for people, and the details in a private file."""
+"""Reports of bugs in lightpaint: one line for people, and the details in a private file."""
 
 import os
 import platform
@@ -15,28 +15,28 @@ from lightpaint.files import one_line
 from lightpaint.screen import visible
 from lightpaint.version import __version__
 
-#: Exit code of a fault that nobody foresaw: EX_SOFTWARE of sysexits.h.
+#: Exit code of an unexpected error: EX_SOFTWARE of sysexits.h.
 FAULT = 70
 
-#: Characters of the error that stand in the line.
-LONGEST = 300
+#: Longest error text in the line, in characters.
+MAX_ERROR_LENGTH = 300
 
 
 def report_fault(command: str, error: BaseException, given: Sequence[str]) -> int:
-    """Say that something unforeseen went wrong and where the details are; return the exit code.
+    """Print that an unexpected error occurred and where the details are; return the exit code.
 
-    command: as it is called, with its sub-command. given: what was typed after `lightpaint`.
+    command: its name, with the sub-command. given: the arguments after `lightpaint`.
     """
-    said = one_line(str(error), limit=LONGEST)
+    said = one_line(str(error), limit=MAX_ERROR_LENGTH)
     what = f"{type(error).__name__}: {said}" if said else type(error).__name__
-    written = _written(_details(error, given))
+    written = _write_details(_details(error, given))
     where = f"the details are in {written}" if written else "the details could not be written"
     lines.err(f"{command}: a fault of lightpaint's own: {what}; {where}")
     return FAULT
 
 
 def _details(error: BaseException, given: Sequence[str]) -> str:
-    """Return all that helps to find the fault. Text from files cannot steer a terminal."""
+    """Return all that helps to find the bug, without control characters from files."""
     about = (
         f"lightpaint {__version__}, Python {platform.python_version()}, {platform.platform()}",
         f"command: {visible(repr(['lightpaint', *given]))}",
@@ -47,18 +47,18 @@ def _details(error: BaseException, given: Sequence[str]) -> str:
 
 
 def _libraries() -> list[str]:
-    """Return the versions of those that are loaded already: loading one might fail again."""
+    """Return the versions of libraries that are loaded already: loading one might fail again."""
     loaded = ((name, sys.modules.get(name)) for name in ("mitsuba", "drjit", "numpy"))
     return [f"{name} {module.__version__}" for name, module in loaded if module is not None]
 
 
-def _written(text: str) -> Path | None:
-    """Return the file that has it, which nobody else may read; None where no place takes one."""
+def _write_details(text: str) -> Path | None:
+    """Write the details to a file that only the user can read; None if no folder allows it."""
     now = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     for folder in _folders():
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            # mkstemp makes it for its owner alone, and takes no place of another.
+            # mkstemp creates it for its owner alone, and never replaces a file.
             descriptor, name = tempfile.mkstemp(".txt", f"lightpaint-{now}-", folder)
             with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
                 file.write(text)
@@ -69,9 +69,9 @@ def _written(text: str) -> Path | None:
 
 
 def _folders() -> list[Path]:
-    """Return where it may go: the user's folder for logs, or else that for temporary files."""
+    """Return possible folders: the user's folder for logs, then that for temporary files."""
     places = []
-    with suppress(ImportError, OSError, RuntimeError):  # of somebody without a home
+    with suppress(ImportError, OSError, RuntimeError):  # for users without a home folder
         from platformdirs import user_log_path
 
         places.append(user_log_path("lightpaint"))

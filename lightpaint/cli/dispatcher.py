@@ -1,4 +1,4 @@
-"""One command from its words to its exit code."""
+"""Runs one command, from its arguments to its exit code."""
 
 import gc
 import io
@@ -12,12 +12,12 @@ from importlib import import_module
 from lightpaint.cli.crash_report import report_fault
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.output import lines
-from lightpaint.cli.output.output_mode import CommandOutcome, Manner, speaking
+from lightpaint.cli.output.output_mode import CommandOutcome, OutputMode, using_output_mode
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BatchError, LightpaintError
 
-#: Where commands are that are not among the plain ones.
-_HOMES = {
+#: Modules of commands that are not in `render_commands`.
+_MODULES = {
     "batch": "batch",
     "cache": "maintenance",
     "doctor": "maintenance",
@@ -27,30 +27,30 @@ _HOMES = {
     "solve": "solve",
 }
 
-#: The scene or the film asks for that, which is no fault of the program.
+#: The scene or the film needs too much memory, which is not a bug.
 OUT_OF_MEMORY_TEXT = (
-    "this takes more memory than there is: close other programs, or render a smaller film "
+    "this needs more memory than there is: close other programs, or render a smaller film "
     '(--resolution 1/2 takes about a quarter; in a manifest, resolution = "1/2")'
 )
 
 
-def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
-    """Run one command and return the exit code. came: the signals that have been heard."""
+def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int:
+    """Run one command and return the exit code. received: the signals that have arrived."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     for stream in (sys.stdout, sys.stderr):
-        # A terminal that lacks a character shows another, and loses no result over it.
+        # A terminal without a character shows a substitute instead of failing.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     parser = command_parser()
-    if "_ARGCOMPLETE" in os.environ:  # a shell asks what could be typed
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks for completions
         from lightpaint.cli.options.completion import complete
 
         complete(parser)
     options = parser.parse_args(given)
-    how_to_go_on = ""
+    hint = ""
     try:
-        # What a command needs is imported when it runs: --help answers at once. An interrupt in
-        # the middle of it would leave libraries half there, which some do not survive.
+        # A command's imports happen when it runs, so that --help answers at once. An interrupt in
+        # the middle would leave libraries half imported, which some do not survive.
         from lightpaint.signals import interruptible_between_pieces
 
         with _without_garbage(), interruptible_between_pieces():
@@ -60,27 +60,27 @@ def run_command(arguments: Sequence[str] | None, came: Sequence[int]) -> int:
 
             command = _command(options.command)
 
-        # The commands say it in their own words.
+        # The commands report this in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
-        with speaking(Manner(options.as_json, options.is_quiet, options.is_verbose)):
+        with using_output_mode(OutputMode(options.as_json, options.is_quiet, options.is_verbose)):
             outcome = command(**values_of(options, given))
             if options.as_json and outcome.told is not None:
                 terminal.write_json(outcome.told())
             terminal.note("done")
         return outcome.code
     except KeyboardInterrupt as interrupt:
-        how_to_go_on = f": {interrupt}" if str(interrupt) else ""
+        hint = f": {interrupt}" if str(interrupt) else ""
     except Exception as error:
-        # An interrupt in the middle of a library often surfaces as some error of its own.
-        if not came:
-            return _failed(options.command, error, given)
-    lines.err(f"lightpaint {options.command}: interrupted{how_to_go_on}")
+        # An interrupt inside a library often surfaces as an error of its own.
+        if not received:
+            return _report(options.command, error, given)
+    lines.err(f"lightpaint {options.command}: interrupted{hint}")
     return 130
 
 
 @contextmanager
 def _without_garbage() -> Iterator[None]:
-    """What is made here stays, and is not looked through for garbage, now or later."""
+    """Keep objects that are created within the block out of garbage collection, now and later."""
     gc.disable()
     try:
         yield
@@ -90,13 +90,13 @@ def _without_garbage() -> Iterator[None]:
 
 
 def _command(name: str) -> Callable[..., CommandOutcome]:
-    """The function of a command, of whose rooms the others have no need."""
-    module = import_module(f"lightpaint.cli.commands.{_HOMES.get(name, 'rooms')}")
+    """Return the function of a command, importing only what that one needs."""
+    module = import_module(f"lightpaint.cli.commands.{_MODULES.get(name, 'render_commands')}")
     return getattr(module, name)  # type: ignore[no-any-return]
 
 
-def _failed(command: str, error: Exception, given: Sequence[str]) -> int:
-    """Say what went wrong, and return the exit code."""
+def _report(command: str, error: Exception, given: Sequence[str]) -> int:
+    """Print what went wrong, and return the exit code."""
     if isinstance(error, LightpaintError):
         for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
             lines.err(f"lightpaint {command}: {spoken(line)}")

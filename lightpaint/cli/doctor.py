@@ -1,4 +1,4 @@
-"""What of lightpaint works on this machine, and the line that installs what is missing."""
+"""Checks of what works on this machine, with the command that installs what is missing."""
 
 import ctypes
 import importlib.metadata
@@ -17,13 +17,13 @@ from lightpaint.version import __version__
 State = Literal["ok", "missing", "info"]
 
 
-#: What lightpaint is built on.
+#: Packages that lightpaint needs.
 PACKAGES = ("mitsuba", "drjit", "numpy", "OpenEXR", "OpenImageIO", "pillow", "colour-science")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at. remedy: what to type, where something is missing."""
+    """The result of one check. remedy: the command to run if something is missing."""
 
     what: str
     state: State
@@ -32,7 +32,7 @@ class Finding:
 
 
 def examine(variant: str | None = None) -> list[Finding]:
-    """Look at everything lightpaint needs here. `variant`: as in `use_variant`."""
+    """Check everything that lightpaint needs. `variant`: as in `use_variant`."""
     findings = [
         Finding("lightpaint", "info", __version__),
         Finding("Python", "info", f"{platform.python_version()} ({sys.executable})"),
@@ -67,7 +67,7 @@ def _package(name: str) -> Finding:
 
 
 def _extra(what: str, package: str, extra: str) -> Finding:
-    """Something that is used where it is there, and missed by nobody else."""
+    """Return the finding of an optional package."""
     found = _package(package)
     if found.state == "ok":
         return Finding(what, "ok", found.found)
@@ -75,7 +75,7 @@ def _extra(what: str, package: str, extra: str) -> Finding:
 
 
 def _denoiser() -> Finding:
-    """What takes the grain out of pictures. Nothing here needs it."""
+    """Return the finding of the denoiser, which is optional."""
     found = _package("pyoidn")
     if found.state == "ok":
         return Finding("denoiser", "ok", f"Open Image Denoise (pyoidn {found.found})")
@@ -91,15 +91,15 @@ def _llvm() -> list[Finding]:
             export = f"export DRJIT_LIBLLVM_PATH={llvm.path}"
             findings.append(Finding("for plain mitsuba", "info", export))
         else:
-            skipped = f"passed over, {llvm.problem}: {llvm.path} ({llvm.origin})"
+            skipped = f"skipped, {llvm.problem}: {llvm.path} ({llvm.origin})"
             findings.append(Finding("LLVM", "info", skipped))
     if not any(finding.state == "ok" for finding in findings):
-        findings.append(Finding("LLVM", "missing", "none that is usable", INSTALL_LLVM))
+        findings.append(Finding("LLVM", "missing", "no usable one", INSTALL_LLVM))
     return findings
 
 
 def _gpu() -> Finding:
-    """Whether an NVIDIA GPU answers. Nothing here needs one."""
+    """Return the finding of an NVIDIA GPU, which is optional."""
     try:
         ctypes.CDLL("libcuda.so.1")
         names = subprocess.run(

@@ -26,36 +26,36 @@ from lightpaint.pipeline.result_folder import ResultFolder
 
 
 @dataclass
-class Several:
-    """What several looks of one command are to each other.
+class LookSet:
+    """The looks of one command, with their variations and their gallery.
 
-    together: folder of a gallery of all; None where somebody else's page lies there. keep_going:
-    whether one that is bad fails alone. called: by folder, what is a variation of another. made: by
-    the folder of an answer, the variations that are made of it, and where they go. failed: names of
-    those that cannot be done, and why. entries: what the gallery shows. shifted: documents of the
-    variations that are made of answers.
+    gallery: folder of their gallery; None if a page of somebody else is there. keep_going: True to
+    go on after a failure. variation_names: by folder, the variation of another look.
+    derived_folders: by the folder of an answer, the variations computed from it, and their folders.
+    failed: names of failed looks, with the reason. entries: the looks in the gallery. shifted:
+    documents of the variations computed from answers.
     """
 
-    together: Path | None
+    gallery: Path | None
     keep_going: bool
-    called: Mapping[Path, str]
-    made: Mapping[Path, Mapping[str, ResultFolder]]
+    variation_names: Mapping[Path, str]
+    derived_folders: Mapping[Path, Mapping[str, ResultFolder]]
     failed: dict[str, str]
     entries: list[LookEntry] = field(default_factory=list)
     shifted: list[dict[str, Any]] = field(default_factory=list)
 
-    def is_done(self, job: Job, lighting: Lighting, bases: Sequence[Basis]) -> None:
-        """Make the variations of an answer that are made of it."""
+    def finish_look(self, job: Job, lighting: Lighting, bases: Sequence[Basis]) -> None:
+        """Write the variations that are computed from an answer."""
         self._enter(job)
-        for word, place in self.made.get(job.folder, {}).items():
+        for word, place in self.derived_folders.get(job.folder, {}).items():
             publish_shifted(job, word, place, lighting, bases)
             self.entries.append(entry_of(job, place.folder, word))
             files = [file for file in place.files if file.is_file()]
             about = {"variation": word, "of": str(job.folder)}
             self.shifted.append(files_document(place.folder, files, **about))
 
-    def goes_on(self, job: Job, error: Exception) -> bool:
-        """Whether the others are solved all the same."""
+    def continues_after(self, job: Job, error: Exception) -> bool:
+        """Return True if the other looks are solved in spite of an error."""
         if not self.keep_going or is_disk_full(error):
             return False
         self._enter(job)
@@ -63,22 +63,22 @@ class Several:
         return True
 
     def show(self, bases: Sequence[Basis]) -> None:
-        """Say what failed, and write the gallery."""
+        """Print the failures, and write the gallery."""
         for name, why in self.failed.items():
             terminal.complain("solve", f"{name}: {why}")
-        if self.together is None:
+        if self.gallery is None:
             return
         named = {entry.name for entry in self.entries}
         lost = [LookEntry(name, "") for name in self.failed if name not in named]
-        rows = write_solve_gallery(self.together, [*self.entries, *lost], self.failed, bases)
-        terminal.write(f"{self.together / FILES[0]}: {counts_text(rows)}")
+        rows = write_solve_gallery(self.gallery, [*self.entries, *lost], self.failed, bases)
+        terminal.write(f"{self.gallery / FILES[0]}: {counts_text(rows)}")
 
     def _enter(self, job: Job) -> None:
         if all(entry.name != job.folder.name for entry in self.entries):
-            self.entries.append(entry_of(job, variation=self.called.get(job.folder, "")))
+            self.entries.append(entry_of(job, variation=self.variation_names.get(job.folder, "")))
 
 
-def several_of(
+def look_set(
     jobs: Sequence[Job],
     words: Sequence[str],
     failed: dict[str, str],
@@ -86,29 +86,29 @@ def several_of(
     output: Path | None,
     keep_going: bool,
     force: bool,
-) -> tuple[list[Job], Several]:
-    """All jobs, those of variations behind the looks that they vary, and what goes with them.
+) -> tuple[list[Job], LookSet]:
+    """Return all jobs, variations after the looks that they vary, and the set of looks.
 
-    words: variations. failed: receives why, by the name of its folder, where one of them cannot be
-    done and the others go on. output: as it was given.
+    words: variations. failed: receives the reason of each failure, by the name of the folder, if
+    the others go on. output: the option's value.
     """
     _check_apart([job.folder for job in jobs], words)
-    found: list[Job] = []
-    called: dict[Path, str] = {}
-    made: dict[Path, Mapping[str, ResultFolder]] = {}
+    all_jobs: list[Job] = []
+    variation_names: dict[Path, str] = {}
+    derived_folders: dict[Path, Mapping[str, ResultFolder]] = {}
     for job in jobs:
         try:
-            anew, places = variation_jobs(job, words), shifted_folders(job, words)
+            variations, places = variation_jobs(job, words), shifted_folders(job, words)
         except LOOK_ERRORS as error:
             if not keep_going:
                 raise
             failed[job.folder.name] = str(error)
             continue
-        found += [job, *anew.values()]
-        called |= {sibling.folder: word for word, sibling in anew.items()}
-        made[job.folder] = places
-    together = _together(output, [job.folder for job in jobs], force=force)
-    return found, Several(together, keep_going, called, made, failed)
+        all_jobs += [job, *variations.values()]
+        variation_names |= {sibling.folder: word for word, sibling in variations.items()}
+        derived_folders[job.folder] = places
+    gallery = _gallery_folder(output, [job.folder for job in jobs], force=force)
+    return all_jobs, LookSet(gallery, keep_going, variation_names, derived_folders, failed)
 
 
 def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
@@ -116,21 +116,21 @@ def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
     for folder in (variation_folder(x, word) for x in folders for word in words):
         if folder in folders:
             raise OutputError(
-                f"a variation and a painting would both go to {folder}: solve them apart, each "
-                "with its own folder=..."
+                f"a variation and a painting would both go to {folder}: solve them separately, "
+                "each with its own folder=..."
             )
 
 
-def _together(output: Path | None, folders: Sequence[Path], *, force: bool) -> Path | None:
-    """Where the gallery of all looks goes: beside their folders.
+def _gallery_folder(output: Path | None, folders: Sequence[Path], *, force: bool) -> Path | None:
+    """Return the folder for the gallery of all looks: that of their folders.
 
-    None where none was named and somebody else's page, or a look, lies there.
+    None if no folder was given and a page of somebody else, or a look, is there.
     """
     place = folders[0].parent if folders else output or Path()
     try:
         if taken := next((x.name for x in folders if is_reserved(x.name)), ""):
             raise OutputError(
-                f"{taken} is where the gallery of several looks has files of its own: give the "
+                f"{taken} is a folder of the gallery of several looks: give the "
                 "painting another name"
             )
         check_gallery(place, force=force)

@@ -1,4 +1,4 @@
-"""What a script asks of an answer, beside that it is the best there is."""
+"""Tolerances of a script: how close an answer must come for exit code 0."""
 
 from dataclasses import dataclass
 
@@ -6,31 +6,31 @@ from lightpaint.lighting.analysis.appearance.appearance import Seen
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """How close an answer has to come; None for anything will do.
+class Tolerances:
+    """The required closeness of an answer; None for no requirement.
 
-    max_miss: mean ΔE over what was painted, at most. min_fit: `Seen.share_met`, at least.
+    max_miss: largest mean ΔE over the painted pixels. min_fit: smallest `Seen.share_met`.
     """
 
     max_miss: float | None = None
     min_fit: float | None = None
 
     def shortfalls(self, seen: Seen) -> list[str]:
-        """What an answer lacks, in words behind its name; nothing where it will do."""
-        told = []
+        """Return what an answer lacks, in words that follow its name."""
+        shortfalls = []
         if self.max_miss is not None and seen.delta_e > self.max_miss:
-            told.append(
+            shortfalls.append(
                 f"misses a mean ΔE of {seen.delta_e:.3f}, more than --max-miss {self.max_miss:g}"
             )
         if self.min_fit is not None and seen.share_met < self.min_fit:
-            told.append(
+            shortfalls.append(
                 f"meets a share of {seen.share_met:.3f}, less than --min-fit {self.min_fit:g}"
             )
-        return told
+        return shortfalls
 
     def document(self, seen: Seen) -> dict[str, object]:
-        """The same for programs; nothing where nothing is asked."""
-        asked = {"max_miss": self.max_miss, "min_fit": self.min_fit}
-        if not (asked := {name: value for name, value in asked.items() if value is not None}):
+        """Return the requirements and whether they are met, for programs."""
+        required = {"max_miss": self.max_miss, "min_fit": self.min_fit}
+        if not (required := {name: value for name, value in required.items() if value is not None}):
             return {}
-        return {"asked": asked, "is_met": not self.shortfalls(seen)}
+        return {"asked": required, "is_met": not self.shortfalls(seen)}

@@ -283,7 +283,7 @@ def test_bases_are_dropped_by_scene_or_file(
         (["drop", "hall"], "no basis of 'hall' is kept in"),
         (["drop", "room", "gone"], "no basis of 'gone' is kept in"),  # and the other stays
         (["drop"], "cache drop needs the name of a scene"),
-        (["clear", "room"], "cache clear takes no name: cache drop room does"),
+        (["clear", "room"], "cache clear takes no name: did you mean cache drop room"),
         (["list", "room"], "cache list takes no name"),
     ):
         done = run(tmp_path, "cache", *line, **here)

@@ -175,7 +175,7 @@ def test_one_line_says_what_the_painting_leaves_open(tmp_path: Path, make_basis:
     assert done.returncode == 0, done.stderr
     [line] = [x for x in done.stderr.splitlines() if "leaves lights open" in x]
     for words in (
-        "the picture holds nothing of dark: kept as it is",
+        "the picture shows nothing of dark: kept as it is",
         "no painted pixel sees right: kept as it is",
         "one and twin light the painted part alike",
     ):

@@ -13,7 +13,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint.basis.file import write_basis
 from lightpaint.cli.options.parser import command_parser
-from lightpaint.cli.tolerances import Wanted
+from lightpaint.cli.tolerances import Tolerances
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.appearance.appearance import Seen
 
@@ -101,10 +101,10 @@ def test_shares_of_what_was_asked() -> None:
     for delta_e, asked, share in ((2, 10, 0.8), (0, 10, 1), (12, 10, 0), (0, 0, 1), (1, 0, 0)):
         seen = Seen(float(delta_e), 0.0, float(asked))
         assert seen.share_met == pytest.approx(share)
-        assert Wanted().shortfalls(seen) == []
-        assert Wanted().document(seen) == {}
-        assert Wanted(min_fit=seen.share_met, max_miss=delta_e).shortfalls(seen) == []
-        assert len(Wanted(max_miss=delta_e - 1e-9).shortfalls(seen)) == 1
+        assert Tolerances().shortfalls(seen) == []
+        assert Tolerances().document(seen) == {}
+        assert Tolerances(min_fit=seen.share_met, max_miss=delta_e).shortfalls(seen) == []
+        assert len(Tolerances(max_miss=delta_e - 1e-9).shortfalls(seen)) == 1
 
 
 def test_every_command_has_a_document(tmp_path: Path) -> None:

@@ -189,10 +189,10 @@ def test_a_target_that_names_no_folder(tmp_path: Path, make_basis: Any, name: st
     write_lighting(tmp_path / "m.json", lighting.for_target("good"))
     if name:  # which is then called as its file is
         said = refused(tmp_path, "relight", "scene.xml", "l.json")
-        assert "is no name for a folder: choose one with -o" in said
+        assert "cannot be the name of a folder: choose one with -o" in said
         assert len(said) < 600
         several = refused(tmp_path, "relight", "scene.xml", "l.json", "m.json", "-o", "looks")
-        assert "is no name for a folder: take it alone, with -o" in several
+        assert "cannot be the name of a folder: solve it alone, with -o" in several
     # Named otherwise, it is only looked for where it is not.
     assert "no such scene" in refused(tmp_path, "relight", "gone.xml", "l.json", "-o", "there")
 

@@ -125,7 +125,7 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     [
         ("room.basis.exr room.basis.exr", "a view is there twice"),
         ("room.basis.exr groups.exr", "several are bases of the views of one scene"),
-        ("scene.xml room.basis.exr", "named with --sensor, once for each"),
+        ("scene.xml room.basis.exr", "for views of a scene repeat --sensor"),
         ("room.basis.exr -s a", "-s cannot change a saved basis|--sensor"),
         ("", "nothing to paint: give a scene, a basis, or light groups"),
         ("--lights key,fill", "no such file or folder of light groups: --lights key,fill"),
@@ -367,7 +367,7 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
         assert process.stderr is not None
         said = process.stderr.read()
     assert open_to in said
-    is_risk = "whoever has its address, with the token, can paint here" in said
+    is_risk = "anyone who has its address with the token can paint here" in said
     assert is_risk == (host == "0.0.0.0")
     assert "Traceback" not in said
     assert said.endswith("what was painted is kept in groups.paint\n")

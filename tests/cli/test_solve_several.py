@@ -63,7 +63,7 @@ def test_somebody_elses_page_is_kept(here: Path) -> None:
 def test_a_painting_called_as_a_file_of_the_gallery_is_refused(here: Path) -> None:
     (here / "p1.exr").rename(here / "thumbnails.exr")
     said = refused(here, "solve", "b.basis.exr", "p0.exr", "thumbnails.exr", "-o", "out")
-    assert "thumbnails is where the gallery of several looks has files of its own" in said
+    assert "thumbnails is a folder of the gallery of several looks" in said
 
 
 def test_variations_are_what_a_batch_makes_of_them(here: Path) -> None:

@@ -162,7 +162,7 @@ def test_each_worker_has_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
         assert shown(listen) == ["worker 2: dawn: answer"]
         for k in range(3, 20):
             listen.at_work(f"worker {k}", "dusk: answer")
-        assert len(shown(listen)) == terminal.WORKERS + 1
+        assert len(shown(listen)) == terminal.MAX_WORKER_LINES + 1
         assert shown(listen)[-1] == "and 10 more at work"
         for k in range(2, 20):
             listen.at_work(f"worker {k}", None)

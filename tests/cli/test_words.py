@@ -13,7 +13,7 @@ import lightpaint
 from lightpaint.batch.run_options import RunOptions
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import LOADING
-from lightpaint.cli.output.vocabulary import _SAID, OPTIONS, SPELLINGS, spoken
+from lightpaint.cli.output.vocabulary import _ARGUMENT, OPTIONS, SPELLINGS, spoken
 from lightpaint.paint.launch import paint_in_browser
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import NOT_IN_GROUPS
@@ -81,7 +81,7 @@ def test_every_argument_that_a_message_names_is_in_the_table(file: Path) -> None
             if any(text.startswith(spelling, match.start()) for spelling in SPELLINGS):
                 continue
             assert match[1] in OPTIONS, f"{file}:{line}: {match[0]}"
-            assert _SAID.match(text, match.start()), f"{file}:{line}: {text}"
+            assert _ARGUMENT.match(text, match.start()), f"{file}:{line}: {text}"
 
 
 def test_the_test_itself_finds_what_it_looks_for(tmp_path: Path) -> None:

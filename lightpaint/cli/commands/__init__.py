@@ -1,1 +1,1 @@
-"""One function for each sub-command: call the corridor, and show what came out."""
+"""The functions of the sub-commands: they call the library and print the results."""

@@ -1,4 +1,4 @@
-"""What `lightpaint solve` prints of an answer: for people, or with everything there is."""
+"""The text that `lightpaint solve` prints for an answer: short, or in full."""
 
 from dataclasses import fields
 from fnmatch import fnmatchcase
@@ -35,21 +35,21 @@ from lightpaint.screen import some_names, some_of
 
 Table = Literal["short", "full"]
 
-#: Lights that are all shown; of more, those that matter most.
+#: Largest number of lights that are all shown; of more, this number of the most important ones.
 ALL, MOST = 16, 10
 
-#: Cells of a name in a table that fits 80 columns with a swatch before it.
+#: Width of a name in a table that fits 80 columns with a swatch.
 NAME = 30
 
-#: Of its present emission, what of a light nobody sees.
+#: Share of its present emission at which a light counts as off.
 OFF = 2.0**-10
 
-#: Distance from Planck's locus up to which a colour is called by its temperature.
+#: Largest distance from Planck's locus of a colour that is shown as a temperature.
 WHITE = 0.02
 
 
 def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
-    """Print how near the answer is, what the lights do, and what was asked beside the painting."""
+    """Print how close the answer is, what the lights do, and which settings shaped it."""
     terminal.tell(look.verdict)
     for sentence in _sentences(look, table):
         terminal.tell(spoken(sentence))
@@ -77,7 +77,10 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
 
 
 def _sentences(look: Look, table: Table) -> list[str]:
-    """What holds the lights most; in full, where all that is missed comes from, and how sure.
+    """Return the main limit on the lights and better colours; in full, all causes and certainty
+    too.
+
+    They end with options to change.
 
     And if other colours come closer.
     """
@@ -93,7 +96,7 @@ def _sentences(look: Look, table: Table) -> list[str]:
 
 
 def _what_holds(look: Look) -> list[str]:
-    """Say what keeps the lights from the paint, the main reason first, each with its option."""
+    """Return what keeps the lights from the painting, the main reason first, with options."""
     if not look.analysis.seen.reasons:
         return bound_sentences(look.diagnosis)
     told = [_spoken_cause(look, reason) for reason in look.analysis.seen.reasons]
@@ -101,7 +104,7 @@ def _what_holds(look: Look) -> list[str]:
 
 
 def _spoken_cause(look: Look, reason: Reason) -> str:
-    """One of them; of what the command line asks of lights, what to leave out."""
+    """Return a reason in words, with the options to leave out."""
     said = spoken_cause(reason, weaker="--hold")
     keys = KEYS_BY_KIND.get(reason.kind, ())
     options = [
@@ -119,23 +122,23 @@ def _spoken_cause(look: Look, reason: Reason) -> str:
 
 
 def spoken_settings(settings: Settings) -> str:
-    """What is used, said or by default: `space display, hold 1, ...`."""
+    """Return the settings in use, given or by default: `space display, hold 1, ...`."""
     told = {field.name: getattr(settings, field.name) for field in fields(settings)}
     transform = told.pop("transform")
     told |= {"view": transform and spoken_view(transform), "command": None}
-    # What is left out is worth a word, and not what is always there.
+    # Mention skipped stages, but not stages that always run.
     said = {name: value for name, value in told.items() if value not in (None, "")}
     said = {name: value for name, value in said.items() if name not in ("verify", "report")}
     return ", ".join(f"{name} {value}" for name, value in said.items() if value is not False)
 
 
 def left_open(look: Look) -> str:
-    """One line: the lights that the painting says nothing of, or nothing of each; "" for none."""
+    """Return one line on lights that the painting does not determine; "" if there are none."""
     unreached = look.solution.certificate.unreached
     dark = [name for name in unreached if not look.basis.image(name).any()]
     told = []
     if dark:
-        told.append(f"the picture holds nothing of {some_names(dark)}: kept as it is")
+        told.append(f"the picture shows nothing of {some_names(dark)}: kept as it is")
     if seen := [name for name in unreached if name not in dark]:
         told.append(f"no painted pixel sees {some_names(seen)}: kept as it is")
     told += partly_reached(look.lighting)
@@ -144,11 +147,11 @@ def left_open(look: Look) -> str:
 
 
 def _show_short(look: Look) -> None:
-    """Print a row for each light that matters, in 80 columns, and what the others do."""
+    """Print a row for each important light, in 80 columns, and a summary of the others."""
     lights, present = look.lighting.lights, look.basis.lights
     shares = energy_shares(look.basis, look.lighting)
     errors = spoken_errors(look.uncertainty, len(shares))
-    shown = _that_matter(look)
+    shown = _important_lights(look)
     table, swatches = terminal.table("light", "stops", "colour", "±", "share"), []
     for k in shown:
         changed = change(present[k], lights[k])
@@ -168,11 +171,11 @@ def _show_short(look: Look) -> None:
     if rest := sorted(set(range(len(lights))) - set(shown)):
         terminal.tell(_spoken_rest(look, rest))
     if any(lights[k].is_active for k in shown):
-        terminal.write("* held by what is asked of it (--table full says what)")
+        terminal.write("* held by a constraint (--table full shows which)")
 
 
-def _that_matter(look: Look) -> list[int]:
-    """Indices of the lights that do most to the picture, or changed most of it, in their order."""
+def _important_lights(look: Look) -> list[int]:
+    """Return indices of the lights that matter or changed most in the picture, in order."""
     weights = look.solution.weights
     if len(weights) <= ALL:
         return list(range(len(weights)))
@@ -182,7 +185,7 @@ def _that_matter(look: Look) -> list[int]:
 
 
 def _spoken_rest(look: Look, rest: list[int]) -> str:
-    """How many more lights there are, what became of them, and what they do together."""
+    """Return the number of other lights, their changes, and their share of the picture."""
     changes = [change(look.basis.lights[k], look.lighting.lights[k]) for k in rest]
     counts = {
         "off": changes.count("off"),
@@ -198,7 +201,7 @@ def _spoken_rest(look: Look, rest: list[int]) -> str:
 
 
 def change(light: BasisLight, setting: LightSetting) -> str:
-    """From the present to the new light in stops of luminance, `on` or `off`."""
+    """Return the change of a light in stops of luminance, `on` or `off`."""
     if light.is_fixed or not any(setting.reached):
         return "kept"
     before, after = (float(luminance(np.array(x.emission))) for x in (light, setting))
@@ -211,14 +214,14 @@ def change(light: BasisLight, setting: LightSetting) -> str:
 
 
 def _color(look: Look, light: LightSetting) -> str | None:
-    """Of a swatch; of a light whose own colour is not known, that of its factor."""
+    """Return the colour of a light's swatch; that of its factor if its own is unknown."""
     if light.is_fixed or light.is_partly_reached:
         return None
     return look.lighting.photometry(light).hex or rgb_to_hex(np.array(light.emission))
 
 
 def _spoken_color(look: Look, light: LightSetting) -> str:
-    """`2700 K` of what is nearly white, else `#ff2010`."""
+    """Return `2700 K` for nearly white, else `#ff2010`."""
     seen = look.lighting.photometry(light)
     if light.is_fixed or seen.hex is None:
         return ""
@@ -227,12 +230,12 @@ def _spoken_color(look: Look, light: LightSetting) -> str:
 
 
 def _show_all(look: Look) -> None:
-    """Print a row for each light: before, solved, how sure, and what it does to the picture."""
+    """Print a row for each light: before, solved, certainty, and share of the picture."""
     shares = energy_shares(look.basis, look.lighting)
     held = any(light.constraint for light in look.lighting.lights)
     headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
-    asked = ["asked (* holds it)"] if held else []
+    asked = ["constraint (* holds it)"] if held else []
     table = terminal.table(*headings, *amounts, *asked)
     errors = spoken_errors(look.uncertainty, len(shares))
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):

@@ -1,4 +1,4 @@
-"""What `lightpaint batch` does: plans, runs and prints."""
+"""`lightpaint batch`: plans, runs and prints."""
 
 import shlex
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from lightpaint.errors import BatchError, OutputError
 from lightpaint.files import scene_name
 from lightpaint.screen import some_of, visible
 
-#: Looks that are listed at the end; of more only those that are not done.
+#: Most looks that are listed at the end; of more only unfinished ones.
 LISTED = 40
 
 
@@ -39,26 +39,26 @@ def batch(
     force: bool,
     log: Path | None,
 ) -> CommandOutcome:
-    """`lightpaint batch looks.toml -o DIR`, or `--init SCENE PAINTING...`"""
+    """Run `lightpaint batch looks.toml -o DIR`, or `--init SCENE PAINTING...`."""
     if is_first:
         made = output or Path("looks.toml")
         write_starter_manifest(made, paths[0], paths[1:], force=force)
-        terminal.write(f"{made}: {len(paths) - 1} looks; what runs them is")
+        terminal.write(f"{made}: {len(paths) - 1} looks; run them with")
         terminal.write(f"lightpaint batch {shlex.quote(str(made))}")
         return CommandOutcome(lambda: {"manifest": str(made), "looks": len(paths) - 1})
     if form is not None and len(paths) != 2:
-        raise BatchError("where is the job to go? give looks.toml --export openjd DIR")
+        raise BatchError("the folder of the job is missing: give looks.toml --export openjd DIR")
     if form is None and len(paths) > 1:
         raise BatchError(f"{len(paths)} manifests: give one, or --init SCENE PAINTING...")
     folder = output or Path(scene_name(Path(paths[0])))
-    # The same in all reports, however often it was stopped, and from wherever it is done.
+    # The same command in all reports, however often and from wherever the batch is run.
     manifest, into = (str(Path(x).absolute()) for x in (paths[0], folder))
     command = shlex.join(["lightpaint", "batch", manifest, "-o", into])
     planned = plan(paths[0], folder, force=force, command=command).select(only)
     if is_dry:
         return _dry(planned)
     if form is not None:
-        return _exported(planned, Path(paths[1]), force=force)
+        return _export(planned, Path(paths[1]), force=force)
     of_looks = (x for look in planned.chosen_looks for x in look.remarks)
     remarks = list(dict.fromkeys((*planned.remarks, *of_looks)))
     for remark in remarks[:LISTED]:
@@ -83,19 +83,19 @@ def batch(
     with listen:
         outcome = run_batch(planned, how, listen, on_step=on_step)
     note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
-    return _told(planned, outcome)
+    return _outcome(planned, outcome)
 
 
-def _exported(planned: Plan, folder: Path, *, force: bool) -> CommandOutcome:
-    """A job for a farm, and how it is run here."""
+def _export(planned: Plan, folder: Path, *, force: bool) -> CommandOutcome:
+    """Write a job for a farm, and print how to run it here."""
     path = write_openjd(folder, planned, command=("--only", LOOK_PARAMETER, "--apart"), force=force)
-    terminal.write(f"{path}: {len(planned.chosen_looks)} looks; what runs them here is")
+    terminal.write(f"{path}: {len(planned.chosen_looks)} looks; run them here with")
     terminal.write(f"openjd run {shlex.quote(str(path))}")
     return CommandOutcome(lambda: documents.files_document(folder, [path]))
 
 
-def _told(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
-    """What a run came to, for people and programs."""
+def _outcome(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
+    """Print the results of a run, and return them for programs."""
     _show(planned, outcome.rows)
     folder = planned.folder
     for name, why in list(outcome.failed.items())[:LISTED]:
@@ -103,9 +103,9 @@ def _told(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
     if len(outcome.failed) > LISTED:
         terminal.complain("batch", f"and {len(outcome.failed) - LISTED} more, in summary.csv")
     if outcome.skipped:
-        terminal.say(f"{len(outcome.skipped)} looks were done earlier, and are as they were")
+        terminal.say(f"{len(outcome.skipped)} looks were done earlier and are unchanged")
     if outcome.waiting:
-        terminal.complain("batch", f"stopped: {some_of(outcome.waiting)} not begun")
+        terminal.complain("batch", f"stopped before {some_of(outcome.waiting)}")
     if outcome.rows:
         terminal.write(f"{folder / FILES[0]}: {counts_text(outcome.rows)}")
     return CommandOutcome(
@@ -119,7 +119,7 @@ def _told(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
 
 
 def _show(planned: Plan, rows: list[SummaryRow]) -> None:
-    """A row for each look; of very many for those that are not done."""
+    """Print a row for each look; of very many, only the unfinished ones."""
     shown = rows if len(rows) <= LISTED else [row for row in rows if row.state != "done"][:LISTED]
     if not shown:
         return
@@ -132,7 +132,7 @@ def _show(planned: Plan, rows: list[SummaryRow]) -> None:
 
 
 def _dry(planned: Plan) -> CommandOutcome:
-    """What would be done, and what that takes; nothing is."""
+    """Print what would be done and its cost, without doing it."""
     table, looks = terminal.table("look", "what", "of"), []
     for look in planned.chosen_looks:
         what = look.failure or ("done earlier" if look.is_done else ", ".join(look.entry.want))
@@ -142,7 +142,7 @@ def _dry(planned: Plan) -> CommandOutcome:
     terminal.print_table(table)
     needed = estimate(planned)
     terminal.write(
-        f"bases {spoken_time(needed.bases_s)} unless they are kept, looks "
+        f"bases {spoken_time(needed.bases_s)} unless they are in the cache, looks "
         f"{spoken_time(needed.looks_s)}, by one process on two cores; "
         f"{needed.memory / 1e9:.1f} GB of memory"
     )
@@ -153,14 +153,14 @@ def _dry(planned: Plan) -> CommandOutcome:
 
 
 def spoken_time(seconds: float) -> str:
-    """`0:07`, `12:30`, `3:05:00`."""
+    """Return a duration as `0:07`, `12:30`, `3:05:00`."""
     whole = round(seconds)
     hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
 def _log(path: Path | None) -> Callable[[str], Any]:
-    """Adds a line with its time to the log, if there is one."""
+    """Return a function that appends a line with its time to the log, if there is one."""
 
     def note(text: str) -> None:
         if path is None:

@@ -1,4 +1,4 @@
-"""What `lightpaint export` does: an answer in the forms that other programs take."""
+"""`lightpaint export`: writes an answer for other programs."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,7 +23,7 @@ def export(
     output: Path | None,
     force: bool,
 ) -> CommandOutcome:
-    """`lightpaint export lighting.json --to FORM,FORM -o DIR`"""
+    """Run `lightpaint export lighting.json --to FORM,FORM -o DIR`."""
     finish(lighting.parent)
     answer, folder = read_lighting(lighting), output or lighting.parent
     source, listen = Source(content(scene), content(groups), stage), terminal.TerminalListener()
@@ -32,8 +32,10 @@ def export(
     made = {folder / name: make for name, make in writers.items()}
     check_files(list(made), [lighting, *source.files])
     check_writable(folder)
-    if not force and (there := [file for file in made if file.exists()]):
-        raise OutputError(f"{there[0]} is there: name another folder (folder=...), or force=True")
+    if not force and (existing := [file for file in made if file.exists()]):
+        raise OutputError(
+            f"{existing[0]} exists: name another folder (folder=...), or pass force=True"
+        )
     texts = {file: make() for file, make in made.items()}
     for file, text in texts.items():
         write_text(file, text)

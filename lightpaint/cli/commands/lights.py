@@ -1,4 +1,4 @@
-"""The lights of a scene: as a table, as JSON, and as a sheet of pictures."""
+"""`lightpaint lights`: the lights of a scene as a table, as JSON, and as a sheet of pictures."""
 
 from pathlib import Path
 
@@ -20,10 +20,10 @@ def lights(
     is_asked: bool = True,
     force: bool = False,
 ) -> CommandOutcome:
-    """`lightpaint lights SCENE`
+    """Run `lightpaint lights SCENE`.
 
-    sheet: where what each does is drawn, if anywhere. is_asked: whether somebody named that place;
-    else the listing is what counts, and a sheet that cannot be is no error.
+    sheet: file of the light sheet; None for none. is_asked: True if the user named it; otherwise a
+    sheet that cannot be written is not an error.
     """
     loaded = scene.content
     if sheet is not None and is_asked:
@@ -32,31 +32,31 @@ def lights(
     for remark in remarks_of_scene(loaded):
         terminal.say(remark)
     tables.show_lights(loaded, cd_per_unit)
-    is_drawn = sheet is not None and _is_drawn(loaded, sheet, is_asked=is_asked, force=force)
+    is_drawn = sheet is not None and _draw_sheet(loaded, sheet, is_asked=is_asked, force=force)
     drawn = {"sheet": str(sheet)} if is_drawn else {}
     return CommandOutcome(lambda: {**documents.lights_document(loaded, cd_per_unit), **drawn})
 
 
-def _is_drawn(scene: Scene, sheet: Path, *, is_asked: bool, force: bool) -> bool:
-    """Whether the sheet of lights could be written; what keeps it from that is said."""
+def _draw_sheet(scene: Scene, sheet: Path, *, is_asked: bool, force: bool) -> bool:
+    """Write the light sheet; print the reason and return False if it cannot be written."""
     try:
         check_sheet(scene, sheet, force=force)
         with terminal.TerminalListener() as listen:
-            why = render_sheet(scene, sheet, listen)
+            reason = render_sheet(scene, sheet, listen)
     except (OutputError, BackendError) as error:
         if is_asked and isinstance(error, OutputError):
             raise
-        why = str(error)
-    if why:
-        terminal.say(f"no {sheet}: {why}")
+        reason = str(error)
+    if reason:
+        terminal.say(f"no {sheet}: {reason}")
         return False
     terminal.note("lights drawn")
-    terminal.write(f"{sheet}: what each of them does alone")
+    terminal.write(f"{sheet}: each light alone")
     return True
 
 
 def note_scene(loaded: Scene) -> None:
-    """A scene that was read, and by what, where somebody wants to know all."""
+    """Print details of a loaded scene, in verbose mode."""
     height, width = loaded.size
     terminal.note(
         f"{loaded.path} read: {len(loaded.emitters)} emitters, {len(loaded.lights)} lights, "

@@ -1,4 +1,4 @@
-"""What is kept and what works here: `lightpaint cache` and `lightpaint doctor`."""
+"""`lightpaint cache` and `lightpaint doctor`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,9 +13,9 @@ from lightpaint.screen import some_names
 
 
 def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
-    """`lightpaint cache [list | drop NAME... | clear]`"""
+    """Run `lightpaint cache [list | drop NAME... | clear]`."""
     if action != "drop" and names:
-        raise BasisError(f"cache {action} takes no name: cache drop {names[0]} does")
+        raise BasisError(f"cache {action} takes no name: did you mean cache drop {names[0]}?")
     if action == "list":
         kept, about = bases.entries(), {"folder": str(folder()), "largest": bases.LARGEST}
         tables.show_kept(kept)
@@ -35,7 +35,7 @@ def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
 
 
 def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
-    """The bases that are meant, each once. Raises BasisError for a name of none."""
+    """Return the bases of these names, each once. Raises BasisError for an unknown name."""
     if not names:
         raise BasisError(
             "cache drop needs the name of a scene or of a file, as cache list shows it"
@@ -51,7 +51,7 @@ def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
 
 
 def doctor(*, variant: str | None) -> CommandOutcome:
-    """`lightpaint doctor`"""
+    """Run `lightpaint doctor`."""
     findings = examine(variant)
     for finding in findings:
         mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
@@ -59,6 +59,6 @@ def doctor(*, variant: str | None) -> CommandOutcome:
     missing = [finding for finding in findings if finding.state == "missing"]
     for finding in missing:
         if finding.remedy:
-            terminal.write(f"to mend {finding.what}: {finding.remedy}")
-    terminal.write("something is missing" if missing else "everything needed is here")
+            terminal.write(f"to fix {finding.what}: {finding.remedy}")
+    terminal.write("something is missing" if missing else "everything that is needed works")
     return CommandOutcome(lambda: documents.doctor_document(findings), 2 if missing else 0)

@@ -1,4 +1,4 @@
-"""`lightpaint paint`: opens the painter in a browser, and says where it is."""
+"""`lightpaint paint`: opens the painter in a browser, and prints its address."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from lightpaint.cli.output import lines, terminal
-from lightpaint.cli.output.output_mode import CommandOutcome, manner
+from lightpaint.cli.output.output_mode import CommandOutcome, output_mode
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from lightpaint.paint.server.server import Server
     from lightpaint.paint.store.session_requests import SessionRequests
 
-#: What it means that others can.
+#: The risk of an address that others can reach.
 RISK = (
-    "whoever has its address, with the token, can paint here and have results written to {folder}, "
-    "and what is sent can be read on the way"
+    "anyone who has its address with the token can paint here and write results to {folder}, "
+    "and the connection is not encrypted"
 )
 
-#: Who can reach the painter, said where an address was chosen.
+#: Who can reach the painter, printed if the user chose an address.
 REACH = {
     Reach.MACHINE: "programs of this machine, and nobody else, can reach the painter at {name}",
     Reach.ADDRESS: "other machines can reach the painter at {name}; " + RISK,
@@ -49,8 +49,8 @@ def paint(
     port: int | None,
     with_browser: bool,
 ) -> CommandOutcome:
-    """`lightpaint paint SCENE|BASIS|LIGHTS`, of one view or of several."""
-    # The server and the session file bring much that no other command needs.
+    """Run `lightpaint paint SCENE|BASIS|LIGHTS`, for one view or several."""
+    # The server and the session file import much that no other command needs.
     from lightpaint.paint.launch import paint_in_browser
     from lightpaint.paint.server.server import check_installed
     from lightpaint.paint.subject_factory import make_subjects
@@ -68,7 +68,7 @@ def paint(
         settings=settings,
         constraints=constraints,
         choice=choice,
-        # A basis has one view only for `solve`.
+        # `solve` takes only one basis, which has one view.
         **({} if len(sources) > 1 and isinstance(sources[0], BasisFile) else {"command": command}),
     )
     subject = subjects[0]
@@ -81,7 +81,7 @@ def paint(
         addresses.append(server.url)
         _announce(server, subject.name, folder, is_reachable=host is not None)
         if with_browser and _has_browser():
-            # Some browsers keep who starts them waiting.
+            # Some browsers block the process that starts them.
             given = (server.one_time_url(),)
             Thread(target=_show, args=given, name="browser", daemon=True).start()
 
@@ -90,10 +90,10 @@ def paint(
             subjects, opened, new=new, host=host, port=port, say=lambda text: _say(text)
         )
     except KeyboardInterrupt:
-        if not addresses:  # it had not begun
+        if not addresses:  # it had not started
             raise
-        terminal.say(f"the painter has ended; what was painted is kept in {folder}")
-    except OutputError as error:  # also where an interrupt has ended it
+        terminal.say(f"the painter has ended; the session is kept in {folder}")
+    except OutputError as error:  # also after an interrupt
         terminal.complain("paint", str(error))
         return CommandOutcome(None, 2)
     return CommandOutcome(None)
@@ -108,8 +108,8 @@ def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) 
         about = REACH[server.address.reach].format(name=server.address.name, folder=folder)
         is_open = server.address.reach is not Reach.MACHINE
         (partial(terminal.complain, "paint") if is_open else terminal.say)(about)
-    said = f"painting {name} at {server.url} (Ctrl-C ends; all is kept in {folder})"
-    if manner().as_json:  # now, in one line: programs connect while it runs
+    said = f"painting {name} at {server.url} (Ctrl-C ends it; everything is kept in {folder})"
+    if output_mode().as_json:  # at once and in one line: programs connect while it runs
         lines.err(said)
         lines.out(json.dumps({**server.connection, "folder": str(folder), "scene": name}))
     else:
@@ -117,7 +117,7 @@ def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) 
 
 
 def _say(text: str) -> None:
-    """What the server says; a mistake of lightpaint's own has many lines."""
+    """Print a message of the server; that of a bug has many lines."""
     for line in text.rstrip().split("\n"):
         terminal.say(line)
 
@@ -129,7 +129,7 @@ def _show(url: str) -> None:
 
 
 def _has_browser() -> bool:
-    """Whether there is one that does not take over the terminal."""
+    """Return True if there is a browser that does not take over the terminal."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or os.environ.get("BROWSER")
     ):

@@ -1,4 +1,4 @@
-"""What is asked in a session of painting, in the words of the command line."""
+"""The requests of a painting session, as options of the command line."""
 
 from collections.abc import Mapping, Sequence
 from shlex import quote
@@ -10,10 +10,9 @@ from lightpaint.paint.store.session_requests import SessionRequests
 def solve_command(
     source: str, paintings: Mapping[str, str], options: Sequence[str], requests: SessionRequests
 ) -> str:
-    """The command that answers exported paintings as their session does.
+    """Return the command that gives the same answer to exported paintings as their session.
 
-    paintings: paths by sensor, "" for that of the only view. source, options: as they were given to
-    the painter.
+    paintings: paths by sensor, "" for that of the only view. source, options: those of the painter.
     """
     words = ["lightpaint solve", quote(source)]
     for sensor, path in paintings.items():
@@ -22,7 +21,7 @@ def solve_command(
 
 
 def options_of(requests: SessionRequests) -> list[str]:
-    """What is asked, as options of `lightpaint solve`."""
+    """Return requests as options of `lightpaint solve`."""
     made = []
     for name, asked in requests.lights.items():
         made += [option for key in asked for option in _options(name, key, asked)]
@@ -35,24 +34,30 @@ def options_of(requests: SessionRequests) -> list[str]:
 
 
 def _options(name: str, key: str, asked: Mapping[str, Any]) -> list[str]:
-    """One of the keys asked of a light, as options; duv goes with its kelvin."""
+    """Return one request for a light as options; duv goes with its kelvin."""
     value = asked[key]
     if key in ("off", "lock") and value is True:
         return [f"--{key} {quote(name)}"]
     if key == "limits":
-        ends = ":".join("" if end not in value else _said(value[end]) for end in ("min", "max"))
+        ends = ":".join(
+            "" if end not in value else _value_text(value[end]) for end in ("min", "max")
+        )
         return [f"--limit {quote(f'{name}={ends}')}"]
     if key == "kelvin":
         duv = f",duv={asked['duv']:g}" if "duv" in asked else ""
-        kelvin = ":".join(map(_said, value)) if isinstance(value, list | tuple) else _said(value)
+        kelvin = (
+            ":".join(map(_value_text, value))
+            if isinstance(value, list | tuple)
+            else _value_text(value)
+        )
         return [f"--kelvin {quote(f'{name}={kelvin}{duv}')}"]
     if key == "duv":
         return []
-    return [f"--{key} {quote(f'{name}={_said(value)}')}"]
+    return [f"--{key} {quote(f'{name}={_value_text(value)}')}"]
 
 
-def _said(value: Any) -> str:
-    """A value of a lights file as an option has it, to its last digit."""
+def _value_text(value: Any) -> str:
+    """Return a value of a lights file as an option has it, with all digits."""
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return ",".join(map(_said, value))
+        return ",".join(map(_value_text, value))
     return repr(float(value)) if isinstance(value, int | float) else str(value)

@@ -1,4 +1,4 @@
-"""What `lightpaint solve` does: one painting or several, their variations, a gallery of all."""
+"""`lightpaint solve`: one painting or several, their variations, and a gallery of all."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
-from lightpaint.cli.tolerances import Wanted
+from lightpaint.cli.tolerances import Tolerances
 from lightpaint.errors import LOOK_ERRORS
 from lightpaint.pipeline.job import Job
 from lightpaint.pipeline.pipeline import run
@@ -15,25 +15,25 @@ from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.screen import some_of
 
 if TYPE_CHECKING:
-    from lightpaint.cli.solve_variations import Several
+    from lightpaint.cli.solve_variations import LookSet
 
-#: Of an answer of which nothing is asked.
-ANY = Wanted()
+#: No requirements.
+ANY = Tolerances()
 
 
 def solve(
     *,
     jobs: Sequence[Job],
     table: Table = "short",
-    wanted: Wanted = ANY,
-    several: "Several | None" = None,
+    wanted: Tolerances = ANY,
+    several: "LookSet | None" = None,
 ) -> CommandOutcome:
-    """`lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`
+    """Run `lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`.
 
-    several: what they are to each other, where there are several.
+    several: the set of looks, if there are several.
     """
     listen, results, shortfalls, obtained = terminal.TerminalListener(), [], [], None
-    # Those of all before the first is run, which says its own again: once is enough.
+    # The remarks of all jobs come before the first one runs; the listener drops repeats.
     for remark in (remark for job in jobs for remark in job.remarks):
         listen.say(remark)
     for job in jobs:
@@ -44,9 +44,9 @@ def solve(
             # Several paintings of one scene share its basis.
             obtained = [look.basis for look in looks]
             if several is not None:
-                several.is_done(job, looks[0].lighting, obtained)
+                several.finish_look(job, looks[0].lighting, obtained)
         except LOOK_ERRORS as error:
-            if several is None or not several.goes_on(job, error):
+            if several is None or not several.continues_after(job, error):
                 raise
             continue
         _show(job, looks, table)
@@ -56,7 +56,7 @@ def solve(
     if several is not None:
         several.show(obtained or [])
     if jobs and not jobs[0].scenes and jobs[0].groups is None:
-        terminal.say("solved from a saved basis: no render was made; lightpaint relight makes one")
+        terminal.say("solved from a saved basis, without a render: lightpaint relight makes one")
     if shortfalls:
         terminal.complain("solve", some_of(shortfalls, joint="; "))
     made = [] if several is None else several.shifted
@@ -72,7 +72,7 @@ def solve(
 
 
 def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
-    """What one job came to."""
+    """Print the results of one job."""
     for view, look in zip(job.views, looks, strict=True):
         if job.by_sensor:
             terminal.write("")

@@ -1,4 +1,4 @@
-"""What stands behind an option, from text to values; argparse calls these as types."""
+"""Types for argparse: from the text of an option to its value."""
 
 import argparse
 from typing import Any
@@ -7,7 +7,7 @@ from lightpaint.validation import BRIGHTEST
 
 
 def key_value(text: str) -> tuple[str, str]:
-    """A parameter of the scene, `key=value`."""
+    """Parse a parameter of the scene, `key=value`."""
     key, equals, value = text.partition("=")
     if not key or not equals:
         raise argparse.ArgumentTypeError(f"{text!r} is not key=value")
@@ -15,7 +15,7 @@ def key_value(text: str) -> tuple[str, str]:
 
 
 def sensor_target(text: str) -> tuple[str, str]:
-    """A painting with its sensor, `SENSOR=TARGET`."""
+    """Parse a painting with its sensor, `SENSOR=TARGET`."""
     sensor, _, target = text.partition("=")
     if not sensor or not target:
         raise argparse.ArgumentTypeError(f"{text!r} is not SENSOR=TARGET")
@@ -23,7 +23,7 @@ def sensor_target(text: str) -> tuple[str, str]:
 
 
 def names_of(text: str) -> list[str]:
-    """Names with commas, `a,b,c`."""
+    """Parse names with commas, `a,b,c`."""
     names = [name.strip() for name in text.split(",")]
     if not all(names):
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of names, a,b,c")
@@ -31,7 +31,7 @@ def names_of(text: str) -> list[str]:
 
 
 def group(text: str) -> tuple[str, list[str]]:
-    """A group and its members, `name=a,b,c`."""
+    """Parse a group and its members, `name=a,b,c`."""
     name, equals, members = text.partition("=")
     if not name.strip() or not equals:
         raise argparse.ArgumentTypeError(f"{text!r} is not name=a,b,c")
@@ -39,7 +39,7 @@ def group(text: str) -> tuple[str, list[str]]:
 
 
 def named(text: str) -> tuple[str, Any]:
-    """What is asked of a light, `NAME=VALUE`."""
+    """Parse a value for a light, `NAME=VALUE`."""
     name, equals, value = text.rpartition("=")
     if not name.strip() or not equals or not value.strip():
         raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE")
@@ -47,7 +47,7 @@ def named(text: str) -> tuple[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """Three numbers with commas; anything else as it is."""
+    """Return three numbers with commas as a list; anything else as text."""
     parts = text.strip().split(",")
     try:
         return [float(part) for part in parts] if len(parts) > 1 else text.strip()
@@ -56,12 +56,12 @@ def _value(text: str) -> Any:
 
 
 def lock(text: str) -> tuple[str, Any]:
-    """A light to be left as it is, `NAME`, or at a level, `NAME=LEVEL`."""
+    """Parse a light to keep as it is, `NAME`, or at a level, `NAME=LEVEL`."""
     return named(text) if "=" in text else (text.strip(), True)
 
 
 def limits(text: str) -> tuple[str, dict[str, Any]]:
-    """Levels to stay between, `NAME=MIN:MAX`."""
+    """Parse levels to stay between, `NAME=MIN:MAX`."""
     if "=" not in text:
         raise argparse.ArgumentTypeError(f"{text!r} is not NAME=MIN:MAX")
     name, value = named(text)
@@ -72,11 +72,11 @@ def limits(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def kelvin(text: str) -> tuple[str, list[float], float | None]:
-    """Name, temperatures, and Duv if that was given."""
+    """Parse name, temperatures, and Duv if given."""
     try:
-        told, comma, away = text.partition(",")
-        key, _, duv = away.partition("=")
-        name, value = named(told)
+        main, comma, option = text.partition(",")
+        key, _, duv = option.partition("=")
+        name, value = named(main)
         ends = [float(end.strip().upper().removesuffix("K")) for end in value.split(":")]
         if comma and key.strip() != "duv":
             raise ValueError(key)
@@ -88,24 +88,24 @@ def kelvin(text: str) -> tuple[str, list[float], float | None]:
 
 
 class Kelvin(argparse.Action):
-    """Puts temperatures to `kelvin` and what they are away from Planck's locus to `duv`."""
+    """An action that stores temperatures in `kelvin` and distances from the locus in `duv`."""
 
     def __call__(self, _parser: Any, options: argparse.Namespace, given: Any, *_: Any) -> None:
         name, ends, duv = given
         options.kelvin = [*options.kelvin, (name, ends)]
-        # What is said last of a light holds: also that it is on the locus.
+        # The last option of a light counts, even if it has no duv.
         options.duv = [entry for entry in options.duv if entry[0] != name]
         options.duv += [] if duv is None else [(name, duv)]
 
 
 def primaries(text: str) -> tuple[str, list[str]]:
-    """Colours to mix, `NAME=COLOR,...`."""
+    """Parse colours to mix, `NAME=COLOR,...`."""
     name, _ = named(text)
     return name, names_of(text.rpartition("=")[2])
 
 
 class at_least:  # noqa: N801 (used as a function)
-    """An integer no smaller than a bound, and maybe no larger than another."""
+    """A type for integers with a lower bound, and maybe an upper one."""
 
     def __init__(self, bound: int, *, most: int | None = None) -> None:
         self.bound, self.most = bound, most
@@ -118,12 +118,12 @@ class at_least:  # noqa: N801 (used as a function)
         if value < self.bound:
             raise argparse.ArgumentTypeError(f"{text!r} is not a whole number >= {self.bound}")
         if self.most is not None and value > self.most:
-            raise argparse.ArgumentTypeError(f"{text!r} is too much: at most {self.most}")
+            raise argparse.ArgumentTypeError(f"{text!r} is too large: expected at most {self.most}")
         return value
 
 
 class number:  # noqa: N801 (used as a function)
-    """A number > 0, or >= 0, of no more than can be computed with, or than `most`.
+    """A type for numbers > 0, or >= 0, up to `most`.
 
     about: what it is a number of, with a space before.
     """

@@ -1,4 +1,4 @@
-"""From options to the arguments of the function that runs a command."""
+"""Conversion of options to the arguments of the command's function."""
 
 from argparse import Namespace
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from lightpaint.cli.options.source_options import (
     scene_to_export,
     source_of_template,
 )
-from lightpaint.cli.tolerances import Wanted
+from lightpaint.cli.tolerances import Tolerances
 from lightpaint.errors import BatchError
 from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints_file import read_constraints
@@ -92,17 +92,17 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
     """Return the arguments of `solve`, with a gallery if there are several looks."""
     how: dict[str, Any] = {
         "table": options.table,
-        "wanted": Wanted(options.max_miss, options.min_fit),
+        "wanted": Tolerances(options.max_miss, options.min_fit),
     }
     if len(options.targets) <= 1 and not options.variations:
         return {"jobs": jobs_of(options, settings), **how}
 
     # Imported late: a single look needs no gallery.
     from lightpaint.batch.manifest.variations import parse_variations
-    from lightpaint.cli.solve_variations import several_of
+    from lightpaint.cli.solve_variations import look_set
 
     failed: dict[str, str] = {}
-    jobs, several = several_of(
+    jobs, several = look_set(
         jobs_of(options, settings, failed),
         parse_variations(options.variations),
         failed,

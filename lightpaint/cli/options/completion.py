@@ -1,9 +1,9 @@
-"""Completion in the shell, with argcomplete: commands, options, names of files."""
+"""Shell completion with argcomplete: commands, options, file names."""
 
 import argparse
 from collections.abc import Iterator
 
-#: Endings of the files that an argument takes, by where its value goes; others take any.
+#: Suffixes of files by the destination of an argument; other arguments take any file.
 ENDINGS = {
     "scene": (".xml",),
     "source": (".xml", ".exr"),
@@ -15,7 +15,7 @@ ENDINGS = {
 
 
 def complete(parser: argparse.ArgumentParser) -> None:
-    """Answer the shell that asks, and exit; without argcomplete there is no answer."""
+    """Answer the shell's request for completions, and exit; without argcomplete answer nothing."""
     try:
         import argcomplete
     except ImportError:
@@ -28,7 +28,7 @@ def complete(parser: argparse.ArgumentParser) -> None:
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """What all commands take."""
+    """Yield the arguments of all commands."""
     for action in parser._actions:
         yield action
         if isinstance(action, argparse._SubParsersAction):

@@ -1,4 +1,4 @@
-"""From options to jobs: paintings, constraints, settings and folders."""
+"""Conversion of options to jobs: paintings, constraints, settings and folders."""
 
 from argparse import Namespace
 from collections.abc import Sequence
@@ -20,32 +20,32 @@ from lightpaint.screen import some_names
 if TYPE_CHECKING:
     from lightpaint.pipeline.job import Job
 
-#: Where what options ask of lights stands, as errors say it.
+#: Place of constraints from options, in errors.
 BY_OPTION = "on the command line"
 
 
 def is_folder(output: Path) -> bool:
-    """Whether a template goes to a folder, and not only to an EXR and a PNG."""
+    """Return True if a template goes to a folder, and not to a single EXR with its PNG."""
     return output.suffix.lower() != ".exr"
 
 
 def settings_of(options: Namespace, given: Sequence[str]) -> Settings:
-    """What the options say of `Settings`; those without an option are as by default."""
-    # A transform is of the painting, which has it; the command is the whole line.
+    """Return the settings in the options; others have their defaults."""
+    # The transform belongs to the painting; the command is the whole line.
     names = {field.name for field in fields(Settings)} - {"transform", "command"}
-    said = {name: value for name, value in vars(options).items() if name in names}
-    return Settings(**said, command=from_any_folder(["lightpaint", *given]))
+    values = {name: value for name, value in vars(options).items() if name in names}
+    return Settings(**values, command=from_any_folder(["lightpaint", *given]))
 
 
 def jobs_of(
     options: Namespace, settings: Settings, failed: dict[str, str] | None = None
 ) -> "list[Job]":
-    """What `solve` is asked for, a job for each painting or one for several views.
+    """Return the jobs of `solve`, one for each painting, or one for several views.
 
-    All are born, and so checked, before the first is run. failed: where the others are to go on,
-    receives why one cannot be done, by the name of its folder.
+    All are created, and so checked, before the first runs. failed: receives the reason of each
+    failure, by the name of the folder, if the others are to go on.
     """
-    # Jobs know all rooms, of which other commands need less.
+    # Imported late: jobs import much that other commands do not need.
     from lightpaint.pipeline.job import Job
 
     basis = basis_of(options)
@@ -66,11 +66,11 @@ def jobs_of(
         if options.output and options.variations:
             folder /= Path(paths[0]).stem
         return [Job(scenes, tuple(paintings), folder, None, asked, settings, by_sensor=True)]
-    # One scene, which is loaded once for all.
+    # One scene, loaded once for all jobs.
     source = () if basis is not None else (scene_of(options),)
     output = options.output and Path(options.output)
     names = [Path(path).stem for path in paths]
-    # With its variations beside it, one painting is several looks.
+    # A painting with variations beside it is several looks.
     is_several = bool(options.variations) and len(names) == 1 and output
     folders = [output / names[0]] if is_several else folders_of(output, names)
     jobs = []
@@ -82,7 +82,7 @@ def jobs_of(
                 raise
             failed[folder.name] = str(error)
     if options.lights_file:
-        for job in jobs:  # where there is no scene to have read it
+        for job in jobs:  # if no scene has read it
             check_files(job.results.files, [Path(options.lights_file)])
     return jobs
 
@@ -104,12 +104,12 @@ def _paintings_of(options: Namespace, paths: list[str]) -> list[Painting]:
 
 
 def transform_of(options: Namespace) -> TransformChoice:
-    """What --view and --exposure ask for, each alone or both."""
+    """Return the choice of --view and --exposure."""
     return TransformChoice(options.view, options.exposure)
 
 
 def constraints_of(options: Namespace) -> Constraints:
-    """What the options ask of the lights."""
+    """Return the constraints in the options."""
     lights: dict[str, dict[str, Any]] = {}
     for key in (key for key in LIGHT_KEYS if key != "off"):
         for name, value in getattr(options, key):
@@ -126,18 +126,18 @@ def constraints_of(options: Namespace) -> Constraints:
 
 
 def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
-    """One result folder per name: DIR itself for a single one, DIR/<name> for several."""
+    """Return one result folder per name: DIR itself for a single one, DIR/<name> for several."""
     if output is not None and len(names) == 1:
         return [output]
     for name in names:
-        # Names that are not UTF-8 are told by whoever reads the file that is called so.
+        # The reader of the file reports names that are not UTF-8.
         if not is_name(name) and is_utf_8(Path(name)):
-            how = "choose one with -o" if len(names) == 1 else "take it alone, with -o"
-            raise OutputError(f"{one_line(repr(name))} is no name for a folder: {how}")
+            how = "choose one with -o" if len(names) == 1 else "solve it alone, with -o"
+            raise OutputError(f"{one_line(repr(name))} cannot be the name of a folder: {how}")
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise OutputError(
-            f"results would overwrite each other in {some_names(twice)}: give those of one name "
-            "a command each, with another -o"
+            f"results would overwrite each other in {some_names(twice)}: run those of one name "
+            "separately, each with its own -o"
         )
     return [(output or Path()) / name for name in names]
 

@@ -1,4 +1,4 @@
-"""The options of commands, in groups that several of them share."""
+"""Groups of options that several commands share."""
 
 import argparse
 
@@ -6,13 +6,13 @@ from lightpaint.cli.options import arguments
 
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
-    """The scene, and how it is loaded."""
+    """Add the scene, and the options for loading it."""
     parser.add_argument("scene", metavar="SCENE", help="Mitsuba scene XML")
     add_view(parser)
 
 
 def add_view(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
-    """What a scene is seen through, and loaded with. several: whether by several sensors."""
+    """Add the options for a scene's sensor and for loading it. several: allow several sensors."""
     if several:
         parser.add_argument(
             "-s",
@@ -21,7 +21,7 @@ def add_view(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
             action="append",
             default=[],
             metavar="SENSOR",
-            help="sensor by index or id; give it once for each view that one lighting is to serve "
+            help="sensor by index or id; repeat it for several views that share one lighting "
             "(default: the first)",
         )
     else:
@@ -40,15 +40,15 @@ def add_view(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
     parser.add_argument(
         "--integrator",
         metavar="PLUGIN",
-        help="integrator to render with instead of the scene's own, which Mitsuba may lack: path, "
-        "direct, or with options path:max_depth=8; what the scene says of max_depth, rr_depth "
-        "and hide_emitters stays (default: the scene's)",
+        help="integrator instead of the scene's own, which this Mitsuba may lack: path, "
+        "direct, or with options like path:max_depth=8; it inherits max_depth, rr_depth "
+        "and hide_emitters (default: the scene's)",
     )
     add_variant(parser)
 
 
 def add_lights(parser: argparse.ArgumentParser) -> None:
-    """Which lights are adjusted, and which go together."""
+    """Add the options for lights and groups."""
     parser.add_argument(
         "--lights",
         type=arguments.names_of,
@@ -68,7 +68,7 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--lights-file",
         metavar="F.toml",
-        help="lights, groups and constraints (default: <scene>.lights.toml where there is one); "
+        help="lights, groups and constraints (default: <scene>.lights.toml if it exists); "
         "--lights replaces its list, --group adds to its groups or replaces the one of that "
         "name; with a saved basis only its constraints apply",
     )
@@ -76,19 +76,19 @@ def add_lights(parser: argparse.ArgumentParser) -> None:
         "--no-lights-file",
         dest="use_lights_file",
         action="store_false",
-        help="leave the lights file beside the scene alone",
+        help="ignore the lights file beside the scene",
     )
     parser.add_argument(
         "--no-group-alike",
         dest="group_alike",
         action="store_false",
-        help="adjust emitters without names one by one, also where more than 24 are alike "
-        "(default: those are one light)",
+        help="adjust unnamed emitters one by one, even if more than 24 are similar "
+        "(default: similar ones form one light)",
     )
 
 
 def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -> None:
-    """How a picture is seen. name, stops: what they are where nobody says."""
+    """Add the options for the view transform. name, stops: their defaults in words."""
     parser.add_argument(
         "--view",
         metavar="VIEW",
@@ -104,7 +104,7 @@ def add_view_transform(parser: argparse.ArgumentParser, name: str, stops: str) -
 
 
 def add_variant(parser: argparse.ArgumentParser) -> None:
-    """What Mitsuba renders with."""
+    """Add the option for the Mitsuba variant."""
     parser.add_argument(
         "-m",
         "--variant",
@@ -114,13 +114,13 @@ def add_variant(parser: argparse.ArgumentParser) -> None:
 
 
 def add_sampling(parser: argparse.ArgumentParser, *, default: str = "the scene's") -> None:
-    """How well one picture is rendered."""
+    """Add the options for the samples of one picture."""
     add_spp(parser, default)
     add_seed(parser)
 
 
 def add_budget(parser: argparse.ArgumentParser) -> None:
-    """What a basis may cost."""
+    """Add the options for the samples of a basis."""
     group = parser.add_mutually_exclusive_group()
     add_spp(group, "the scene's")
     group.add_argument(
@@ -128,21 +128,21 @@ def add_budget(parser: argparse.ArgumentParser) -> None:
         dest="time_s",
         type=arguments.number(" of seconds"),
         metavar="SECONDS",
-        help="instead: render the basis for so long, besides what earlier runs have kept; "
-        "compiling counts, the verification does not",
+        help="instead: seconds to render the basis, added to samples of earlier runs; "
+        "they include compilation, but not the verification",
     )
     parser.add_argument(
         "--quality",
         choices=("preview", "final"),
-        help="preview: 64 samples per pixel on some 30,000 pixels, each a block of the film's; "
-        "final: 512 on the whole film; --spp, --time and --resolution go before",
+        help="preview: 64 samples per pixel on about 30,000 pixels, each a block of film pixels; "
+        "final: 512 on the whole film; --spp, --time and --resolution take precedence",
     )
     add_resolution(parser)
     add_seed(parser)
 
 
 def add_spp(parser: "argparse._ActionsContainer", default: str) -> None:
-    """How many samples."""
+    """Add the option for samples per pixel."""
     parser.add_argument(
         "--spp",
         type=arguments.at_least(2, most=2**20),
@@ -152,7 +152,7 @@ def add_spp(parser: "argparse._ActionsContainer", default: str) -> None:
 
 
 def add_seed(parser: argparse.ArgumentParser) -> None:
-    """Which samples."""
+    """Add the option for the random seed."""
     parser.add_argument(
         "--seed",
         type=arguments.at_least(0),
@@ -163,87 +163,90 @@ def add_seed(parser: argparse.ArgumentParser) -> None:
 
 
 def add_resolution(parser: argparse.ArgumentParser) -> None:
-    """On how small a film."""
+    """Add the option for a smaller film."""
     parser.add_argument(
         "--resolution",
         metavar="1/N|WxH",
-        help="render with a pixel for each square block of the film's pixels, like 1/4 or 320x180; "
-        "what makes no whole block at the right and at the bottom is left out (default: the whole "
+        help="render one pixel for each square block of film pixels, like 1/4 or 320x180; "
+        "incomplete blocks at the right and at the bottom are left out (default: the whole "
         "film)",
     )
 
 
 def add_cache(parser: argparse.ArgumentParser) -> None:
-    """Whether bases are kept."""
+    """Add the options for the cache of bases."""
     parser.add_argument(
         "--no-cache",
         dest="use_cache",
         action="store_false",
-        help="neither take nor keep the basis for later runs (default: do both)",
+        help="neither use a basis of earlier runs nor keep this one (default: do both)",
     )
     parser.add_argument(
         "--exact-spp",
         action="store_true",
-        help="take just as many samples per pixel as are asked for, even where a basis with more "
-        "is kept, and leave that one kept (default: take what is kept)",
+        help="use exactly the requested samples per pixel, even if the cache has a basis with "
+        "more, "
+        "which stays there (default: use the cached one)",
     )
 
 
 def add_unit(parser: argparse.ArgumentParser) -> None:
-    """What a number stands for."""
+    """Add the option for the scale of radiance."""
     parser.add_argument(
         "--unit",
         dest="cd_per_unit",
         type=arguments.number(" of cd/m²"),
         metavar="CD/M2",
-        help="cd/m² that a radiance of 1 in the scene stands for, to have lumen, candela and lux "
-        "(default: numbers in proportion, without a unit)",
+        help="cd/m² that a radiance of 1 in the scene stands for, to show lumen, candela and lux "
+        "(default: relative numbers without units)",
     )
 
 
 def add_output(parser: "argparse._ActionsContainer", metavar: str, about: str) -> None:
-    """Where results go."""
+    """Add the option for the output."""
     parser.add_argument("-o", "--output", metavar=metavar, help=about)
 
 
 def add_server(parser: argparse.ArgumentParser) -> None:
-    """Where the painter's page is, and which session it shows."""
+    """Add the options for the painter's address and session."""
     parser.add_argument(
         "--new",
         action="store_true",
-        help="start afresh; the session that is there is kept under another name (default: go on)",
+        help="start a new session; the present one is kept under another name (default: continue "
+        "it)",
     )
     parser.add_argument(
         "--port",
         type=arguments.at_least(0, most=65535),
         metavar="N",
-        help="where the page is served; 0 for any (default: 8421, or any if that is taken)",
+        help="port of the page; 0 for any free one (default: 8421, or any free one if that is "
+        "taken)",
     )
     parser.add_argument(
         "--host",
         metavar="ADDRESS",
-        help="listen at this address of the machine, or at all of them (0.0.0.0), so that others "
-        "can reach the page: whoever has its token can paint (default: nobody but this machine)",
+        help="listen at this address of the machine, or at all (0.0.0.0), so that other machines "
+        "can reach the page: anyone with its token can paint (default: this machine only)",
     )
     parser.add_argument(
         "--no-browser",
         dest="with_browser",
         action="store_false",
-        help="only say where the page is",
+        help="only print the address of the page",
     )
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
-    """What may be given up."""
+    """Add the option for replacing results."""
     parser.add_argument(
         "--force",
         action="store_true",
-        help="replace results of something else, or that were changed by hand (default: refuse)",
+        help="replace results of another painting, or changed by hand (default: refuse)",
     )
 
 
-def add_manner(parser: argparse.ArgumentParser) -> None:
-    """How results are said, and what beside them."""
+def add_output_mode(parser: argparse.ArgumentParser) -> None:
+    """Add the options for the output mode."""
     parser.add_argument(
         "--json",
         dest="as_json",
@@ -263,5 +266,5 @@ def add_manner(parser: argparse.ArgumentParser) -> None:
         "--verbose",
         dest="is_verbose",
         action="store_true",
-        help="also what was used, and how long each stage took",
+        help="also settings, and the time of each stage",
     )

@@ -1,4 +1,4 @@
-"""What the command line understands: one sub-command per room, and their options."""
+"""The parser of the command line: its sub-commands and their options."""
 
 import argparse
 from collections.abc import Callable
@@ -11,8 +11,8 @@ from lightpaint.cli.options.option_groups import (
     add_cache,
     add_force,
     add_lights,
-    add_manner,
     add_output,
+    add_output_mode,
     add_sampling,
     add_scene,
     add_server,
@@ -29,22 +29,22 @@ from lightpaint.cli.options.solve_options import (
     add_paintings,
     add_pattern,
     add_several,
+    add_tolerances,
     add_variations,
     add_verification,
-    add_wanted,
 )
 from lightpaint.version import __version__
 
-#: What a script asks.
+#: Exit codes, for scripts.
 EXIT_CODES = (
     "Exit codes: 0 done; 1 done, but not as asked (verify disagrees, --max-miss, --min-fit); "
-    "2 an error that you can mend, in one line; 70 a fault of lightpaint's own; "
+    "2 an error that you can fix, in one line; 70 a bug in lightpaint; "
     "130 Ctrl-C, 143 SIGTERM, 129 the terminal closed."
 )
 
 
 def command_parser() -> argparse.ArgumentParser:
-    """The parser of all commands."""
+    """Return the parser of all commands."""
     parser = Parser(
         prog="lightpaint",
         description="Paint how a scene should look; get the lighting that comes closest.",
@@ -54,10 +54,10 @@ def command_parser() -> argparse.ArgumentParser:
         dest="command", metavar="COMMAND", required=True, parser_class=CommandParser
     )
     for name, (about, add_options) in _COMMANDS.items():
-        said = about[0].upper() + about[1:] + "."
-        its = commands.add_parser(name, help=about, description=said, epilog=EXIT_CODES)
-        add_options(its)
-        add_manner(its)
+        description = about[0].upper() + about[1:] + "."
+        command = commands.add_parser(name, help=about, description=description, epilog=EXIT_CODES)
+        add_options(command)
+        add_output_mode(command)
     return parser
 
 
@@ -66,12 +66,14 @@ def _lights(parser: argparse.ArgumentParser) -> None:
     add_lights(parser)
     add_unit(parser)
     where = parser.add_mutually_exclusive_group()
-    add_output(where, "F.png", "what each light does alone, as a picture (default: lights.png)")
+    add_output(where, "F.png", "picture of each light alone (default: lights.png)")
     where.add_argument(
-        "--no-sheet", action="store_true", help="only list them; --json does that, too, without -o"
+        "--no-sheet", action="store_true", help="only list the lights; so does --json without -o"
     )
     parser.add_argument(
-        "--force", action="store_true", help="replace a picture of something else (default: refuse)"
+        "--force",
+        action="store_true",
+        help="replace a picture that is not a light sheet (default: refuse)",
     )
 
 
@@ -89,16 +91,16 @@ def _template(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE|BASIS|LIGHTS",
         nargs="?",
         help="scene XML, a *.basis.exr, or light groups of another renderer: an EXR or a folder of "
-        "them, which --lights may name as well",
+        "them (--lights may name these, too)",
     )
     add_view(parser)
     add_lights(parser)
     add_pattern(parser)
     add_budget(parser)
     add_cache(parser)
-    add_view_transform(parser, "srgb", "one that shows something; 0 where --view is given")
+    add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
     add_output(
-        parser, "DIR|F.exr", "folder to write, or only an EXR and a PNG (default: template/)"
+        parser, "DIR|F.exr", "folder to write, or a single EXR with its PNG (default: template/)"
     )
     parser.add_argument(
         "--force", action="store_true", help="replace an existing file (default: refuse)"
@@ -125,14 +127,14 @@ def _solve(parser: argparse.ArgumentParser) -> None:
         "--table",
         choices=("short", "full"),
         default="short",
-        help="short: in stops and colours, of many lights those that matter; full: all lights, "
-        "with their radiometry, and how sure they are (default: %(default)s)",
+        help="short: stops and colours, of many lights only the important ones; full: all lights, "
+        "with radiometric units and uncertainties (default: %(default)s)",
     )
     add_several(parser)
     add_variations(parser)
     add_method(parser)
     add_verification(parser)
-    add_wanted(parser)
+    add_tolerances(parser)
     add_unit(parser)
     add_lights(parser)
     add_pattern(parser)
@@ -147,8 +149,8 @@ def _paint(parser: argparse.ArgumentParser) -> None:
         "sources",
         metavar="SCENE|BASIS|LIGHTS",
         nargs="*",
-        help="scene XML, a *.basis.exr (or several, of the views of one scene), or light groups of "
-        "another renderer, which --lights may name, too",
+        help="scene XML, a *.basis.exr (or several, one per view of a scene), or light groups of "
+        "another renderer (--lights may name these, too)",
     )
     add_output(
         parser,
@@ -157,42 +159,44 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     )
     add_server(parser)
     add_fit(parser)
-    add_view_transform(parser, "srgb", "one that shows something; 0 where --view is given")
+    add_view_transform(parser, "srgb", "metered like a camera; 0 with --view")
     add_lights(parser)
     add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
     add_cache(parser)
     add_view(parser, several=True)
-    # Options are kept for the command that answers what is exported.
+    # The parser is kept for the command that answers exported paintings.
     parser.set_defaults(targets=[], masks=None, views=[], parser=parser)
 
 
 def _export(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("lighting", metavar="lighting.json", help="as solve left it")
+    parser.add_argument("lighting", metavar="lighting.json", help="the file that solve wrote")
     parser.add_argument(
         "--to",
         type=arguments.names_of,
         action="extend",
         required=True,
         metavar="csv,json,mitsuba,usd,blender,nuke",
-        help="one or several. csv, json: fixtures with colour, kelvin, lumen and DMX; mitsuba: a "
-        "patch of the scene's XML; usd: a layer that overrides lights of a stage; blender: Python "
-        "that sets lights by their names; nuke: a script that multiplies light groups",
+        help="one or several formats. csv, json: fixtures with colour, kelvin, lumen and DMX; "
+        "mitsuba: a "
+        "patch for the scene's XML; usd: a layer that overrides lights of a stage; blender: a "
+        "Python script that sets lights by name; nuke: a script that scales light groups",
     )
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--scene", metavar="SCENE.xml", help="scene that it was solved for")
+    what.add_argument("--scene", metavar="SCENE.xml", help="scene that the lighting was solved for")
     what.add_argument(
         "--lights",
         dest="groups",
         metavar="FILE.exr",
-        help="light groups of another renderer that it was solved from, or a folder of them",
+        help="light groups of another renderer that the lighting was solved from, or a folder of "
+        "them",
     )
     add_pattern(parser)
     parser.add_argument(
         "--stage",
         metavar="FILE.usd",
-        help="of usd: the stage whose lights, by the names they have in the scene, are overridden "
+        help="for usd: the stage whose lights are overridden, by the names they have in the scene "
         "(default: prims below /lights)",
     )
     add_view(parser)
@@ -202,7 +206,9 @@ def _export(parser: argparse.ArgumentParser) -> None:
 
 def _relight(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
-    parser.add_argument("lightings", metavar="lighting.json", nargs="+", help="as solve left them")
+    parser.add_argument(
+        "lightings", metavar="lighting.json", nargs="+", help="files that solve wrote"
+    )
     add_sampling(parser)
     add_output(parser, "DIR", "result folder (default: named after the lighting's target)")
     add_force(parser)
@@ -220,28 +226,29 @@ def _cache(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         choices=("list", "drop", "clear"),
         default="list",
-        help="list them, drop those of NAME, or clear all (default: %(default)s)",
+        help="list the bases, drop those of NAME, or clear all (default: %(default)s)",
     )
     parser.add_argument(
         "names",
         metavar="NAME",
         nargs="*",
-        help="scene, or file, of the bases to drop, as list shows them; may be a pattern, 'hall*'",
+        help="scene or file of the bases to drop, as list shows them; may be a pattern like "
+        "'hall*'",
     )
 
 
-#: What each does, and how its options are added.
+#: The description of each command, and the function that adds its options.
 _COMMANDS: dict[str, tuple[str, Callable[[argparse.ArgumentParser], None]]] = {
-    "demo": ("solve for a painting that comes along, to see what this is", _demo),
+    "demo": ("solve a painting that is included, to see how it works", _demo),
     "lights": ("list the lights of a scene", _lights),
     "basis": ("render the image of each light alone", _basis),
     "template": ("render the current look, to paint over", _template),
     "solve": ("find the lighting that comes closest to a painting", _solve),
-    "paint": ("paint in the browser, and see the lighting that comes closest at once", _paint),
-    "batch": ("find many looks from one manifest, and go on where it was stopped", add_batch),
+    "paint": ("paint in the browser, and see the closest lighting at once", _paint),
+    "batch": ("solve many looks from one manifest; a stopped batch continues", add_batch),
     "export": ("write a lighting for other programs, fixtures and consoles", _export),
     "relight": ("write lightings into the scene and render it", _relight),
-    "verify": ("render results anew and compare with the prediction", _verify),
+    "verify": ("render results again and compare them with the prediction", _verify),
     "cache": ("list or delete the bases kept from earlier runs", _cache),
-    "doctor": ("say what works here and what to install", add_variant),
+    "doctor": ("check what works on this machine and what to install", add_variant),
 }

@@ -1,4 +1,4 @@
-"""From options to sources: scenes, bases and light groups.
+"""Conversion of options to sources: scenes, bases and light groups.
 
 `solve --lights FILE.exr TARGET` and `solve FILE.exr TARGET` both mean another renderer's light
 groups; `--lights key,fill` goes on to mean the lights of a scene.
@@ -14,12 +14,12 @@ from lightpaint.basis.lightgroups.folder import is_exr, is_light_groups, is_own_
 from lightpaint.errors import BasisError
 from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile, check_needed
 
-#: Options that say how a scene is loaded, by the names that Python has for them.
+#: Options for loading a scene, by their Python names.
 LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")
 
 
 def source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
-    """Return what `template` is to show: a scene, a saved basis, or light groups."""
+    """Return the source of a template: a scene, a saved basis, or light groups."""
     given = ",".join(options.lights or ())
     if options.scene is None:
         if not given:
@@ -33,7 +33,7 @@ def source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile
 
 
 def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> SceneFile:
-    """The scene that was asked for. is_to_solve: whether its lights are chosen."""
+    """Return the scene of a command. is_to_solve: whether its lights are chosen."""
     path = options.source if options.command in ("solve", "paint") else options.scene
     if is_to_solve:
         how |= {
@@ -49,7 +49,7 @@ def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> Sce
 
 
 def scene_to_export(options: Namespace) -> SceneFile | None:
-    """The scene that a lighting is exported for, if one was given; its lights are all told of."""
+    """Return the scene that a lighting is exported for, if given, with all of its lights."""
     if options.scene is None:
         return None
     parameters = dict(options.parameters)
@@ -58,8 +58,9 @@ def scene_to_export(options: Namespace) -> SceneFile | None:
 
 
 def painted_of(options: Namespace) -> list[SceneFile | BasisFile | GroupsFile]:
-    """What `paint` paints: a scene, by each sensor that is named; bases of several views; or light
-    groups, also those that --lights names.
+    """Return the sources to paint.
+
+    They are a scene, once for each sensor; bases of several views; or light groups.
     """
     given = ",".join(options.lights or ())
     paths = options.sources
@@ -76,8 +77,8 @@ def painted_of(options: Namespace) -> list[SceneFile | BasisFile | GroupsFile]:
         made.append(basis_of(options) or scene_of(options))
     if len(paths) > 1 and not all(isinstance(one, BasisFile) for one in made):
         raise BasisError(
-            f"{len(paths)} things to paint: several are bases of the views of one scene; views of "
-            "a scene are named with --sensor, once for each"
+            f"{len(paths)} things to paint: several must be bases of the views of one scene; for "
+            "views of a scene repeat --sensor"
         )
     if len(options.sensors) > 1:
         return [scene_of(options, sensor=sensor) for sensor in options.sensors]
@@ -85,10 +86,10 @@ def painted_of(options: Namespace) -> list[SceneFile | BasisFile | GroupsFile]:
 
 
 def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
-    """The basis or the light groups that `solve` starts from; None where it is a scene.
+    """Return the basis or the light groups that `solve` starts from; None for a scene.
 
-    Where `--lights` names the light groups, the source is put in front of the targets, since it
-    is one. Raises BasisError for options that a basis without its scene has no use of.
+    If `--lights` names the light groups, the source is really the first target. Raises BasisError
+    for options that are useless without a scene.
     """
     source, names = Path(options.source), options.lights
     given = ",".join(names or ())
@@ -110,7 +111,7 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
         return None
     if options.views:
         raise BasisError(
-            f"--target cannot be used with {basis.path}, which has one view only: give the scene, "
+            f"--target cannot be used with {basis.path}, which has only one view: give the scene "
             "to solve for several"
         )
     is_groups = isinstance(basis, GroupsFile)
@@ -125,36 +126,36 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
 
 
 def _groups_file(path: str, options: Namespace) -> GroupsFile:
-    """Light groups, in whose folder what this command paints with may lie."""
+    """Return light groups; paintings in their folder are not among them."""
     pictures = (*options.targets, *(options.masks or ()))
     return GroupsFile(path, options.pattern, leave_out=pictures)
 
 
 def _is_file_to_be(given: str, source: Path) -> bool:
-    """Whether `--lights` means a file or folder, and not lights of a scene or a basis."""
+    """Return True if `--lights` means a file or folder, and not lights of a scene or a basis."""
     if given.lower().endswith(".exr"):
         return True
-    # A folder or file may well have the name of a light: results are kept in such.
+    # A folder of results may well have the name of a light.
     return source.suffix.lower() != ".xml" and Path(given).exists()
 
 
 def _check_light_groups(given: str) -> None:
-    """Raise BasisError for a `--lights` that names something else, ImageError for one damaged."""
+    """Raise BasisError if `--lights` names something else, ImageError if it is damaged."""
     path = Path(given)
     if not path.exists():
         raise BasisError(f"no such file or folder of light groups: --lights {given}")
     if path.is_dir() and not is_light_groups(path):
         raise BasisError(f"--lights {given} is a folder without an .exr file")
-    # What is no EXR at all is refused where it is read.
+    # The reader refuses files that are not EXR.
     if path.is_file() and is_exr(path) and is_own_basis(path):
         raise BasisError(
-            f"--lights {given} holds no light groups: give an EXR of another renderer's, or a "
-            "folder of them; a basis of lightpaint's own stands where the scene does"
+            f"--lights {given} holds no light groups: give an EXR of another renderer, or a "
+            "folder of them; pass a basis of lightpaint in place of the scene"
         )
 
 
 def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
-    """Emitters by name of the group. Given twice, a group has both lists."""
+    """Return emitters by name of the group; lists of repeated groups are joined."""
     groups: dict[str, list[str]] = {}
     for name, members in given:
         groups[name] = groups.get(name, []) + members

@@ -1,1 +1,1 @@
-"""Output of the terminal: tables, JSON documents, progress, and the words for them."""
+"""Output: tables, JSON documents, progress, and the words for them."""

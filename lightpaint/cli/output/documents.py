@@ -1,4 +1,4 @@
-"""What commands say to programs: the documents of `--json` (docs/solving.md)."""
+"""The documents of `--json`, for programs (docs/solving.md)."""
 
 import json
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_of
-from lightpaint.cli.tolerances import Wanted
+from lightpaint.cli.tolerances import Tolerances
 from lightpaint.pipeline.job import Job, PaintedView
 from lightpaint.pipeline.result_folder import RECORD
 from lightpaint.pipeline.results import Look
@@ -21,14 +21,14 @@ from lightpaint.scene.scene import Scene
 
 
 def lights_document(scene: Scene, cd_per_unit: float | None) -> dict[str, Any]:
-    """Of `lights`."""
+    """Return the document of `lights`."""
     scale = {} if cd_per_unit is None else {"cd_per_unit": cd_per_unit}
-    listed = [described(light, cd_per_unit) for light in scene.lights]
+    listed = [light_document(light, cd_per_unit) for light in scene.lights]
     return {"scene": str(scene.path), **scale, "lights": listed}
 
 
-def described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
-    """A light, and the emitters in it, for other programs."""
+def light_document(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
+    """Return a light, and the emitters in it, for other programs."""
     members = [
         {
             "name": member.name,
@@ -59,7 +59,7 @@ def described(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
 
 
 def basis_document(file: Path, basis: Basis) -> dict[str, Any]:
-    """Of `basis`."""
+    """Return the document of `basis`."""
     height, width = basis.size
     return {
         "file": str(file),
@@ -74,8 +74,8 @@ def basis_document(file: Path, basis: Basis) -> dict[str, Any]:
     }
 
 
-def result_document(job: Job, view: PaintedView, look: Look, wanted: Wanted) -> dict[str, Any]:
-    """Of one view in `solve`: what its report.json and lighting.json say, and where they are."""
+def result_document(job: Job, view: PaintedView, look: Look, wanted: Tolerances) -> dict[str, Any]:
+    """Return the document of one view in `solve`: its report.json, lighting.json and files."""
     others = {its.folder for its in job.views} - {view.folder, job.folder}
     files = [*job.results.files, job.folder / RECORD]
     return {
@@ -97,17 +97,17 @@ def _in_file(path: Path) -> Any:
 
 
 def files_document(folder: Path, files: Sequence[Path], **others: Any) -> dict[str, Any]:
-    """Files that were written, and the folder that they are in."""
+    """Return files that were written, and their folder."""
     return {**others, "folder": str(folder), "files": [str(file) for file in files]}
 
 
 def verified_document(folder: Path, result: Verification) -> dict[str, Any]:
-    """Of one folder in `verify`, as report.json has it."""
+    """Return the document of one folder in `verify`, as in report.json."""
     return {"folder": str(folder), **dict(finite(verification_numbers(result)))}
 
 
 def kept_document(entry: cache.Entry) -> dict[str, Any]:
-    """Of one basis in the cache; what cannot be read of it is absent."""
+    """Return the document of one basis in the cache, without what cannot be read."""
     told: dict[str, Any] = {"file": str(entry.path), "bytes": entry.size}
     if (known := entry.origin) is not None and entry.image_size is not None:
         height, width = entry.image_size
@@ -117,7 +117,7 @@ def kept_document(entry: cache.Entry) -> dict[str, Any]:
 
 
 def doctor_document(findings: Sequence[Finding]) -> dict[str, Any]:
-    """Of `doctor`."""
+    """Return the document of `doctor`."""
     return {
         "ok": all(finding.state != "missing" for finding in findings),
         "findings": [

@@ -1,7 +1,7 @@
-"""What goes to the terminal, line by line: the one place in the package that prints.
+"""Lines for the terminal: the only module of the package that prints.
 
-Names, paths and the words of libraries come from files, where anything may stand. What would steer
-a terminal, or pass for a line of its own, is shown instead (`screen.visible`).
+Names, paths and texts of libraries may contain anything. Characters that would control a terminal,
+or look like a new line, are made visible (`screen.visible`).
 """
 
 import os
@@ -11,14 +11,14 @@ from lightpaint.errors import OutputError
 from lightpaint.images.formats.library_output import unsilenced
 from lightpaint.screen import visible
 
-#: Characters of a line on stderr; what is longer was in no sentence.
-LONGEST = 4000
+#: Longest line on stderr, in characters: no sentence is longer.
+MAX_LINE_LENGTH = 4000
 
 
 def out(line: str, *, swatch: str | None = None) -> None:
-    """A line of results, to stdout. Work goes on if whoever read them has left (`| head`).
+    """Print a line of results to stdout. Work goes on if its reader has left (`| head`).
 
-    swatch: a colour like `#ffaa66`, of which a block stands before the line; "" for room for one.
+    swatch: a colour like `#ffaa66` for a block before the line; "" for blank space.
     """
     try:
         with unsilenced():
@@ -38,12 +38,12 @@ def _block(color: str | None) -> str:
 
 
 def err(line: str) -> None:
-    """A line of progress, a remark or an error, to stderr."""
+    """Print a line of progress, a remark or an error to stderr."""
     with unsilenced():
         print(cut(line), file=sys.stderr, flush=True)
 
 
 def cut(line: str) -> str:
-    """As `err` shows it."""
-    shown = visible(line[: LONGEST + 1])
-    return shown if len(shown) <= LONGEST else f"{shown[:LONGEST]} …"
+    """Return a line as `err` prints it."""
+    shown = visible(line[: MAX_LINE_LENGTH + 1])
+    return shown if len(shown) <= MAX_LINE_LENGTH else f"{shown[:MAX_LINE_LENGTH]} …"

@@ -1,4 +1,4 @@
-"""How a command speaks: in tables or as JSON, with more or less beside its results."""
+"""The output mode of a command: tables or JSON, quiet or verbose."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -9,23 +9,24 @@ from typing import Any
 
 
 class Stopwatch:
-    """Seconds since it was made, and since it was last looked at."""
+    """A stopwatch with lap times."""
 
     def __init__(self) -> None:
         self._began = self._last = time.perf_counter()
 
-    def look(self) -> tuple[float, float]:
-        """(since the last look, in all)."""
+    def read(self) -> tuple[float, float]:
+        """Return seconds since the last reading, and in all."""
         now = time.perf_counter()
         lap, self._last = now - self._last, now
         return lap, now - self._began
 
 
 @dataclass(frozen=True)
-class Manner:
-    """as_json: one document on stdout, and nothing else. is_quiet: neither progress nor remarks.
+class OutputMode:
+    """The output mode of a command.
 
-    is_verbose: also what was used, and how long it took. clock: since the command began.
+    as_json: one document on stdout, and nothing else. is_quiet: neither progress nor remarks.
+    is_verbose: also settings and times. clock: runs since the command began.
     """
 
     as_json: bool = False
@@ -36,26 +37,27 @@ class Manner:
 
 @dataclass(frozen=True)
 class CommandOutcome:
-    """The outcome of a command. told: the document for programs, made if asked for; None where
-    they were told already.
+    """The outcome of a command.
+
+    told: creates the document for programs, on request; None if it was printed already.
     """
 
     told: Callable[[], dict[str, Any]] | None
     code: int = 0
 
 
-_MANNER = ContextVar("manner", default=Manner())  # noqa: B039 (nobody looks at its clock)
+_MANNER = ContextVar("manner", default=OutputMode())  # noqa: B039 (its clock is not used)
 
 
-def manner() -> Manner:
-    """That of the command that runs."""
+def output_mode() -> OutputMode:
+    """Return the output mode of the running command."""
     return _MANNER.get()
 
 
 @contextmanager
-def speaking(how: Manner) -> Iterator[None]:
-    """Speak so within."""
-    before = _MANNER.set(how)
+def using_output_mode(mode: OutputMode) -> Iterator[None]:
+    """Use an output mode within the block."""
+    before = _MANNER.set(mode)
     try:
         yield
     finally:

@@ -1,4 +1,4 @@
-"""What commands print of scenes, bases and suggestions: tables, and sentences below them."""
+"""Tables of scenes, bases and suggestions, with sentences below them."""
 
 from collections.abc import Sequence
 
@@ -17,9 +17,9 @@ from lightpaint.scene.scene import Scene
 
 
 def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
-    """Print the lights of a scene as they are, groups with their members."""
+    """Print the lights of a scene, groups with their members."""
     headings = ("light", "plugin", "emission R G B", "unit", "size or place", "sampling", "colour")
-    # Lumen and candela only where somebody has said what a number stands for.
+    # Lumens and candelas need a scale.
     amounts = () if cd_per_unit is None else ("luminous", "flux")
     table = terminal.table(*headings, *amounts)
     for light in scene.lights:
@@ -39,7 +39,7 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
                 "" if light.is_fixed else whole.color,
                 *whole.amounts[: len(amounts)],
             )
-        # Of many that nobody has named one row says all.
+        # One row is enough for many similar lamps without names.
         for member in () if light.is_found else light.members:
             its = photometry_of(member, cd_per_unit)
             table.row(
@@ -56,7 +56,7 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
 
 
 def photometry_of(light: Light | Emitter, cd_per_unit: float | None) -> Photometry:
-    """Of a light or one of its emitters, as the scene has it."""
+    """Return the photometry of a light or of one of its emitters, as in the scene."""
     unit, flux = MULTIPLE, None
     if isinstance(light, Light):
         unit, flux = light.unit, light.unit_flux
@@ -80,7 +80,7 @@ def show_kept(entries: Sequence[Entry]) -> None:
 
 
 def spoken_agreement(result: Verification) -> str:
-    """Whether render and prediction agree, with numbers."""
+    """Return whether render and prediction agree, with numbers."""
     return (
         f"{agreement(result)}; RMSE {result.rmse:.2g} (noise {result.noise_rmse:.2g}), "
         f"ΔE {result.delta_e_mean:.1f}"
@@ -95,7 +95,7 @@ def show_suggestions(
     terminal.write(spoken_suggestions(suggestions))
     if not suggestions:
         return
-    headings = ("suggested light", "at", "intensity R G B", "unit", "takes away", "left", "colour")
+    headings = ("suggested light", "at", "intensity R G B", "unit", "removes", "left", "colour")
     amounts = () if cd_per_unit is None else ("luminous", "flux")
     table = terminal.table(*headings, *amounts)
     for light in suggestions:
@@ -111,6 +111,6 @@ def show_suggestions(
             *seen.amounts[: len(amounts)],
         )
     terminal.print_table(table)
-    terminal.write("to be pasted into <scene>, and solved again:")
+    terminal.write("paste this into <scene>, and solve again:")
     for light in suggestions:
         terminal.write_lines(light.xml)

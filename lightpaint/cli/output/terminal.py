@@ -1,4 +1,4 @@
-"""How the command line speaks: tables to stdout, progress and remarks to stderr."""
+"""Output of the command line: tables to stdout, progress and remarks to stderr."""
 
 import io
 import json
@@ -22,21 +22,21 @@ from rich.table import Table
 from rich.text import Text
 
 from lightpaint.cli.output import lines
-from lightpaint.cli.output.output_mode import manner
+from lightpaint.cli.output.output_mode import output_mode
 from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.screen import visible
 
 
 def numbers(rgb: tuple[float, float, float]) -> str:
-    """Three numbers to read, not to compute with."""
+    """Return three numbers rounded for reading."""
     return " ".join(f"{v:.3g}" for v in rgb)
 
 
 class Rows(Table):
-    """A table whose cells are text as it stands, without markup."""
+    """A table whose cells are plain text, without markup."""
 
     def row(self, *cells: str, room: int | None = None) -> None:
-        """Add a row. room: cells of the terminal that the first one is cut to."""
+        """Add a row. room: width to which the first cell is cut."""
         first, *others = (Text(visible(cell)) for cell in cells)
         if room is not None:
             first.truncate(room, overflow="ellipsis")
@@ -44,7 +44,7 @@ class Rows(Table):
 
 
 def table(*columns: str) -> Rows:
-    """An empty table with these headings."""
+    """Return an empty table with these headings."""
     made = Rows(box=None, pad_edge=False, header_style="bold")
     for column in columns:
         made.add_column(column, no_wrap=True)
@@ -52,12 +52,12 @@ def table(*columns: str) -> Rows:
 
 
 def print_table(made: Rows, swatches: Sequence[str | None] = ()) -> None:
-    """Print to stdout. Piped output has no width: nothing in it is cut.
+    """Print a table to stdout. Piped output has no width limit: nothing is cut.
 
-    swatches: a colour like `#ffaa66` for each row, or None for none. They stand before the rows
-    where the terminal can show them, and are nowhere else.
+    swatches: a colour like `#ffaa66` for each row, or None. They appear before the rows if the
+    terminal can show them.
     """
-    if manner().as_json:
+    if output_mode().as_json:
         return
     width = None if sys.stdout.isatty() else 1000
     page = Console(highlight=False, width=width, file=io.StringIO(), color_system=None)
@@ -71,28 +71,28 @@ def print_table(made: Rows, swatches: Sequence[str | None] = ()) -> None:
 
 
 def has_truecolour() -> bool:
-    """Whether stdout is a terminal that says it has all colours, and nobody asked for none."""
+    """Return True if stdout is a terminal with all colours, and the user allows them."""
     has_all = os.environ.get("COLORTERM", "").lower() in ("truecolor", "24bit")
     return has_all and not os.environ.get("NO_COLOR") and sys.stdout.isatty()
 
 
 def write(text: str) -> None:
-    """A line of results, to stdout; nowhere if they are asked for as JSON."""
-    if not manner().as_json:
+    """Print a line of results to stdout; nothing in JSON mode."""
+    if not output_mode().as_json:
         lines.out(text)
 
 
 def write_json(told: Mapping[str, Any]) -> None:
-    """The results as a document for programs, to stdout."""
-    # All but ASCII is escaped by it, and of that one character is not seen.
+    """Print the results to stdout as a document for programs."""
+    # json escapes all but ASCII, which has one more invisible character.
     text = json.dumps(told, indent=2, allow_nan=False).replace("\x7f", "\\u007f")
     for line in text.split("\n"):
         lines.out(line)
 
 
 def tell(text: str) -> None:
-    """A sentence or two, to stdout: on a terminal in lines that end where words do."""
-    if manner().as_json or not sys.stdout.isatty():
+    """Print a sentence or two to stdout, wrapped at words on a terminal."""
+    if output_mode().as_json or not sys.stdout.isatty():
         write(text)
         return
     for line in textwrap.wrap(visible(text), Console().width, break_on_hyphens=False):
@@ -100,49 +100,49 @@ def tell(text: str) -> None:
 
 
 def write_lines(text: str) -> None:
-    """Several lines of results, to stdout."""
+    """Print several lines of results to stdout."""
     for line in text.rstrip().split("\n"):
         write(line.rstrip())
 
 
 def say(text: str) -> None:
-    """A remark, to stderr."""
-    if not manner().is_quiet:
+    """Print a remark to stderr."""
+    if not output_mode().is_quiet:
         lines.err(f"lightpaint: {spoken(text)}")
 
 
 def complain(command: str, text: str) -> None:
-    """What is not as it was asked for, to stderr, however quiet it is to be."""
+    """Print a shortcoming to stderr, even in quiet mode."""
     lines.err(f"lightpaint {command}: {spoken(text)}")
 
 
 def note(text: str) -> None:
-    """A stage that is done, and how long it took, to stderr, where somebody wants to know all."""
-    if manner().is_verbose:
+    """Print a finished stage and its time to stderr, in verbose mode."""
+    if output_mode().is_verbose:
         say(_timed(text))
 
 
 def _timed(text: str) -> str:
-    lap, total = manner().clock.look()
+    lap, total = output_mode().clock.read()
     return f"{text} [{lap:.2f} s, {total:.2f} s in all]"
 
 
-#: Workers that have a line each; of more only how many there are.
-WORKERS = 8
+#: Most workers with a line each; of more, only their number is shown.
+MAX_WORKER_LINES = 8
 
 
 class _Count(MofNCompleteColumn):
-    """How many of how many, and nothing where nobody counts."""
+    """A column with the count of finished pieces; empty if there is no total."""
 
     def render(self, task: Task) -> Text:
         return Text("") if task.total is None else super().render(task)
 
 
 class TerminalListener:
-    """Hears progress and remarks, and shows them on stderr; of equal remarks the first.
+    """A listener that shows progress and remarks on stderr, each remark once.
 
-    On a terminal bars are shown while it is entered, and a line for each worker that is at work; in
-    a log it is one line for each piece of work that begins.
+    On a terminal it shows bars while it is entered, and a line for each busy worker; in a log, one
+    line for each piece of work that begins.
     """
 
     def __init__(self) -> None:
@@ -153,7 +153,7 @@ class TerminalListener:
         self._others: set[str] = set()  # workers without a line
 
     def __enter__(self) -> "TerminalListener":
-        if sys.stderr.isatty() and not manner().is_quiet:
+        if sys.stderr.isatty() and not output_mode().is_quiet:
             columns = (
                 TextColumn("{task.description}", markup=False),
                 BarColumn(),
@@ -172,7 +172,7 @@ class TerminalListener:
     def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Show that `done` of `total` pieces of the work `label` are finished."""
         if self._bars is None:
-            if done == 0 and not manner().is_quiet:
+            if done == 0 and not output_mode().is_quiet:
                 lines.err(f"{label}: {total} {unit}")
             return
         if label not in self._tasks:
@@ -180,19 +180,19 @@ class TerminalListener:
             self._tasks[label] = self._bars.add_task(visible(what), total=total)
         self._bars.update(self._tasks[label], completed=done, total=total)
 
-    def at_work(self, worker: str, what: str | None) -> None:
-        """Show what a worker does now; None for nothing."""
+    def at_work(self, worker: str, task: str | None) -> None:
+        """Show the present task of a worker; None if it is idle."""
         if self._bars is None:
             return
-        if what is None:
+        if task is None:
             self._others.discard(worker)
             if worker in self._workers:
                 self._bars.remove_task(self._workers.pop(worker))
         elif worker in self._workers:
-            self._bars.reset(self._workers[worker], description=visible(f"{worker}: {what}"))
-        elif len(self._workers) < WORKERS:
+            self._bars.reset(self._workers[worker], description=visible(f"{worker}: {task}"))
+        elif len(self._workers) < MAX_WORKER_LINES:
             self._others.discard(worker)
-            self._workers[worker] = self._bars.add_task(visible(f"{worker}: {what}"), total=None)
+            self._workers[worker] = self._bars.add_task(visible(f"{worker}: {task}"), total=None)
         else:
             self._others.add(worker)
         if self._others or "others" in self._tasks:
@@ -202,7 +202,7 @@ class TerminalListener:
             self._bars.update(self._tasks["others"], description=others, visible=bool(self._others))
 
     def say(self, text: str) -> None:
-        """A remark, above the bars if there are any."""
+        """Print a remark, above the bars if there are any."""
         if text in self._said:
             return
         self._said.add(text)
@@ -212,6 +212,6 @@ class TerminalListener:
         self._bars.console.out(lines.cut(f"lightpaint: {spoken(text)}"), highlight=False)
 
     def note(self, text: str) -> None:
-        """A stage that is done, where somebody wants to know all; each has a time of its own."""
-        if manner().is_verbose:
+        """Print a finished stage with its time, in verbose mode."""
+        if output_mode().is_verbose:
             self.say(_timed(text))

@@ -1,11 +1,11 @@
-"""The words of the command line for those of the library: `--resize` for `resize=True`."""
+"""Translation of the library's arguments to options: `--resize` for `resize=True`."""
 
 import os
 import re
 import shlex
 from collections.abc import Sequence
 
-#: Arguments of the library that errors and remarks name, and their options.
+#: Options for the arguments that errors and remarks of the library name.
 OPTIONS = {
     "cd_per_unit": "--unit",
     "colors": "--colors",
@@ -47,7 +47,7 @@ OPTIONS = {
     "verify_spp": "--verify-spp",
 }
 
-#: What is spelled otherwise than by an option and a value.
+#: Arguments with a value that have an option of their own.
 SPELLINGS = {
     "group_alike=False": "--no-group-alike",
     "find=False": "--no-template",
@@ -56,8 +56,8 @@ SPELLINGS = {
     "verify=False": "--no-verify",
 }
 
-#: `name=value` as the library writes it: alone among words, so that no path is taken for one.
-_SAID = re.compile(
+#: `name=value` as the library writes it: a separate word, so that no path matches.
+_ARGUMENT = re.compile(
     r"""(?<![^\s(])(\w+)=(\.\.\.|True|False|\d+|'[^']*'|"\w+"|\{'\w+':\ \.\.\.\})"""
     r"""(?=[,;:.)]*(?:\s|$))""",
     re.VERBOSE,
@@ -65,29 +65,29 @@ _SAID = re.compile(
 
 
 def spoken(text: str) -> str:
-    """`text` of the library in the words of the command line."""
-    return _SAID.sub(_spoken, text)
+    """Return `text` of the library with the options of the command line."""
+    return _ARGUMENT.sub(_spoken, text)
 
 
 def _spoken(match: re.Match[str]) -> str:
-    said, (name, value) = match[0], match.groups()
-    if said in SPELLINGS:
-        return SPELLINGS[said]
+    argument, (name, value) = match[0], match.groups()
+    if argument in SPELLINGS:
+        return SPELLINGS[argument]
     if name not in OPTIONS:
-        return said
+        return argument
     if key := re.fullmatch(r"\{'(\w+)': \.\.\.\}", value):
         return f"{OPTIONS[name]} {key[1]}=VALUE"
     return OPTIONS[name] if value in ("...", "True") else f"{OPTIONS[name]} {value.strip(chr(34))}"
 
 
 def from_any_folder(words: Sequence[str] | str) -> str:
-    """Return a command, given as words or as a shell has it, that does the same from any folder.
+    """Return a command, as words or as a shell line, that does the same from any folder.
 
-    Paths stand in it as they were given. In a shell of its own it first goes to the folder that
-    they are meant from.
+    Its paths stay as they were given; a subshell first changes to the folder that they are relative
+    to.
     """
     command = words if isinstance(words, str) else shlex.join(words)
     try:
         return f"(cd {shlex.quote(os.getcwd())} && {command})"
-    except OSError:  # of a folder that is there no more
+    except OSError:  # the working folder was deleted
         return command

@@ -1,4 +1,4 @@
-"""What the plain sub-commands do: calls of the corridor, and what came out told."""
+"""The sub-commands that render: basis, template, demo, relight and verify."""
 
 import shlex
 from collections.abc import Sequence
@@ -48,9 +48,9 @@ from lightpaint.target.template import CLEAN, LIGHT, LIGHTS, MATTES, SHOWN, file
 
 
 def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutcome:
-    """`lightpaint basis SCENE -o F.basis.exr`"""
+    """Run `lightpaint basis SCENE -o F.basis.exr`."""
     if output.suffix.lower() != ".exr":
-        raise OutputError(f"{output} must end in .exr, the format that is written")
+        raise OutputError(f"{output} must end in .exr: a basis is an EXR")
     check_writable(output.parent)
     loaded = on_film(scene.content, settings.quality, settings.resolution)
     note_scene(loaded)
@@ -75,7 +75,7 @@ def template(
     settings: Settings,
     force: bool,
 ) -> CommandOutcome:
-    """`lightpaint template SCENE|BASIS|LIGHTS -o DIR`"""
+    """Run `lightpaint template SCENE|BASIS|LIGHTS -o DIR`."""
     _check_template(output, force=force)
     if not isinstance(source, SceneFile):
         return _template_of_basis(source, output, transform, settings)
@@ -98,7 +98,7 @@ def template(
             files = render_template(loaded, output, progress=listen, **how)
         else:
             files = [output, render_look(loaded, output, progress=listen, **how)]
-    return _shown_template(output, files)
+    return _show_template(output, files)
 
 
 def _template_of_basis(
@@ -107,7 +107,7 @@ def _template_of_basis(
     transform: ViewTransform | None,
     settings: Settings,
 ) -> CommandOutcome:
-    """A template of what is rendered already."""
+    """Write a template of a saved basis or of light groups."""
     check_nothing_unused(settings, source)
     found = source.content
     made = found if isinstance(found, Basis) else found.basis
@@ -119,13 +119,13 @@ def _template_of_basis(
         files = template_of_basis(made, output, transform=transform)
     else:
         files = [output, look_of_basis(made, output, transform=transform)]
-    return _shown_template(output, files, is_denoised=made.knows_noise)
+    return _show_template(output, files, is_denoised=made.knows_noise)
 
 
-def _shown_template(
+def _show_template(
     output: Path, files: Sequence[Path], *, is_denoised: bool = True
 ) -> CommandOutcome:
-    """Return lines that say what to do with the files of a template."""
+    """Print what the files of a template are for."""
     is_tree = is_folder(output)
     picture = output / SHOWN if is_tree else output.with_suffix(".png")
     linear = output / LIGHT if is_tree else output
@@ -145,7 +145,7 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
     lines = [f"{picture}: {look}; {steps}"]
     if CLEAN in {file.name for file in files}:
         lines.append(
-            f"{output / CLEAN}: the same in linear light, to paint over in programs that know EXR"
+            f"{output / CLEAN}: the same in linear light, to paint over in programs that read EXR"
         )
     its = "the look as rendered, with its noise" if is_denoised else "the same in linear light"
     lines.append(f"{output / LIGHT if is_tree else output}: {its}")
@@ -158,7 +158,7 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
 
 
 def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOutcome:
-    """`lightpaint demo -o DIR`"""
+    """Run `lightpaint demo -o DIR`."""
     made = write_demo(folder)
     options = [f"--spp {settings.spp}"] if settings.spp else []
     options += [f"-m {variant}"] if variant else []
@@ -183,7 +183,7 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOut
 def relight(
     *, scene: SceneFile, lightings: Sequence[Path], output: Path | None, settings: Settings
 ) -> CommandOutcome:
-    """`lightpaint relight SCENE lighting.json...`"""
+    """Run `lightpaint relight SCENE lighting.json...`."""
     for path in lightings:
         finish(path.parent)
     answers = [read_lighting(path) for path in lightings]
@@ -199,7 +199,7 @@ def relight(
     for lighting, place in zip(answers, results, strict=True):
         folder = place.folder
         if lighting.scene_identity not in ("", scene_of(loaded, lighting).identity):
-            terminal.say(f"{folder}: the lighting was solved for another state of the scene")
+            terminal.say(f"{folder}: the lighting was solved for an earlier state of the scene")
         with terminal.TerminalListener() as listen:
             how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
             relight_look({"": loaded}, lighting, place, progress=listen, **how)
@@ -211,13 +211,13 @@ def relight(
 
 
 def _relit(lighting: Path, place: ResultFolder) -> dict[str, Any]:
-    """What there is of a lighting that was relit, for programs."""
+    """Return the files of a relit scene, for programs."""
     files = [file for file in place.files if file.is_file()]
     return documents.files_document(place.folder, files, lighting=str(lighting))
 
 
 def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) -> CommandOutcome:
-    """`lightpaint verify DIR...`"""
+    """Run `lightpaint verify DIR...`."""
     use_variant(variant)
     results = []
     for folder in (view for given in folders for view in result_folders(given)):
@@ -238,7 +238,7 @@ def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) 
 
 
 def _check_template(output: Path, *, force: bool) -> None:
-    """Raise OutputError for a place that a template cannot or should not go to."""
+    """Raise OutputError if a template cannot or should not be written there."""
     is_tree = is_folder(output)
     check_name(output)
     check_files(_replaced(output), ())
@@ -250,8 +250,8 @@ def _check_template(output: Path, *, force: bool) -> None:
             )
     if output.suffix.lower() in (".png", ".tif", ".tiff", ".jpg", ".jpeg"):
         raise OutputError(
-            f"{output} is no folder: name one with -o, or a file that ends in .exr (a PNG comes "
-            "along)"
+            f"{output} is not a folder: name one with -o, or a file that ends in .exr (a PNG is "
+            "written beside it)"
         )
     if is_tree and output.is_file():
         raise OutputError(f"{output} is a file: name a folder with -o, or a file that ends in .exr")
@@ -259,7 +259,7 @@ def _check_template(output: Path, *, force: bool) -> None:
 
 
 def _replaced(output: Path) -> list[Path]:
-    """What a template at `output` may take the place of."""
+    """Return the files that a template at `output` may replace."""
     if not is_folder(output):
         return [output, output.with_suffix(".png")]
     finish(output)
@@ -267,7 +267,7 @@ def _replaced(output: Path) -> list[Path]:
 
 
 def _loaded(scene: SceneFile) -> Scene:
-    """The scene, of whose lights only the sum counts."""
+    """Return the scene, without remarks on single lights."""
     loaded = scene.content
     note_scene(loaded)
     if note := use_variant().note:
