@@ -183,7 +183,7 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
         f"preview: {preview.spp} samples per pixel on about {pixels:,} pixels",
         f"final: {final.spp} on the whole film",
         f"white: {LAMP_KELVINS[0]} to {LAMP_KELVINS[1]} K",
-        f"more than {MAX_SEPARATE} are alike",
+        f"more than {MAX_SEPARATE} are similar",
     ):
         assert said in texts
 

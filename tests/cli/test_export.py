@@ -168,7 +168,5 @@ def test_what_it_lacks_is_one_line(here: Path) -> None:
         assert said in refused(here, "export", *given, "-o", "none")
     (here / "kept").mkdir()
     (here / "kept" / "fixtures.csv").write_text("mine", encoding="utf-8")
-    assert "exists: name another" in refused(
-        here, "export", lighting, "--to", "csv", "-o", "kept"
-    )
+    assert "exists: name another" in refused(here, "export", lighting, "--to", "csv", "-o", "kept")
     assert run(here, "export", lighting, "--to", "csv", "-o", "kept", "--force").returncode == 0
