@@ -76,7 +76,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
         case "paint":
             return _paint_arguments(options, settings, given)
         case "relight":
-            scene = scene_of(options, is_solve_arguments=False, use_lights_file=False)
+            scene = scene_of(options, is_to_solve=False, use_lights_file=False)
             paths = list(map(Path, options.lightings))
             return {"scene": scene, "lightings": paths, "output": output, "settings": settings}
         case "verify":
