@@ -125,7 +125,7 @@ def session(hand: Hand) -> None:
     hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41), on(0.1, 0.37), on(0.02, 0.33))
     hand.wait()
     # More light on the figure, and warmer.
-    hand.press("Ask by dragging: up is brighter, right is warmer")
+    hand.press("Adjust: drag up for brighter, right for warmer")
     x, y = on(0.295, 0.56)
     hand.drag((x, y), (x + 50, y - 110), moves=14)
     hand.wait()

@@ -70,13 +70,13 @@ class Designer:
 
     def whole(self, stops: float, mired: float = 0) -> None:
         """Ask for all of the picture, in numbers."""
-        if not self.page.get_by_role("button", name="Ask for it").count():
+        if not self.page.get_by_role("button", name="Apply").count():
             self.key("a")
-            self.press("In numbers")
+            self.press("By numbers")
         self.number("Brighter", stops)
         if mired:
             self.number("Warmer", mired)
-        self.press("Ask for it")
+        self.press("Apply")
 
     @property
     def sentence(self) -> str:
@@ -86,7 +86,7 @@ class Designer:
 def sculptures(designer: Designer) -> None:
     """A warm evening, with light on the sculptures only."""
     designer.whole(-2.5)
-    designer.choose("Ask about", "Object")
+    designer.choose("Area", "Object")
     for name, place in {"figure": FIGURE, "knot": KNOT, "vase": VASE}.items():
         designer.ask(f"drag {name} up and right", place, 130, 60)
 
@@ -94,10 +94,10 @@ def sculptures(designer: Designer) -> None:
 def red_picture(designer: Designer) -> None:
     """The red picture alone, by five white lamps."""
     designer.whole(-4)
-    designer.choose("Ask about", "Object")
+    designer.choose("Area", "Object")
     designer.ask("drag the red picture up", FIELD, 150)
-    designer.press("How the painting is answered")
-    designer.choose("Which colours lamps may have", "White")
+    designer.press("Solve settings")
+    designer.choose("Light colours", "White")
     designer.number("At most", 5)
     designer.key("Escape")
 
@@ -108,23 +108,23 @@ def moonlit(designer: Designer) -> None:
     designer.ask("drag the lantern up and right", (0.392, 0.7), 60, 120)
     designer.key("n")
     load(designer.page)
-    designer.press("Ask for it")
+    designer.press("Apply")
 
 
 def contradictory(designer: Designer) -> None:
     """One of two pictures under one lamp brighter, the other one darker."""
     designer.key("a")
-    designer.choose("Ask about", "Object")
+    designer.choose("Area", "Object")
     designer.ask("drag the left picture up", LEFT_TIDE, 110)
     designer.ask("drag the right picture down", RIGHT_TIDE, -110)
-    designer.press("How true?")
+    designer.press("Analysis")
     designer.press("Why not closer?")
 
 
 def an_hour_ago(designer: Designer) -> None:
     """Three wishes that are kept as a look."""
     designer.key("a")
-    designer.choose("Ask about", "Object")
+    designer.choose("Area", "Object")
     designer.ask("drag the figure up and right", FIGURE, 110, 50)
     designer.ask("drag the red picture down", FIELD, -80)
     designer.ask("drag the vase up", VASE, 100)

@@ -115,9 +115,10 @@ function foldByItself(root, store) {
 
 /** @param {number} count */
 function given(count) {
-  const strokes = count === 1 ? 'A stroke of this tab' : `${counted(count, 'stroke')} of this tab`;
-  return `${strokes} had not been heard before another one took over, and would lie over what was
-    painted there: given up.`.replace(/\s+/g, ' ');
+  const [strokes, they] =
+    count === 1 ? ['A stroke', 'It is'] : [counted(count, 'stroke'), 'They are'];
+  return `${strokes} in this tab had not been sent when another tab took over. ${they} dropped, so as
+    not to cover what was painted there.`.replace(/\s+/g, ' ');
 }
 
 /** @param {{hands: Hands, root: () => HTMLElement}} props */
@@ -165,13 +166,13 @@ function Side({ ui, hands }) {
       toggle=${() => store.set({ open: { ...ui.open, [name]: !ui.open[name] } })}>${made}</${Fold}>`;
   return html`<aside class="side" aria-label="Panels">
     ${fold('colour', 'Colour', html`<${ColourPanel} ui=${ui} hands=${hands} />`)}
-    ${fold('ask', 'Ask in numbers', html`<${Ask} ui=${ui} hands=${hands} />`)}
+    ${fold('ask', 'Adjust by numbers', html`<${Ask} ui=${ui} hands=${hands} />`)}
     ${fold(
       'lights',
       'Lights',
       html`<${LightsPanel} ui=${ui} hands=${hands} />`,
       html`<${OfAll} ui=${ui} hands=${hands} />`,
     )}
-    ${fold('truth', 'How true?', html`<${TruthPanel} ui=${ui} hands=${hands} />`)}
+    ${fold('truth', 'Analysis', html`<${TruthPanel} ui=${ui} hands=${hands} />`)}
   </aside>`;
 }

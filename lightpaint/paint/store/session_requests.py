@@ -18,12 +18,12 @@ HOLD_KEYS = ("lock", "off")
 
 #: Titles of these settings on the page.
 TITLES = {
-    "hold": "What you did not paint",
-    "space": "What counts as close",
-    "colors": "Which colours lamps may have",
-    "literal": "How the paint is meant",
-    "prefer_current": "Lights that hardly help",
-    "sparse": "How many lights may be on",
+    "hold": "Unpainted areas",
+    "space": "Colour space of the match",
+    "colors": "Light colours",
+    "literal": "Read the paint as",
+    "prefer_current": "Lights that make little difference",
+    "sparse": "Number of lights",
 }
 
 

@@ -17,7 +17,7 @@ def test_what_was_said_of_the_answer_before_is_marked(painter: Painter) -> None:
     painter.tell(kind="answer", version=100, exact=False)
     assert badge.inner_text() == "live"
     painter.tell(kind="answer", version=101, exact=True, lights=lights)
-    assert badge.inner_text() == "judging"
+    assert badge.inner_text() == "analysing"
     assert line.locator(".said").bounding_box() == box
     assert "is-old" in line.get_attribute("class")
     assert line.locator(".said").inner_text() == said
@@ -30,8 +30,8 @@ def test_what_was_said_of_the_answer_before_is_marked(painter: Painter) -> None:
 
 def test_names_from_files_are_text(painter: Painter) -> None:
     painter.page.keyboard.press("a")
-    painter.button("In numbers", exact=True).click()
-    assert "blue <b>ball</b>" in painter.page.get_by_role("combobox", name="Where").inner_text()
+    painter.button("By numbers", exact=True).click()
+    assert "blue <b>ball</b>" in painter.page.get_by_role("combobox", name="Area").inner_text()
     painter.tell(kind="say", text="<img src=x>", tone="info")
     assert painter.page.get_by_text("<img src=x>").is_visible()
     assert painter.page.locator(".toasts img").count() == 0
@@ -105,10 +105,10 @@ def test_a_legend_lies_on_no_picture_where_there_is_room(
 
 
 def test_truth(painter: Painter) -> None:
-    how = painter.page.locator(".answer").get_by_role("button", name="How true?")
+    how = painter.page.locator(".answer").get_by_role("button", name="Analysis")
     box = how.bounding_box()
     how.click()
-    assert how.bounding_box() == box  # or Keep look, and its tip, would be under the pointer
+    assert how.bounding_box() == box  # or Save look, and its tip, would be under the pointer
     assert how.get_attribute("aria-pressed") == "true"
     painter.button("False colour").click()
     assert painter.ui("show")["overlay"] == "falsecolor"
@@ -120,7 +120,7 @@ def test_truth(painter: Painter) -> None:
     bar = painter.page.get_by_role("progressbar", name="Verifying")
     painter.tell(kind="progress", what="verify", done=5, total=16, unit="passes")
     assert bar.get_attribute("aria-valuenow") == "5"
-    painter.button("Stop the render").click()
+    painter.button("Stop").click()
     assert painter.said("verify")[-1]["run"] is False
     painter.button("Verify").click()
     painter.tell(kind="progress", what="lights", done=5, total=16, unit="passes")
@@ -139,7 +139,7 @@ def test_how_pictures_are_shown(painter: Painter) -> None:
     painter.choose("Compare", "present solution")
     painter.choose("View", "agx")
     painter.type("Exposure", "1.5")
-    painter.page.get_by_label("Clean").uncheck()
+    painter.page.get_by_label("Denoise").uncheck()
     show = painter.page.evaluate("() => window.engine.shown")
     assert (show["left"], show["transform"], show["stops"]) == ("present", "agx", 1.5)
     assert show["clean"] is False
@@ -147,7 +147,7 @@ def test_how_pictures_are_shown(painter: Painter) -> None:
 
 
 def test_looks(painter: Painter) -> None:
-    painter.button("Keep look").click()
+    painter.button("Save look").click()
     painter.stroke()
     painter.page.keyboard.press("Control+s")
     assert [one["name"] for one in painter.said("save_look")] == ["Look 1", "Look 2"]
@@ -155,10 +155,10 @@ def test_looks(painter: Painter) -> None:
     painter.page.get_by_label("Name of Look 2").fill("Dawn")
     painter.page.get_by_label("Name of Look 2").press("Enter")
     assert painter.said("rename_look")[-1] == {"kind": "rename_look", "look": 2, "name": "Dawn"}
-    painter.button("Go on from Look 1").click()
+    painter.button("Load Look 1").click()
     assert painter.said("load_look")[-1]["look"] == 1
     painter.button("Compare looks").click()
-    painter.type("Between", "25")
+    painter.type("Crossfade", "25")
     one, two = (look["weights"] for look in painter.ui("looks"))
     shown = painter.page.evaluate("() => window.engine.shown")
     assert shown["instead"] == two  # what is there now lies on the right
@@ -231,14 +231,14 @@ def test_what_is_said_while_looks_are_compared_is_of_the_answer(painter: Painter
     painter.button("Compare looks").click()
     assert (badge.count(), whose.inner_text()) == (0, "of Look 3")
     assert boxes() == before
-    painter.type("Between", "25")  # which no answer is
+    painter.type("Crossfade", "25")  # which no answer is
     assert badge.inner_text() == "answer not shown"
-    assert whose.inner_text() == "of the answer, not shown"
+    assert whose.inner_text() == "of the answer (not shown)"
     assert whose.evaluate("(one) => one.scrollWidth <= one.clientWidth")
     assert boxes() == before
     assert painter.page.locator(".is-unseen .light").count() == 7
     painter.choose("Second look", "1")
-    painter.type("Between", "100")
+    painter.type("Crossfade", "100")
     assert badge.inner_text() == "answer not shown"
     painter.choose("First look", "3")
     assert (badge.count(), whose.inner_text()) == (0, "of Look 3")
@@ -248,7 +248,7 @@ def test_what_is_said_while_looks_are_compared_is_of_the_answer(painter: Painter
 
 def test_a_render_of_before_is_offered_again(painter: Painter) -> None:
     render = painter.button("Answer | Render")
-    painter.button("How true?").click()
+    painter.button("Analysis").click()
     assert render.count() == 0
     begin = "(is_old) => host.tell({ ...host.state(), verified: [{ agrees: true, view: 0,"
     begin += " text: 'The render agrees.', is_old }] })"
@@ -272,7 +272,7 @@ def test_pictures_stay_as_large_whatever_is_done_with_looks(
     painter = opened(viewport={"width": size[0], "height": size[1]})
     stage, strip = painter.page.locator(".stage"), painter.page.locator(".looks")
     before = stage.bounding_box()
-    assert "keeps painting and answer" in strip.inner_text()
+    assert "saves painting and answer" in strip.inner_text()
     for _ in range(12):  # more than there is room for
         painter.page.keyboard.press("Control+s")
         painter.still()
@@ -281,7 +281,7 @@ def test_pictures_stay_as_large_whatever_is_done_with_looks(
     assert place["x"] + place["width"] <= strip.bounding_box()["x"] + strip.bounding_box()["width"]
     painter.button("Compare looks").click()
     assert stage.bounding_box() == before
-    slider = painter.page.get_by_role("slider", name="Between").bounding_box()
+    slider = painter.page.get_by_role("slider", name="Crossfade").bounding_box()
     assert slider["width"] >= 160
     around = strip.bounding_box()
     assert around["height"] <= 56
@@ -300,7 +300,7 @@ def test_pictures_stay_as_large_whatever_is_done_with_looks(
         painter.page.evaluate("(look) => painter.session.send('drop_look', { look })", look)
     painter.still()
     assert stage.bounding_box() == before
-    assert "keeps painting and answer" in strip.inner_text()
+    assert "saves painting and answer" in strip.inner_text()
 
 
 def test_in_a_low_painter_an_empty_strip_gives_pictures_its_room(opened: Any) -> None:
@@ -317,8 +317,8 @@ def test_what_lies_between_two_looks_is_kept_under_a_name_that_says_so(painter: 
     painter.page.keyboard.press("Control+s")
     painter.still()
     painter.button("Compare looks").click()
-    painter.type("Between", "60")
-    painter.button("Keep as look").click()
+    painter.type("Crossfade", "60")
+    painter.button("Save as look").click()
     said = painter.said("mix_looks")[-1]
     assert (said["first"], said["second"], said["part"]) == (1, 2, 0.6)
     assert said["name"] == "Look 1 → Look 2, 60 %"
@@ -334,21 +334,21 @@ def test_the_look_that_is_seen_is_marked(painter: Painter) -> None:
         return [str(one.get_attribute("aria-label")) for one in found]
 
     painter.page.keyboard.press("Control+s")
-    assert marked() == ["Go on from Look 1"]
+    assert marked() == ["Load Look 1"]
     painter.stroke()
     assert marked() == []
     painter.page.keyboard.press("Control+s")
-    assert marked() == ["Go on from Look 2"]
-    painter.button("Go on from Look 1").click()
-    assert marked() == ["Go on from Look 1"]
+    assert marked() == ["Load Look 2"]
+    painter.button("Load Look 1").click()
+    assert marked() == ["Load Look 1"]
     # It has the same lights as another.
     painter.page.evaluate("() => painter.session.send('copy_look', { look: 1 })")
-    assert marked() == ["Go on from Look 1"]
-    painter.button("Go on from Look 1 2").click()
-    assert marked() == ["Go on from Look 1 2"]
+    assert marked() == ["Load Look 1"]
+    painter.button("Load Look 1 2").click()
+    assert marked() == ["Load Look 1 2"]
     for way in ("undo", "redo"):  # and is the one that was gone on from, after that, too
         painter.page.evaluate("(way) => { painter.session.send(way); }", way)
-    assert marked() == ["Go on from Look 1 2"]
+    assert marked() == ["Load Look 1 2"]
     # Where all lights are held, they stay as they are while somebody paints.
     painter.page.evaluate("() => painter.session.send('drop_look', { look: 1 })")
     painter.page.evaluate(
@@ -376,9 +376,9 @@ def test_a_key_that_is_held_down_keeps_one_look(painter: Painter) -> None:
 
 
 def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
-    painter.button("Write files").click()
+    painter.button("Export").click()
     painter.page.get_by_label("Report").uncheck()
-    painter.button("Write", exact=True).click()
+    painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     assert painter.said("export")[-1]["what"] == ["target", "picture", "lighting", "relit"]
     window = painter.page.get_by_role("dialog")
     assert window.locator(".exported li").all_inner_texts() == [
@@ -392,23 +392,23 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     assert painter.page.get_by_text("lightpaint solve gallery.xml").is_visible()
     assert not painter.page.get_by_text("Nothing is painted yet").count()
     painter.page.evaluate("() => { host.unpainted = true; }")
-    painter.button("Write", exact=True).click()
+    painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     painter.page.get_by_text("Nothing is painted yet: no painting was written").wait_for()
     assert not painter.page.get_by_text("lightpaint solve gallery.xml").count()
 
 
 def test_settings(painter: Painter) -> None:
-    painter.button("How the painting is answered").click()
-    painter.button("Let go").click()
+    painter.button("Solve settings").click()
+    painter.button("Ignore").click()
     assert painter.said("set")[-1]["values"]["hold"] == 0
     painter.button("Hold", exact=True).click()
-    painter.type("How firmly", "2.5")
+    painter.type("Strength", "2.5")
     painter.button("Linear").click()
     painter.button("White", exact=True).click()
-    painter.button("At its word").click()
+    painter.button("Literal").click()
     painter.type("At most", "3")
     painter.button("Stay", exact=True).click()
-    painter.type("How strongly", "0.02")
+    painter.type("Strength", "0.02")
     asked: dict[str, Any] = {}
     for said in painter.said("set"):
         asked |= said["values"]
@@ -424,7 +424,7 @@ def test_settings(painter: Painter) -> None:
 
 def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -> None:
     stage, panel = painter.page.locator(".stage"), painter.page.locator(".settings")
-    opener = painter.button("How the painting is answered")
+    opener = painter.button("Solve settings")
     before = stage.bounding_box()
     for close in ("Escape", "button", "pictures"):
         opener.click()
@@ -452,14 +452,14 @@ def test_settings_leave_the_pictures_seen_and_the_keys_alone(painter: Painter) -
 
 
 def test_settings_typed_into_are_closed_by_escape(painter: Painter) -> None:
-    painter.button("How the painting is answered").click()
+    painter.button("Solve settings").click()
     painter.page.get_by_role("textbox", name="At most").focus()
     painter.page.keyboard.press("Escape")
     painter.page.locator(".settings").wait_for(state="detached")
 
 
 def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) -> None:
-    painter.button("How the painting is answered").click()
+    painter.button("Solve settings").click()
     painter.give_up()
     assert painter.said("drop")
     assert painter.page.locator(".settings").is_visible()
@@ -467,11 +467,16 @@ def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) 
 
 #: What the sentence advises, what its button is called, and the message that it comes to.
 HELPS: list[tuple[dict[str, Any], str, str, dict[str, Any]]] = [
-    ({"kind": "hold", "hold": 0.8, "closes": 0.35}, "Loosen: closes 35 %", "set", {"hold": 0.8}),
-    ({"kind": "colors", "closes": 0.6}, "Any colour: closes 60 %", "set", {"colors": "free"}),
+    (
+        {"kind": "hold", "hold": 0.8, "closes": 0.35},
+        "Loosen hold: 35 % closer",
+        "set",
+        {"hold": 0.8},
+    ),
+    ({"kind": "colors", "closes": 0.6}, "Any colour: 60 % closer", "set", {"colors": "free"}),
     (
         {"kind": "off", "names": ["key"], "closes": 0.57},
-        "Turn on key: closes 57 %",
+        "Turn on key: 57 % closer",
         "ask_all",
         {"key": {}},
     ),
@@ -490,10 +495,10 @@ def test_what_is_advised_is_seen_before_it_is_done(
 ) -> None:
     asked = {"key": {"off": True}, "cove": {"kelvin": 2700, "limits": {"max": 2}}}
     said = {"kind": "answer", "exact": True, "lights": [], "delta_e": 11.2, "asked": asked}
-    how = painter.button("How true?").bounding_box()
+    how = painter.button("Analysis").bounding_box()
     help_ = {"names": [], "hold": None, **help_}
     painter.tell(**said, version=2, headline="A first step, 10 %.", help=help_)
-    assert painter.button("How true?").bounding_box() == how
+    assert painter.button("Analysis").bounding_box() == how
     button = painter.page.get_by_role("button", name=label, exact=True)
     button.focus()
     painter.page.keyboard.press("Enter")
@@ -507,7 +512,7 @@ def test_what_is_advised_is_seen_before_it_is_done(
     dialog.wait_for(state="detached")
     assert not painter.said(kind)
     button.click()
-    painter.button("Do it").click()
+    painter.button("Apply").click()
     assert painter.said(kind)[-1][field] == change
     assert dialog.count() == 0
 
@@ -520,8 +525,8 @@ def test_a_preview_of_before_is_none(painter: Painter) -> None:
     painter.button("Loosen").click()
     number = painter.said("preview")[-1]["number"]
     painter.tell(kind="previewed", number=number - 1, text="Old.", arrays={})
-    assert painter.page.get_by_text("Finding what it would do").is_visible()
-    assert painter.button("Do it").is_disabled()
+    assert painter.page.get_by_text("Computing the preview").is_visible()
+    assert painter.button("Apply").is_disabled()
     painter.tell(kind="say", text="That could not be found.", tone="warn", what="preview")
     painter.page.get_by_role("dialog").wait_for(state="detached")
 
@@ -544,7 +549,7 @@ def test_what_cannot_be_let_go_here_has_no_button(painter: Painter, help_: dict[
 
 def test_a_render_of_what_was_there_before_is_said_to_be(painter: Painter) -> None:
     """Somebody has painted on while it was made."""
-    painter.button("How true?").click()
+    painter.button("Analysis").click()
     painter.button("Verify").click()
     painter.stroke()
     painter.tell(kind="verified", agrees=True, text="A render confirms it.", view=0, is_old=True)
@@ -555,7 +560,7 @@ def test_a_render_of_what_was_there_before_is_said_to_be(painter: Painter) -> No
 
 def test_what_another_page_has_done_is_no_look_of_this_one(painter: Painter) -> None:
     painter.page.keyboard.press("Control+s")
-    painter.button("How true?").click()
+    painter.button("Analysis").click()
     painter.button("Why not closer?").click()
     painter.still()
     assert painter.page.locator("[aria-current=true]").count() == 1
@@ -585,7 +590,7 @@ def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -
 
 
 def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
-    painter.button("How the painting is answered").click()
+    painter.button("Solve settings").click()
     painter.page.get_by_role("textbox", name="At most").focus()
     painter.page.keyboard.type("3")
     painter.page.keyboard.press("Escape")
@@ -599,14 +604,14 @@ def test_what_is_half_typed_is_given_up_by_escape(painter: Painter) -> None:
 
 def test_where_a_page_may_not_copy_it_says_so(opened: Any) -> None:
     painter = opened(init="Object.defineProperty(navigator, 'clipboard', { value: undefined })")
-    painter.button("Write files").click()
+    painter.button("Export").click()
     painter.button("Copy the folder's path").click()
     painter.page.get_by_text("select the text instead").wait_for()
 
 
 def test_a_double_click_begins_no_render(painter: Painter) -> None:
     """The panel comes to lie under its second click."""
-    painter.button("How true?").click()
+    painter.button("Analysis").click()
     painter.button("Verify").dispatch_event("click", {"detail": 2})
     assert painter.said("verify") == []
     painter.button("Verify").click()

@@ -60,7 +60,7 @@ def test_keys_of_paint_programs(painter: Painter) -> None:
 
 def test_every_key_of_the_overlay_is_there(painter: Painter) -> None:
     painter.page.keyboard.press("?")
-    dialog = painter.page.get_by_role("dialog", name="Keys")
+    dialog = painter.page.get_by_role("dialog", name="Keyboard shortcuts")
     dialog.wait_for()
     assert dialog.locator("kbd").count() > 40
     painter.page.keyboard.press("e")  # goes nowhere while a window is open
@@ -163,7 +163,7 @@ def test_lines_by_keys_and_no_ask(painter: Painter) -> None:
     assert way == pytest.approx([12 / scale, 12 / scale])
     press("a")
     press("Enter")
-    assert "In numbers" in painter.ui("toasts")[-1]["text"]
+    assert "By numbers" in painter.ui("toasts")[-1]["text"]
     assert len(painter.calls("begin")) == 1
 
 
@@ -178,8 +178,8 @@ def test_the_colour_panel(painter: Painter) -> None:
     painter.type("Saturation", "0")
     assert len({round(x, 9) for x in painter.ui("colour")}) == 1
     painter.button("White", exact=True).click()
-    painter.type("Kelvin", "6504")
-    painter.type("Green", "10")
+    painter.type("CCT", "6504")
+    painter.type("Tint", "10")
     rgb = painter.ui("colour")
     assert rgb[1] == max(rgb)  # greener than daylight, in which green is not the largest
     painter.type("Brightness", "2")
@@ -189,10 +189,10 @@ def test_the_colour_panel(painter: Painter) -> None:
     assert warm[0] > warm[1] > warm[2]
     below = painter.page.locator(".is-ask").bounding_box()
     painter.stroke()
-    lately = painter.page.get_by_role("group", name="Used lately")
+    lately = painter.page.get_by_role("group", name="Recent colours")
     assert lately.get_by_role("button").count() == 1
     assert painter.page.locator(".is-ask").bounding_box() == below  # its room was there
-    painter.button("Look", exact=True).click()
+    painter.button("Colour", exact=True).click()
     assert painter.ui("as") == "look"
 
 
@@ -214,10 +214,10 @@ def test_how_bright_a_colour_is_is_seen_and_said(painter: Painter) -> None:
     assert patch() == ["#808080", "rgb(239 239 239)"]
     painter.type("Brightness", "-2.5")
     painter.stroke()
-    lately = painter.page.get_by_role("group", name="Used lately").get_by_role("button")
+    lately = painter.page.get_by_role("group", name="Recent colours").get_by_role("button")
     names = [one.get_attribute("aria-label") for one in lately.all()]
     said = ["1: #808080, \u22122.5 stops", "2: #808080, +1 stops"]
-    assert names == [f"Used lately {one}" for one in said]
+    assert names == [f"Recent {one}" for one in said]
     assert lately.all_inner_texts() == ["\u22122.5", "+1"]
 
 
@@ -290,7 +290,7 @@ def test_what_was_used_in_painters_beside_each_other_is_remembered(painter: Pain
     painter.type("Hex", "#778899")
     painter.stroke()
     open_again(beside)
-    lately = beside.page.get_by_role("group", name="Used lately").get_by_role("button")
+    lately = beside.page.get_by_role("group", name="Recent colours").get_by_role("button")
     names = [str(one.get_attribute("aria-label")) for one in lately.all()]
     assert [name.split(": ")[1] for name in names] == ["#778899", "#112233", "#445566"]
 
@@ -304,14 +304,14 @@ def test_warm_is_right(painter: Painter) -> None:
 
     found = []
     for key in ("Home", "ArrowRight", "ArrowRight", "End"):
-        painter.slide("Kelvin", key)
+        painter.slide("CCT", key)
         found.append(warmth())
     assert found == sorted(set(found))
     for swatch in painter.page.locator(".swatch").all()[:7]:
         swatch.click()
         found.append(warmth())
     assert found[4:] == sorted(set(found[4:]))
-    kelvin = painter.page.get_by_role("slider", name="Kelvin", exact=True)
+    kelvin = painter.page.get_by_role("slider", name="CCT", exact=True)
     track = kelvin.evaluate("(one) => one.style.getPropertyValue('--track')")
     first, last = re.findall("#(..)..(..)", track)[:: len(re.findall("#", track)) - 1]
     assert int(first[0], 16) < int(first[1], 16)
@@ -330,11 +330,11 @@ def test_asking_in_numbers(painter: Painter) -> None:
     before = lights.bounding_box()
     painter.page.keyboard.press("a")
     assert lights.bounding_box() == before  # who drags needs no numbers: nothing moves
-    painter.button("In numbers", exact=True).click()
-    painter.choose("Where", "red ball")
+    painter.button("By numbers", exact=True).click()
+    painter.choose("Area", "red ball")
     painter.type("Brighter", "-1.5")
     painter.type("Warmer", "40")
-    painter.button("Ask for it").click()
+    painter.button("Apply").click()
     assert painter.calls("ask")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
     painter.stroke()
     assert painter.calls("begin")[-1][1] == "ask"
@@ -344,9 +344,9 @@ def test_importance_is_seen_while_it_is_painted(painter: Painter) -> None:
     painter.page.keyboard.press("w")
     painter.still()
     assert painter.page.evaluate("() => window.engine.shown.overlay") == "importance"
-    assert painter.page.locator(".legend").get_by_text("Painted").is_visible()
+    assert painter.page.locator(".legend").get_by_text("Importance").is_visible()
     assert painter.page.evaluate("() => window.engine.hand.importance") == 4
-    painter.slide("Counts", "Home")
+    painter.slide("Weight", "Home")
     assert painter.ui("importance") == 0.1
     painter.page.keyboard.press("o")  # another overlay is what was asked for
     painter.still()
@@ -504,15 +504,15 @@ def test_numbers_that_were_typed_stay_while_other_panels_are_open(painter: Paint
     """In another view the same object is meant, though its number is another."""
     page = painter.page
     page.keyboard.press("a")
-    painter.button("In numbers", exact=True).click()
-    painter.choose("Where", "red ball")
+    painter.button("By numbers", exact=True).click()
+    painter.choose("Area", "red ball")
     painter.type("Brighter", "-1.5")
     painter.type("Warmer", "40")
-    painter.button("How the painting is answered").click()
+    painter.button("Solve settings").click()
     page.keyboard.press("Escape")
     page.keyboard.press("p")
     page.keyboard.press("p")
-    ask = painter.button("Ask for it")
+    ask = painter.button("Apply")
     ask.click()
     assert painter.calls("ask")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
     page.evaluate(
@@ -527,16 +527,16 @@ def test_numbers_that_were_typed_stay_while_other_panels_are_open(painter: Paint
     )
     painter.still()
     assert ask.is_disabled()
-    where = page.get_by_role("combobox", name="Where")
+    where = page.get_by_role("combobox", name="Area")
     assert where.evaluate("(one) => one.selectedOptions[0].text") == "red ball: not in this view"
 
 
 def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
     page = painter.page
     page.keyboard.press("a")
-    painter.button("In numbers", exact=True).click()
-    ask = painter.button("Ask for it")
-    for where in (page.get_by_role("combobox", name="Where"), ask):
+    painter.button("By numbers", exact=True).click()
+    ask = painter.button("Apply")
+    for where in (page.get_by_role("combobox", name="Area"), ask):
         where.focus()
         page.keyboard.press("e")
         assert painter.ui("tool") == "ask"

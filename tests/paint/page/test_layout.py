@@ -8,7 +8,7 @@ from painter_page import Painter
 
 
 def test_a_button_that_is_on_is_seen_under_the_pointer(painter: Painter) -> None:
-    opener = painter.button("How the painting is answered")
+    opener = painter.button("Solve settings")
     opener.click()  # the pointer stays on it
     opener.locator("xpath=self::*[contains(@class, 'is-on')]").wait_for()
     colours = opener.evaluate(
@@ -50,7 +50,7 @@ def test_tab_leads_to_pictures_and_lights_at_once(opened: Any, query: str) -> No
 
     skips = painter.page.locator(".skips button")
     painter.page.keyboard.press("Tab")
-    assert "To the pictures" in focused()
+    assert "Skip to the pictures" in focused()
     assert skips.first.bounding_box()["width"] > 80
     assert skips.last.bounding_box()["width"] == 1  # not seen
     painter.page.keyboard.press("Enter")
@@ -58,7 +58,7 @@ def test_tab_leads_to_pictures_and_lights_at_once(opened: Any, query: str) -> No
     painter.page.evaluate("() => painter.store.set({ side: false, open: {} })")
     skips.first.focus()
     painter.page.keyboard.press("Tab")
-    assert "To the lights" in focused()
+    assert "Skip to the lights" in focused()
     painter.page.keyboard.press("Enter")
     assert focused().startswith("light-name key" if "=12" in query else "light-name")
     assert painter.page.locator(".stage").bounding_box() == before
@@ -67,10 +67,10 @@ def test_tab_leads_to_pictures_and_lights_at_once(opened: Any, query: str) -> No
 @pytest.mark.parametrize("size", [(1280, 720), (900, 600)])
 def test_how_true_is_seen_where_it_opens(opened: Any, size: tuple[int, int]) -> None:
     painter = opened("lights=12", viewport={"width": size[0], "height": size[1]})
-    button = painter.button("How true?")
+    button = painter.button("Analysis")
     button.click()
     painter.still()
-    panel = painter.page.get_by_role("region", name="How true?").bounding_box()
+    panel = painter.page.get_by_role("region", name="Analysis").bounding_box()
     assert panel["height"] > 80
     assert panel["y"] + panel["height"] <= size[1] + 1
     painter.page.reload()
@@ -158,7 +158,7 @@ def test_a_look_is_kept_from_anywhere(opened: Any, query: str) -> None:
     painter.page.locator(".look-name").click()
     assert press("Control+s") == "strue"
     assert kept() == 2
-    painter.button("How the painting is answered").click()
+    painter.button("Solve settings").click()
     painter.page.get_by_role("textbox", name="At most").focus()
     assert press("Control+s") == "strue"
     assert kept() == 3
@@ -311,7 +311,7 @@ def test_of_a_low_painter_the_sentence_comes_first(opened: Any, size: tuple[int,
         assert box["y"] + box["height"] <= size[1]
     assert not painter.page.locator(".here").is_visible()
     if not painter.ui("side"):
-        painter.button("Panels").click()
+        painter.button("Show or hide the panels").click()
     light = painter.page.locator(".light").last
     light.scroll_into_view_if_needed()
     assert light.bounding_box()["y"] < size[1]
@@ -333,10 +333,10 @@ def test_panels_leave_the_pictures_of_a_narrow_column_their_room(opened: Any) ->
     width = stage.bounding_box()["width"]
     assert side.count() == 0
     assert width > 600
-    painter.button("Panels").click()
+    painter.button("Show or hide the panels").click()
     assert side.is_visible()
     assert stage.bounding_box()["width"] == width  # they lie over them while they are wanted
-    painter.button("Panels").click()
+    painter.button("Show or hide the panels").click()
     assert side.count() == 0
     for room, count in ((1000, 1), (690, 0)):
         painter.page.set_viewport_size({"width": room, "height": 560})
@@ -349,10 +349,10 @@ def test_panels_leave_the_pictures_of_a_narrow_column_their_room(opened: Any) ->
 def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
     painter = opened("first&lights=12", init=axe)
     if state == "busy":
-        painter.button("How true?").click()
+        painter.button("Analysis").click()
         painter.button("False colour").click()
-        painter.button("Keep look").click()
-        painter.button("Keep look").click()
+        painter.button("Save look").click()
+        painter.button("Save look").click()
         painter.button("Compare looks").click()
         painter.choose("First look", "2")
         painter.stroke()
@@ -365,7 +365,7 @@ def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
         painter.tell(kind="say", text="Something is so.", tone="warn")
         painter.page.get_by_text("Something is so.").wait_for()
     elif state == "settings":
-        painter.button("How the painting is answered").click()
+        painter.button("Solve settings").click()
         painter.button("Hold", exact=True).click()
     elif state != "first":
         painter.page.evaluate("(dialog) => painter.store.set({ dialog })", state)

@@ -15,7 +15,7 @@ def test_a_light_is_moved_by_hand_and_freed(painter: Painter) -> None:
     present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
     lock = asked[-1]["asked"]["lock"]
     assert lock == pytest.approx([x * 2 for x in present], rel=1e-6)  # 20 steps of a twentieth
-    painter.button("Let the solve have key again").click()
+    painter.button("Unlock key").click()
     assert painter.said("ask")[-1]["asked"] == {}
     painter.slide("key, stops from now", "Home")
     assert painter.said("ask")[-1]["asked"] == {"lock": [0, 0, 0]}
@@ -44,7 +44,7 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
     for text in ("bright", "-3 %", "21 st", "12", "80", "-200"):
         painter.type("key, level", text)
         painter.page.get_by_role("textbox", name="key, level").blur()
-        words = "is no level. Type stops from now (+1.5), percent (80 %), as now, or off."
+        words = "is not a level. Type stops from now (+1.5), percent (80 %), as now, or off."
         if text[-1].isdigit():
             words = "may be stops or percent: type the unit, too (12 st, 80 %)."
         assert painter.ui("toasts")[-1]["text"] == f"{text} {words}"
@@ -68,7 +68,7 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
 def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
     painter.page.get_by_role("button", name="key", exact=True).click()
     panel = painter.page.get_by_role("group", name="What the solve may do with key")
-    panel.get_by_role("button", name="Held", exact=True).click()
+    panel.get_by_role("button", name="Locked", exact=True).click()
     present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
     level = sum(a * b for a, b in zip((0.2126, 0.7152, 0.0722), present, strict=True))
     for unit, text, factor in (
@@ -79,7 +79,7 @@ def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
         ("stops", "2", 4),
     ):
         painter.choose("Unit", unit)
-        painter.type("Held at", text)
+        painter.type("Locked at", text)
         lock = painter.said("ask")[-1]["asked"]["lock"]
         assert lock == pytest.approx([factor * x for x in present], rel=1e-6)
 
@@ -94,17 +94,17 @@ def test_of_a_light_that_is_off_there_are_no_percent(painter: Painter) -> None:
 
 def test_limits_that_leave_nothing_are_not_sent(painter: Painter) -> None:
     painter.page.get_by_role("button", name="key", exact=True).click()
-    painter.type("At most", "150")
+    painter.type("Max", "150")
     count = len(painter.said("ask"))
     for label, before, text, words in (
-        ("At least", "", "200", "At least 200 % is above At most 150 %"),
-        ("At least", "", "150", ""),
-        ("At most", "150", "140.5", "At least 150 % is above At most 140.5 %"),
+        ("Min", "", "200", "The minimum (200 %) is above the maximum (150 %)"),
+        ("Min", "", "150", ""),
+        ("Max", "150", "140.5", "The minimum (150 %) is above the maximum (140.5 %)"),
     ):
         painter.type(label, text)
         field = painter.page.get_by_role("textbox", name=label, exact=True)
         if words:
-            assert painter.ui("toasts")[-1]["text"] == f"{words}: the limits stay as they were."
+            assert painter.ui("toasts")[-1]["text"] == f"{words}. The limits have not changed."
             assert field.input_value() == before
         else:
             count += 1
@@ -131,13 +131,13 @@ def test_what_is_asked_of_a_level_stands_in_one_row(opened: Any, size: tuple[int
             end = after["x"] if after else room["x"] + room["width"]
             assert box["x"] + box["width"] < end
 
-    in_a_row("At least", "At most")
-    unit, least = panel.get_by_role("combobox", name="Unit"), panel.get_by_label("At least")
+    in_a_row("Min", "Max")
+    unit, least = panel.get_by_role("combobox", name="Unit"), panel.get_by_label("Min")
     assert unit.bounding_box()["y"] > least.bounding_box()["y"]  # levels need all of the width
     painter.choose("Colour", "kelvin")
-    in_a_row("From", "To", "Green")
-    panel.get_by_role("button", name="Held", exact=True).click()
-    in_a_row("Held at", "Unit")
+    in_a_row("From", "To", "Tint")
+    panel.get_by_role("button", name="Locked", exact=True).click()
+    in_a_row("Locked at", "Unit")
 
 
 def test_a_long_name_of_a_dimmer_has_one_line(painter: Painter) -> None:
@@ -182,9 +182,9 @@ def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, w
 def test_what_a_light_may_do(painter: Painter) -> None:
     page = painter.page
     page.get_by_role("button", name="key", exact=True).click()
-    painter.type("At most", "150")
+    painter.type("Max", "150")
     assert painter.said("ask")[-1]["asked"] == {"limits": {"max": "150%"}}
-    painter.type("At least", "20")
+    painter.type("Min", "20")
     assert painter.said("ask")[-1]["asked"] == {"limits": {"min": "20%", "max": "150%"}}
     painter.choose("Colour", "kelvin")
     painter.type("From", "3000")
@@ -202,7 +202,7 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     assert len(painter.said("ask")[-1]["asked"]["primaries"]) == 3
     panel.get_by_role("button", name="As now", exact=True).click()
     assert painter.said("ask")[-1]["asked"] == {"lock": True}
-    painter.choose("On one dimmer with", "cove")
+    painter.choose("Tie to", "cove")
     assert painter.said("tie")[-1]["ties"] == [["key", "cove"]]
     group = painter.page.get_by_role("group", name="key and cove, on one dimmer")
     painter.page.evaluate("() => painter.session.ask(0, { color: '3200K' })")
@@ -224,14 +224,14 @@ def test_who_holds_a_light_holds_its_dimmer(painter: Painter) -> None:
     key, cove = (
         painter.page.get_by_role("group", name=name, exact=True) for name in ("key", "cove")
     )
-    key.get_by_role("button", name="Hold key as it is").click()
-    free = cove.get_by_role("button", name="Let the solve have cove again")
+    key.get_by_role("button", name="Lock key as it is").click()
+    free = cove.get_by_role("button", name="Unlock cove")
     free.wait_for()
     assert cove.locator(".dimmer.is-held").count() == 1
     free.click()
     assert painter.said("ask")[-1]["asked"] == {}
     assert painter.said("ask")[-1]["light"] == painter.said("ask")[0]["light"]  # key holds both
-    key.get_by_role("button", name="Hold key as it is").wait_for()
+    key.get_by_role("button", name="Lock key as it is").wait_for()
 
 
 def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: Painter) -> None:
@@ -246,7 +246,7 @@ def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: P
     within = "(one) => one.scrollWidth <= one.clientWidth"
     assert badge.evaluate(within)
     painter.page.evaluate(held, {"key": {"lock": [1, 1, 1]}})
-    assert badge.all_inner_texts() == ["held"]
+    assert badge.all_inner_texts() == ["locked"]
 
 
 def test_names_that_differ_at_their_end_are_told_apart(opened: Any) -> None:
@@ -323,9 +323,9 @@ def test_on_its_way_through_the_dark_a_light_keeps_its_colour(painter: Painter) 
 
 def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     painter.button("key", exact=True).click()
-    painter.button("Held", exact=True).click()
+    painter.button("Locked", exact=True).click()
     before = painter.said("ask")[-1]["asked"]["lock"]
-    kelvin = painter.page.locator(".held-colour").get_by_role("textbox", name="Kelvin")
+    kelvin = painter.page.locator(".held-colour").get_by_role("textbox", name="CCT")
     kelvin.fill("2700")
     kelvin.press("Enter")
     lock = np.array(painter.said("ask")[-1]["asked"]["lock"])
@@ -398,7 +398,7 @@ def test_64_lights_are_found_sorted_and_folded(opened: Any) -> None:
 
 
 def test_a_number_is_taken_as_it_is_shown(painter: Painter) -> None:
-    painter.button("How the painting is answered").click()
+    painter.button("Solve settings").click()
     painter.type("At most", "1.5")
     assert painter.said("set")[-1]["values"] == {"sparse": 2}
     assert painter.page.get_by_role("textbox", name="At most").input_value() == "2"
@@ -455,10 +455,10 @@ def panel_of_key(painter: Painter) -> Any:
 
 def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> None:
     panel = panel_of_key(painter)
-    panel.get_by_role("button", name="Held", exact=True).click()
-    painter.type("Held at", "")
+    panel.get_by_role("button", name="Locked", exact=True).click()
+    painter.type("Locked at", "")
     painter.still()
-    level = panel.get_by_role("textbox", name="Held at", exact=True)
+    level = panel.get_by_role("textbox", name="Locked at", exact=True)
     level.press("ArrowDown")
     assert max(painter.said("ask")[-1]["asked"]["lock"]) == 0
     level.press("ArrowUp")
@@ -468,9 +468,9 @@ def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> No
 
 def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
     panel = panel_of_key(painter)
-    panel.get_by_role("button", name="Held", exact=True).click()
+    panel.get_by_role("button", name="Locked", exact=True).click()
     painter.choose("Unit", "value")
-    painter.type("Held at", "0.00004")
+    painter.type("Locked at", "0.00004")
     lock = painter.said("ask")[-1]["asked"]["lock"]
     assert 0.2126 * lock[0] + 0.7152 * lock[1] + 0.0722 * lock[2] == pytest.approx(4e-5, rel=1e-3)
 
@@ -515,10 +515,10 @@ def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
     """Each has again what was asked of it before; as after a look that holds all of them."""
     painter.page.evaluate("() => painter.session.ask(0, { limits: { max: '150%' } })")
     painter.still()
-    free = painter.page.get_by_role("button", name="Free all")
+    free = painter.page.get_by_role("button", name="Unlock all")
     for name in ("key", "cove"):
         assert free.count() == 0
-        painter.button(f"Hold {name} as it is").click()
+        painter.button(f"Lock {name} as it is").click()
         painter.still()
     steps = painter.ui("history")["count"]
     free.click()

@@ -22,11 +22,11 @@ def test_a_tab_that_comes_second_says_where_the_painter_is(opened: Any) -> None:
 
 def test_what_fails_is_said_and_the_painter_lives(painter: Painter) -> None:
     painter.page.evaluate("() => { window.host.fails = 'the disk is full'; }")
-    painter.button("Keep look").click()
+    painter.button("Save look").click()
     painter.page.get_by_text("the disk is full").wait_for()
     painter.button("Dismiss").click()
     assert not painter.page.get_by_text("the disk is full").is_visible()
-    painter.button("Keep look").click()
+    painter.button("Save look").click()
     assert len(painter.said("save_look")) == 2
 
 
@@ -78,7 +78,7 @@ def refuse(painter: Painter) -> None:
 def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     """Nor does it go along with what is asked next."""
     painter.page.get_by_role("button", name="key", exact=True).click()
-    painter.type("At least", "20")
+    painter.type("Min", "20")
     before = {name: painter.ui(name) for name in ("asked", "ties", "settings", "weights")}
     at_most = painter.page.get_by_role("textbox", name="At most")
     refuse(painter)
@@ -94,7 +94,7 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     assert painter.ui("asked") == {"key": asked}
     before["asked"] = painter.ui("asked")
     for act in (
-        lambda: painter.choose("On one dimmer with", "cove"),
+        lambda: painter.choose("Tie to", "cove"),
         lambda: painter.page.evaluate("() => void painter.session.setting('sparse', 99)"),
         lambda: painter.page.evaluate("() => painter.session.hold(2, [9, 9, 9], true)"),
     ):
@@ -189,11 +189,15 @@ def test_what_could_not_be_asked_for_is_not_under_way(painter: Painter) -> None:
     painter.page.evaluate(f"() => {{ host.send = () => {LOST}; }}")
     ask_for_all(painter)
     assert under_way(painter) == set()
-    painter.button("Write files").click()
-    painter.button("Write", exact=True).click()
-    assert painter.button("Write", exact=True).is_enabled()
+    painter.button("Export").click()
+    painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
+    assert (
+        painter.page.get_by_role("dialog")
+        .get_by_role("button", name="Export", exact=True)
+        .is_enabled()
+    )
     painter.page.keyboard.press("Escape")
-    painter.button("How true?").click()
+    painter.button("Analysis").click()
     painter.button("Out of reach").click()  # asks for what it shows, and once
     painter.page.wait_for_function("() => painter.store.value.show.overlay === null")
 

@@ -179,7 +179,7 @@ def test_in_jupyterlab(browser: Any, folder: Path) -> None:
         page.remove_locator_handler(asks)
         page.locator('.jp-NotebookPanel-toolbar [data-jp-item-name="restart"] *').first.click()
         asks.click()
-        page.get_by_text("The kernel has ended: run the cell again to go on.").wait_for()
+        page.get_by_text("The kernel has ended. Run the cell again to continue.").wait_for()
 
 
 @pytest.mark.skipif(find_spec("marimo") is None, reason="marimo")

@@ -316,10 +316,10 @@ def test_a_light_is_held_and_moved_and_left(served: Served, opened: Any) -> None
     me.press("0").stroke((60, 30), (80, 30)).still("brush")
     slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
     box = slider.bounding_box()
-    me.button("Hold light 1 as it is in the answer").click()
+    me.button("Lock light 1 as it is in the answer").click()
     me.still("brush", "light 1")
     held = session.weights[1].copy()
-    me.page.get_by_text("held", exact=True).wait_for()
+    me.page.get_by_text("locked", exact=True).wait_for()
     assert slider.bounding_box() == box  # what is said of a light moves no row
     slider.focus()
     slider.press("ArrowRight")
@@ -454,7 +454,7 @@ def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
     before = me.seen(60, 30)
     me.press("0").stroke((20, 20), (40, 20)).still("brush")
     me.press("Control+s")
-    me.button("Go on from Look 1").wait_for()
+    me.button("Load Look 1").wait_for()
     me.stroke((60, 20), (60, 40)).still("brush", "brush")
     shown = [me.seen(x, 30, pane) for x in (30, 60) for pane in (0, 1)]
     me.page.reload()
@@ -463,15 +463,15 @@ def test_what_is_kept_is_there_again_and_solved_alike_from_its_files(
     me.press("Control+z").still("brush")
     assert me.seen(60, 30) == before
     me.press("Control+Shift+Z").still("brush", "brush")
-    me.button("Go on from Look 1").click()
+    me.button("Load Look 1").click()
     me.still("brush", "brush", "look Look 1")
-    me.button("Hold light 2 as it is in the answer").click()
+    me.button("Lock light 2 as it is in the answer").click()
     me.still("brush", "brush", "look Look 1", "light 2")
     np.testing.assert_allclose(me.seen(30, 20), me.code(me.paint), atol=1)
     assert me.seen(60, 30) == before
-    me.button("Write files").click()
+    me.button("Export").click()
     me.page.get_by_label("Report").uncheck()
-    me.button("Write", exact=True).click()
+    me.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     command = shlex.split(me.page.locator(".command code").inner_text())
     again = [sys.executable, "-m", *command, "--output", str(served.folder / "again")]
     made = subprocess.run(again, cwd=REPOSITORY, capture_output=True, text=True, check=False)
@@ -609,9 +609,9 @@ def test_two_views_are_painted_and_have_one_answer(two: Served, opened: Any) -> 
     me.press("Control+Shift+Z", "Control+Shift+Z").still("brush", "brush")
     until(lambda: me.look("return engine.work.view") == 1, "the other view is shown")
     me.ready()
-    me.button("Write files").click()
+    me.button("Export").click()
     assert not me.page.get_by_label("Report").is_visible()  # of bases without their scene
-    me.button("Write", exact=True).click()
+    me.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     me.page.locator(".exported li", has_text="painting-side.exr").wait_for()
     paintings = [two.folder / f"painting-{view.name}.exr" for view in views]
     bases = [view.basis for view in views]
@@ -705,5 +705,5 @@ def test_in_a_browser_that_is_zoomed_it_is_sharp_and_in_its_place(
     me.press("0").stroke((20, 20), (40, 20)).still("brush")
     np.testing.assert_allclose(me.seen(30, 20), me.code(me.paint), atol=1)
     assert me.look("return document.documentElement.scrollWidth <= innerWidth")
-    me.button("Write files").click()  # what does not fit is scrolled to
-    me.page.get_by_role("dialog", name="Write files").wait_for()
+    me.button("Export").click()  # what does not fit is scrolled to
+    me.page.get_by_role("dialog", name="Export").wait_for()

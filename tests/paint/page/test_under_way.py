@@ -16,8 +16,8 @@ def progress(painter: Painter, what: str, done: int, total: int = 16) -> None:
 def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Painter) -> None:
     page = painter.page
     page.evaluate("() => { host.isWriting = true; }")
-    painter.button("Write files").click()
-    painter.button("Write", exact=True).click()
+    painter.button("Export").click()
+    painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
     progress(painter, "export", 4)
     dialog = page.get_by_role("dialog")
     assert "25 %" in dialog.inner_text()
@@ -25,37 +25,37 @@ def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Pa
     assert page.locator(".working").count() == 0  # it is seen once
     page.keyboard.press("Escape")
     chip = page.locator(".working")
-    chip.get_by_text("Writing files: 25 %").wait_for()
+    chip.get_by_text("Exporting files: 25 %").wait_for()
     page.get_by_role("button", name="Stop: writing files").click()
     assert painter.said("export")[-1] == {"kind": "export", "what": [], "run": False}
     painter.tell(
         kind="exported", files=["/shows/gallery-evening/lighting.json"], command="", is_stopped=True
     )
-    page.get_by_text("Stopped. Written: lighting.json.").wait_for()
+    page.get_by_text("Stopped. Exported lighting.json.").wait_for()
     assert chip.count() == 0
     # A page that was loaded anew hears of it, too.
     progress(painter, "export", 8)
-    chip.get_by_text("Writing files: 50 %").wait_for()
+    chip.get_by_text("Exporting files: 50 %").wait_for()
     files = [f"/shows/gallery-evening/{name}" for name in ("painting.exr", "answer/report.html")]
     painter.tell(kind="exported", files=files, command="")
-    page.get_by_text("Written: painting.exr, answer/report.html.", exact=True).wait_for()
-    painter.button("Write files").click()
+    page.get_by_text("Exported painting.exr, answer/report.html.", exact=True).wait_for()
+    painter.button("Export").click()
     assert page.get_by_role("dialog").get_by_text("answer/report.html").is_visible()
 
 
 def test_reasons_that_are_sought_are_said_to_be(painter: Painter) -> None:
     painter.page.evaluate("() => { host.explain = () => ({ kind: 'started', what: 'explain' }); }")
-    painter.button("How true?").click()
+    painter.button("Analysis").click()
     painter.button("Why not closer?").click()
-    sought = painter.page.get_by_role("button", name="Seeking reasons …")
+    sought = painter.page.get_by_role("button", name="Finding reasons …")
     sought.wait_for()
     assert sought.is_disabled()
-    assert painter.page.get_by_role("progressbar", name="Seeking reasons").is_visible()
-    painter.button("How true?").click()  # its panel closes
-    painter.page.locator(".working").get_by_text("Seeking reasons").wait_for()
+    assert painter.page.get_by_role("progressbar", name="Finding reasons").is_visible()
+    painter.button("Analysis").click()  # its panel closes
+    painter.page.locator(".working").get_by_text("Finding reasons").wait_for()
     painter.tell(kind="explained", sentences=["It is so."])
     assert painter.page.locator(".working").count() == 0
-    painter.button("How true?").click()
+    painter.button("Analysis").click()
     assert painter.button("Why not closer?").is_enabled()
 
 
@@ -65,7 +65,7 @@ def test_all_that_goes_on_is_counted_alike(painter: Painter) -> None:
     for what, name in (
         ("basis", "Rendering the lights"),
         ("verification", "Verifying"),
-        ("export", "Writing files"),
+        ("export", "Exporting files"),
     ):
         progress(painter, what, 2)
         page.locator(".working").get_by_text(f"{name}: 12 %").wait_for()
@@ -79,7 +79,7 @@ def test_all_that_goes_on_is_counted_alike(painter: Painter) -> None:
     page.locator(".working").get_by_text("Rendering the lights: 43 %, 20 s left").wait_for()
     page.evaluate("() => window.painter.store.set({ basis: null })")
     page.evaluate("() => engine.tell('loading', { done: 1, total: 4, isFirst: true })")
-    page.locator(".working").get_by_text("Loading pictures of the lights: 25 %").wait_for()
+    page.locator(".working").get_by_text("Loading the images of the lights: 25 %").wait_for()
 
 
 def test_nothing_to_undo_is_no_mistake(painter: Painter) -> None:
@@ -104,7 +104,7 @@ def test_until_a_look_is_there_no_picture_is_called_its_own(painter: Painter, pi
         }"""
     )
     tag = painter.page.locator(".tag", has_text=picture)
-    painter.button("Go on from Look 1").click()
+    painter.button("Load Look 1").click()
     tag.get_by_text(f"{picture}: Look 1 is coming …").wait_for()
     painter.page.evaluate("() => window.go()")
     painter.still()
@@ -115,7 +115,7 @@ def test_an_answer_without_some_of_its_lights_says_so(opened: Any) -> None:
     painter = opened()
     tag = painter.page.locator(".tag").last
     painter.page.evaluate("() => engine.tell('loading', { done: 1, total: 4, isFirst: true })")
-    tag.get_by_text("Answer: some of its lights are still loading …").wait_for()
+    tag.get_by_text("Answer: some lights are still loading …").wait_for()
     painter.page.evaluate("() => engine.tell('loading', { done: 1, total: 4, isFirst: false })")
     painter.still()
     assert tag.inner_text() == "Answer"  # they are there, and get cleaner

@@ -55,7 +55,7 @@ def cut_off(painter: Painter, where: str = ".lightpaint") -> list[str]:
 
 
 def how_true(painter: Painter) -> None:
-    painter.button("How true?").click()
+    painter.button("Analysis").click()
     painter.button("Why not closer?").click()
     painter.page.get_by_text("Of what is missed").wait_for()
 
@@ -68,7 +68,7 @@ def verified(painter: Painter) -> None:
 
 def numbers(painter: Painter) -> None:
     painter.page.keyboard.press("a")
-    painter.button("In numbers", exact=True).click()
+    painter.button("By numbers", exact=True).click()
     objects = painter.ui("state")["objects"]
     painter.choose("Where", max(objects, key=len))
 
@@ -105,15 +105,15 @@ def some_only(painter: Painter) -> None:
 
 
 def settings(painter: Painter) -> None:
-    painter.button("How the painting is answered").click()
+    painter.button("Solve settings").click()
     painter.button("Hold", exact=True).click()
     painter.button("Stay", exact=True).click()
 
 
 def files(painter: Painter) -> None:
-    painter.button("Write files").click()
-    painter.button("Write", exact=True).click()
-    painter.page.get_by_text("The same on the command line").wait_for()
+    painter.button("Export").click()
+    painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
+    painter.page.get_by_text("The same from the command line").wait_for()
 
 
 def keys(painter: Painter) -> None:

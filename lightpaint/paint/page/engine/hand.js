@@ -44,7 +44,7 @@ export const LABELS = {
   pick: 'pick',
   fill: 'fill',
   line: 'line',
-  ask: 'ask',
+  ask: 'adjust',
 };
 
 /** What brighter and warmer light is. @param {number} stops @param {number} mired

@@ -20,7 +20,7 @@ const MESSAGES = 2 ** 32;
 /** Milliseconds without an answer after which that is said. */
 const SILENCE_MS = 10_000;
 
-const ENDED = 'The kernel has ended: run the cell again to go on.';
+const ENDED = 'The kernel has ended. Run the cell again to continue.';
 
 /** @implements {Host} */
 export class ModelHost extends Hearers {

@@ -12,15 +12,15 @@ import { DARKEST, atLevel, isOnNow, nowOf, stopsOf } from './level.js';
 
 const MANNERS = [
   { value: 'free', label: 'Free', tip: 'The solve sets it' },
-  { value: 'held', label: 'Held', tip: 'You hold it at a level' },
-  { value: 'present', label: 'As now', tip: 'It stays as the scene has it' },
-  { value: 'off', label: 'Off', tip: 'It is off in every answer' },
+  { value: 'held', label: 'Locked', tip: 'Locked at a level that you set' },
+  { value: 'present', label: 'As now', tip: 'It stays as it is in the scene' },
+  { value: 'off', label: 'Off', tip: 'Switched off in every answer' },
 ];
 const COLOURS = [
   { value: 'any', label: 'Any colour' },
   { value: 'color', label: 'One colour' },
-  { value: 'kelvin', label: 'White, from – to' },
-  { value: 'primaries', label: 'Mix of LEDs' },
+  { value: 'kelvin', label: 'White range' },
+  { value: 'primaries', label: 'LED mix' },
 ];
 
 /** @param {import("./light.js").Props} props */
@@ -41,10 +41,8 @@ export function Asking(props) {
     if (to === 'present') session.ask(k, { lock: true });
     if (to === 'off') session.turn(k, true);
   };
-  return html`<div class="asking-light" role="group" aria-label=${`What the solve may do with ${
-    light.label
-  }`}>
-    <h3>In the solve</h3>
+  return html`<div class="asking-light" role="group" aria-label=${`Constraints on ${light.label}`}>
+    <h3>Constraints</h3>
     <${Choice} label="Level" value=${manner} choices=${MANNERS} change=${change} />
     ${
       manner === 'held' &&
@@ -56,7 +54,7 @@ export function Asking(props) {
       html`<${Limits} ...${props} />
       ${
         tied && colourOf(asked) === 'any'
-          ? html`<p class="faint">On one dimmer, lights keep the colours that they have now.</p>`
+          ? html`<p class="faint">Tied lights keep their present colours.</p>`
           : !light.is_scalar && html`<${Colours} ...${props} />`
       }`
     }
@@ -87,7 +85,7 @@ function Held({ k, light, hands, rgb }) {
   }[/** @type {'stops' | 'share' | 'value'} */ (unit)];
   const units = [{ value: 'stops', label: 'st from now' }, ...unitsOf(light)];
   return html`<div class="ask-fields is-pair">
-    <${Number_} label="Held at" value=${value} least=${least} most=${unit === 'stops' ? 20 : undefined}
+    <${Number_} label="Locked at" value=${value} least=${least} most=${unit === 'stops' ? 20 : undefined}
       figures=${unit === 'stops' ? undefined : FIGURES} step=${step} start=${DARKEST}
       empty=${unit === 'stops' ? 'off' : undefined}
       change=${(/** @type {number | null} */ to) => hold(to === null ? 0 : of(to))} />
@@ -145,7 +143,7 @@ function Limits({ k, light, hands, asked = {} }) {
         unit === 'share' ? `${x} %` : number(x, FIGURES);
       const [low, high] = [least, most].map(spoken);
       hands.session.toast(
-        `At least ${low} is above At most ${high}: the limits stay as they were.`,
+        `The minimum (${low}) is above the maximum (${high}). The limits have not changed.`,
       );
       return;
     }
@@ -162,9 +160,9 @@ function Limits({ k, light, hands, asked = {} }) {
     hands.session.ask(k, { ...asked, limits: Object.fromEntries(turned) });
   };
   return html`<div class="ask-fields is-levels">
-    <${Number_} label="At least" value=${shown(limits.min)} least=${0} empty="–" step=${5}
+    <${Number_} label="Min" value=${shown(limits.min)} least=${0} empty="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('min', value)} figures=${FIGURES} />
-    <${Number_} label="At most" value=${shown(limits.max)} least=${0} empty="–" step=${5}
+    <${Number_} label="Max" value=${shown(limits.max)} least=${0} empty="–" step=${5}
       change=${(/** @type {number | null} */ value) => set('max', value)} figures=${FIGURES} />
     ${
       canShare &&
@@ -225,7 +223,7 @@ function One({ k, hands, asked, rest, rgb }) {
     ${
       found &&
       html`<${Button} label=${`${Math.round(found.kelvin / 50) * 50}K`}
-      tip="The white that it is nearest to in the answer" act=${() =>
+      tip="The white nearest to its colour in the answer" act=${() =>
         hands.session.ask(k, { ...rest, color: `${Math.round(found.kelvin / 50) * 50}K` })} />`
     }
   </div>`;
@@ -247,7 +245,8 @@ function Whites({ k, hands, asked, rest }) {
       unit="K" change=${(/** @type {number} */ to) => set(to, high, duv)} />
     <${Number_} label="To" value=${high} least=${1000} most=${25000} step=${100} digits=${0}
       unit="K" change=${(/** @type {number} */ to) => set(low, to, duv)} />
-    <${Number_} label="Green" value=${1000 * duv} least=${-20} most=${20} digits=${1}
+    <${Number_} label="Tint" value=${1000 * duv} least=${-20} most=${20} digits=${1}
+      tip="Duv × 1000: above 0 green, below 0 magenta"
       change=${(/** @type {number} */ to) => set(low, high, to / 1000)} />
   </div>`;
 }
@@ -260,18 +259,18 @@ function Ties({ light, hands, tied, others = [] }) {
   const label = (/** @type {string} */ name) =>
     others.find((one) => one.name === name)?.label ?? name;
   const choices = [
-    { value: '', label: 'no other' },
+    { value: '', label: 'no light' },
     ...free.map((one) => ({ value: one.name, label: one.label })),
   ];
   return html`<div class="ask-row">
     ${
       tied &&
-      html`<span>On one dimmer with ${tied
+      html`<span>Tied to ${tied
         .filter((name) => name !== light.name)
         .map(label)
         .join(', ')}</span><${Button} label="Untie" act=${() => hands.session.untie(light.name)} />`
     }
-    <${Select} label=${tied ? 'And with' : 'On one dimmer with'} value="" choices=${choices}
+    <${Select} label=${tied ? 'Also tie to' : 'Tie to'} value="" choices=${choices}
       change=${(/** @type {string} */ name) => name && hands.session.tie(light.name, name)} />
   </div>`;
 }

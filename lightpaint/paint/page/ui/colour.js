@@ -20,7 +20,7 @@ const GELS = [
   ['Cyan', '#2fd6e0'],
   ['Blue', '#2a55ff'],
   ['Magenta', '#e02fd0'],
-  ['Black: no light', '#000000'],
+  ['Black', '#000000'],
 ];
 const MIXERS = [
   { value: 'white', label: 'White' },
@@ -35,15 +35,15 @@ export function ColourPanel({ ui, hands }) {
   const Mixer = { white: White, hsv: Hsv, rgb: Rgb }[ui.mixer];
   return html`<div class="colour">
     <div class="colour-row">
-      <span class="patch" data-tip="The colour; and on the right as it is shown, at its brightness"
+      <span class="patch" data-tip="Left: the colour. Right: how the display shows it at this brightness."
         style=${{ '--colour': toHex(ui.colour), '--shown': shownAs(ui, hands) }}></span>
       <${Hex} colour=${ui.colour} set=${set} />
-      <${Choice} label="Mix colours by" value=${ui.mixer} choices=${MIXERS}
+      <${Choice} label="Colour model" value=${ui.mixer} choices=${MIXERS}
         change=${(/** @type {any} */ mixer) => store.set({ mixer })} />
     </div>
     <${Mixer} colour=${ui.colour} set=${set} />
     <${Slider} label="Brightness" value=${ui.stops} least=${-8} most=${8} step=${0.1} digits=${1}
-      unit="st" rest=${0} tip="Stops over display white. Light may be brighter than white."
+      unit="st" rest=${0} tip="Stops above display white. Paint can be brighter than white."
       change=${(/** @type {number} */ stops) => store.set({ stops })} />
     <${Swatches} ui=${ui} hands=${hands} />
   </div>`;
@@ -94,9 +94,9 @@ function White({ colour, set }) {
   return html`<div class=${`white ${isWhite ? '' : 'is-dim'}`}>
     <${KelvinSlider} value=${kelvin}
       change=${(/** @type {number} */ made) => dial({ kelvin: made })} />
-    <${Slider} label="Green" value=${green} least=${-20} most=${20} step=${1} digits=${0} rest=${0}
+    <${Slider} label="Tint" value=${green} least=${-20} most=${20} step=${1} digits=${0} rest=${0}
       track=${gradient([-20, 0, 20].map((by) => ofKelvin(kelvin, by)))}
-      tip="Towards green, or to the left towards magenta: thousandths of (u, v)"
+      tip="Duv × 1000: green to the right, magenta to the left"
       change=${(/** @type {number} */ made) => dial({ green: made })} /></div>`;
 }
 
@@ -152,13 +152,13 @@ function Swatches({ ui, hands }) {
     ${WHITES.map((kelvin) => swatch(ofKelvin(kelvin), `${kelvin} K`, ui.stops))}
     ${gels.map(({ name, rgb }) => swatch(rgb, name, ui.stops))}
   </div>
-  <div class="swatches is-recent" role="group" aria-label="Used lately">
-    ${!ui.recent.length && html`<span class="faint">Used lately</span>`}
+  <div class="swatches is-recent" role="group" aria-label="Recent colours">
+    ${!ui.recent.length && html`<span class="faint">Recent colours</span>`}
     ${ui.recent.map(({ colour, stops }, k) => {
       const by = signed(stops, Math.abs(stops - Math.round(stops)) < 0.05 ? 0 : 1);
       const bright = by === '0' ? '' : `, ${by} stops`;
       return html`<${Swatch} key=${k} rgb=${colour} stops=${bright && by}
-        tip=${`Used lately ${k + 1}: ${toHex(colour)}${bright}`}
+        tip=${`Recent ${k + 1}: ${toHex(colour)}${bright}`}
         act=${() => store.set({ colour, stops })} />`;
     })}
   </div>`;

@@ -21,7 +21,7 @@ export function Dialogs({ ui, hands }) {
 /** @param {{close: () => void}} props */
 function KeysDialog({ close }) {
   const spoken = (/** @type {string} */ key) => (key === 'Ctrl' ? MOD : key);
-  return html`<${Dialog} title="Keys" close=${close} class="keys">
+  return html`<${Dialog} title="Keyboard shortcuts" close=${close} class="keys">
     ${KEYS.map(
       ({ title, keys }) => html`<section key=${title}><h3>${title}</h3><dl>
       ${keys.map(
@@ -31,7 +31,7 @@ function KeysDialog({ close }) {
       )}
     </dl></section>`,
     )}
-    <p class="faint">On a tablet one finger paints, two move and zoom. A pen paints with its pressure.</p>
+    <p class="faint">On a tablet, one finger paints; two fingers pan and zoom. Pen pressure controls the flow.</p>
   </${Dialog}>`;
 }
 
@@ -39,13 +39,13 @@ function KeysDialog({ close }) {
  *   about: string}[]} */
 const FILES = [
   { key: 'target', label: 'Painting', about: 'painting.exr, for lightpaint solve' },
-  { key: 'picture', label: 'Picture', about: 'answer.png: the answer, to be shown' },
-  { key: 'lighting', label: 'Lighting', about: 'lighting.json: every light, in numbers' },
+  { key: 'picture', label: 'Picture', about: 'answer.png: the answer as a picture' },
+  { key: 'lighting', label: 'Lighting', about: 'lighting.json: level and colour of every light' },
   { key: 'relit', label: 'Scene', about: 'relit.xml: the scene with this lighting' },
-  { key: 'report', label: 'Report', about: 'report.html: what was painted, what came of it' },
+  { key: 'report', label: 'Report', about: 'report.html: painting, answer and analysis' },
 ];
 
-const UNPAINTED = 'Nothing is painted yet: no painting was written, and no report of one.';
+const UNPAINTED = 'Nothing is painted yet, so no painting and no report were exported.';
 
 /** @param {{ui: Ui, hands: Hands, close: () => void}} props */
 function ExportDialog({ ui, hands, close }) {
@@ -58,34 +58,34 @@ function ExportDialog({ ui, hands, close }) {
   const isBusy = ui.isWriting;
   const { exported } = ui;
   const folder = ui.state?.folder ?? '';
-  return html`<${Dialog} title="Write files" close=${close} class="export">
+  return html`<${Dialog} title="Export" close=${close} class="export">
     ${can.map(
       ({ key, label, about }) => html`<div class="export-row" key=${key}>
       <${Check} label=${label} on=${what.includes(key)} change=${(/** @type {boolean} */ on) =>
         setWhat(on ? [...what, key] : what.filter((one) => one !== key))} />
       <span class="faint">${about}</span></div>`,
     )}
-    <div class="row"><span class="faint folder">into ${folder}</span>
+    <div class="row"><span class="faint folder">to ${folder}</span>
       <${CopyButton} text=${folder} tip="Copy the folder's path" hands=${hands} />
       ${
         isBusy &&
-        html`<${Bar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Writing" />
+        html`<${Bar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Exporting" />
         <span class="faint">${ui.writing && progressText(ui.writing)}</span>
         <${Button} label="Stop" icon="close" act=${() => hands.session.write([])}
-          tip="What is written by now stays" />`
+          tip="Files that are written already stay" />`
       }
-      <${Button} label=${isBusy ? 'Writing …' : 'Write'} primary disabled=${isBusy || !what.length}
+      <${Button} label=${isBusy ? 'Exporting …' : 'Export'} primary disabled=${isBusy || !what.length}
         act=${() => hands.session.write(what)} /></div>
-    ${isBusy && html`<p class="faint">It goes on when this window is closed.</p>`}
+    ${isBusy && html`<p class="faint">Export continues if you close this window.</p>`}
     ${
       exported &&
       html`<div class="exported" role="status">
-      <h3>${exported.is_stopped ? 'Stopped; written until then' : 'Written'}</h3>
+      <h3>${exported.is_stopped ? 'Stopped. Written already:' : 'Exported'}</h3>
       <ul>${exported.files.map((file) => html`<li key=${file}><code>${within(file, folder)}</code></li>`)}</ul>
       ${exported.is_unpainted && html`<p>${UNPAINTED}</p>`}
       ${
         exported.command &&
-        html`<h3>The same on the command line</h3>
+        html`<h3>The same from the command line</h3>
         <${Copied} text=${exported.command} hands=${hands} />`
       }
     </div>`
@@ -110,7 +110,7 @@ function CopyButton({ text, hands, label, tip }) {
       setDone(true);
     } catch {
       // Browsers let pages copy that come from this machine, or by https.
-      hands.session.toast('The browser does not let this page copy: select the text instead.');
+      hands.session.toast('This browser does not let the page copy. Select the text instead.');
     }
   };
   return html`<${Button} label=${label && (isDone ? 'Copied' : label)} tip=${isDone && tip ? 'Copied' : tip}

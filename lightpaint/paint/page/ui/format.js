@@ -42,7 +42,8 @@ export function progressText({ done, total, left_s: left }) {
 
 /** No finer than it can be foretold. @param {number} seconds */
 function timeText(seconds) {
-  if (seconds < 60) return `${Math.max(1, seconds < 10 ? Math.round(seconds) : 5 * Math.round(seconds / 5))} s`;
+  if (seconds < 60)
+    return `${Math.max(1, seconds < 10 ? Math.round(seconds) : 5 * Math.round(seconds / 5))} s`;
   if (seconds < 3600) return `${Math.round(seconds / 60)} min`;
   return `${(seconds / 3600).toFixed(1)} h`;
 }

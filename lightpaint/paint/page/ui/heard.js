@@ -128,7 +128,7 @@ function seenOf(answer, { view, views }) {
   };
 }
 
-const UNPAINTED = 'Nothing is painted in this view: it goes with the others.';
+const UNPAINTED = 'Nothing is painted in this view. It follows the others.';
 
 const UNKNOWN = { error: null, held: false, unreached: false };
 
@@ -233,6 +233,7 @@ function timed(now, before) {
   const isSame = before?.since && before.total === now.total && before.done <= now.done;
   const since = (isSame && before.since) || { ms, done: now.done };
   const [seconds, done] = [(ms - since.ms) / 1000, now.done - since.done];
-  const left_s = seconds > KNOWN_S && done > 0 ? (seconds / done) * (now.total - now.done) : undefined;
+  const left_s =
+    seconds > KNOWN_S && done > 0 ? (seconds / done) * (now.total - now.done) : undefined;
   return { ...now, since, left_s };
 }

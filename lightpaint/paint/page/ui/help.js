@@ -22,15 +22,15 @@ const KEYS = {
 /** What a button does, of one light and of several. @type {Record<string, [string, string]>} */
 const WORDS = {
   off: ['Turn on', 'Turn on'],
-  lock: ['Free', 'Free'],
-  limits: ['Lift the limit of', 'Lift the limits of'],
+  lock: ['Unlock', 'Unlock'],
+  limits: ['Remove the limit of', 'Remove the limits of'],
   colour: ['Any colour for', 'Any colour for'],
-  tie: ['Off its dimmer:', 'Off their dimmer:'],
+  tie: ['Untie', 'Untie'],
 };
 
 /** The same of all lights. @type {Record<string, string>} */
 const OF_ALL = {
-  hold: 'Loosen',
+  hold: 'Loosen hold',
   colors: 'Any colour',
   sparse: 'More lights',
   prefer_current: 'Let lights change',
@@ -50,7 +50,7 @@ function nameOf({ kind, names }, most = Infinity) {
 /** The same at length. @param {Cause} cause @param {string} name */
 function titleOf({ kind, hold }, name) {
   if (kind !== 'hold') return name;
-  return hold ? `Hold the rest less firmly: ${number(hold, 2)}` : 'Let the rest go';
+  return hold ? `Loosen the hold to ${number(hold, 2)}` : 'Ignore unpainted areas';
 }
 
 /** The message that lets go of it; null of what was not asked on this page, or is let go already.
@@ -87,9 +87,9 @@ export function Help({ ui, hands }) {
   const change = help && changeOf(help, ui, hands.session);
   if (!help || !change) return null;
   const name = nameOf(help);
-  const closes = help.closes === null ? '' : `: closes ${Math.round(100 * help.closes)} %`;
+  const closes = help.closes === null ? '' : `: ${Math.round(100 * help.closes)} % closer`;
   return html`<${Button} label=${`${nameOf(help, ON_BUTTON)}${closes}`} class="help"
-    tip=${`${name}${closes}. Shows what it would do; nothing is done yet.`}
+    tip=${`${name}${closes}. Shows a preview first.`}
     act=${() => hands.session.preview(titleOf(help, name), change)} />`;
 }
 
@@ -102,13 +102,13 @@ export function PreviewDialog({ ui, hands }) {
   const { label, text, isAtCost, before, after } = preview;
   return html`<${Dialog} title=${label} close=${close} class="preview">
     <div class="pair">
-      <${Small} picture=${before} caption="Now" /><${Small} picture=${after} caption="Then" />
+      <${Small} picture=${before} caption="Before" /><${Small} picture=${after} caption="After" />
     </div>
     <p class=${isAtCost ? 'is-bad' : ''} role="status">
       ${isAtCost && html`<${Icon} name="warn" />`}
-      <span>${text || 'Finding what it would do …'}</span></p>
-    <div class="row"><${Button} label="Leave it" act=${close} />
-      <${Button} label="Do it" primary disabled=${!text} act=${() => hands.session.makeChange()} />
+      <span>${text || 'Computing the preview …'}</span></p>
+    <div class="row"><${Button} label="Cancel" act=${close} />
+      <${Button} label="Apply" primary disabled=${!text} act=${() => hands.session.makeChange()} />
     </div>
   </${Dialog}>`;
 }
@@ -120,6 +120,6 @@ function Small({ picture, caption }) {
     if (picture && ref.current) put(ref.current, picture);
   }, [picture]);
   return html`<figure><canvas ref=${ref} width="16" height="9" role="img"
-    aria-label=${caption === 'Now' ? 'The answer now' : 'The answer after it'}></canvas>
+    aria-label=${caption === 'Before' ? 'The answer before the change' : 'The answer after it'}></canvas>
     <figcaption>${caption}</figcaption></figure>`;
 }

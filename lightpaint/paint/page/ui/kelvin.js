@@ -29,8 +29,8 @@ export const withinKelvin = (kelvin) => Math.min(COOLEST, Math.max(WARMEST, kelv
 
 /** @param {{value: number, change: (kelvin: number, done: boolean) => void, label?: string,
  *   disabled?: boolean}} props */
-export function KelvinSlider({ value, change, label = 'Kelvin', disabled }) {
+export function KelvinSlider({ value, change, label = 'CCT', disabled }) {
   return html`<${Slider} label=${label} value=${withinKelvin(value)} least=${WARMEST}
     most=${COOLEST} step=${100} unit="K" curve=${MIRED} track=${TRACK} disabled=${disabled}
-    tip="Colour temperature: to the right warmer" change=${change} />`;
+    tip="Correlated colour temperature: warmer to the right" change=${change} />`;
 }

@@ -60,30 +60,30 @@ export const KEYS = [
     })),
   },
   {
-    title: 'Work',
+    title: 'General',
     keys: [
       {
         keys: 'mod+s',
         shown: ['Ctrl', 'S'],
-        does: 'keep this look',
+        does: 'save look',
         act: (hands) => void keepLook(hands),
         isOnce: true,
       },
       {
         keys: 'p',
         shown: ['P'],
-        does: 'panels away, and back',
+        does: 'show or hide panels',
         act: ({ store }) => fold(store),
       },
       {
         keys: '?',
         shown: ['?'],
-        does: 'these keys',
+        does: 'show these shortcuts',
         act: ({ store }) => store.set({ dialog: 'keys' }),
       },
-      { keys: '', shown: ['Tab'], does: 'from control to control' },
-      { keys: '', shown: ['← ↑ ↓ →'], does: 'on the pictures: the brush, Enter paints' },
-      { keys: '', shown: ['Shift', 'Enter'], does: 'there: line from the last stroke' },
+      { keys: '', shown: ['Tab'], does: 'next control' },
+      { keys: '', shown: ['← ↑ ↓ →'], does: 'move the brush on the pictures; Enter paints' },
+      { keys: '', shown: ['Shift', 'Enter'], does: 'there, a line from the last stroke' },
     ],
   },
   {
@@ -94,13 +94,13 @@ export const KEYS = [
       { keys: '{', shown: ['Shift', '['], does: 'softer', act: ({ store }) => harden(store, -1) },
       { keys: '}', shown: ['Shift', ']'], does: 'harder', act: ({ store }) => harden(store, 1) },
       { keys: 'digit', shown: ['1', '…', '9', '0'], does: 'flow 10 % to 100 %' },
-      { keys: 'x', shown: ['X'], does: 'other colour', act: ({ store }) => swap(store) },
-      { keys: '', shown: ['Alt', 'click'], does: 'take light from the picture' },
+      { keys: 'x', shown: ['X'], does: 'swap colours', act: ({ store }) => swap(store) },
+      { keys: '', shown: ['Alt', 'click'], does: 'pick light from the picture' },
       { keys: '', shown: ['Shift', 'click'], does: 'line from the last stroke' },
       {
         keys: 'escape',
         shown: ['Esc'],
-        does: 'give up the stroke',
+        does: 'cancel the stroke',
         act: ({ engine, store }) => {
           const isClosed = engine.cancel() ? {} : { panel: null };
           store.set({ asking: null, hovered: null, ...isClosed });
@@ -127,17 +127,17 @@ export const KEYS = [
   {
     title: 'Pictures',
     keys: [
-      { keys: '', shown: ['Space', 'drag'], does: 'move the pictures' },
+      { keys: '', shown: ['Space', 'drag'], does: 'pan' },
       { keys: '', shown: ['Ctrl', 'wheel'], does: 'zoom' },
       { keys: '+', shown: ['+'], does: 'zoom in', act: zoomBy(1.25) },
       { keys: '-', shown: ['−'], does: 'zoom out', act: zoomBy(0.8) },
       {
         keys: 'f',
         shown: ['F'],
-        does: 'fit',
+        does: 'fit to window',
         act: ({ store }) => look(store, { zoom: 1, pan: [0, 0] }),
       },
-      { keys: 'shift+f', shown: ['Shift', 'F'], does: 'one to one', act: showPixels },
+      { keys: 'shift+f', shown: ['Shift', 'F'], does: '100 %', act: showPixels },
       {
         keys: 'v',
         shown: ['V'],
@@ -147,25 +147,25 @@ export const KEYS = [
       {
         keys: 'n',
         shown: ['N'],
-        does: 'next view, where there are several',
+        does: 'next view, if there are several',
         act: seeNext,
       },
       {
         keys: 'k',
         shown: ['K'],
-        does: 'the other picture, in blink',
+        does: 'switch the picture in blink',
         act: ({ store }) =>
           look(store, {
             layout: 'blink',
             blink: store.value.show.blink === 'left' ? 'right' : 'left',
           }),
       },
-      { keys: ',', shown: [','], does: 'display darker', act: expose(-0.5) },
-      { keys: '.', shown: ['.'], does: 'display brighter', act: expose(0.5) },
+      { keys: ',', shown: [','], does: 'lower display exposure', act: expose(-0.5) },
+      { keys: '.', shown: ['.'], does: 'raise display exposure', act: expose(0.5) },
       {
         keys: 'c',
         shown: ['C'],
-        does: 'clean or raw',
+        does: 'denoise on or off',
         act: ({ store }) => look(store, { clean: !store.value.show.clean }),
       },
       {

@@ -61,10 +61,10 @@ const [MOST, MOST_ALONE] = [20, 8];
 function refused(text, light) {
   const plain = text.trim();
   if (!isOnNow(light))
-    return `${plain} is no level. ${light.label} is off now: type stops (+1.5 st), or off.`;
+    return `${plain} is not a level. ${light.label} is off now: type stops (+1.5 st) or off.`;
   if (Number.isFinite(Number(asTyped(plain))))
-    return `${plain} may be stops or percent: type the unit, too (12 st, 80 %).`;
-  return `${plain} is no level. Type stops from now (+1.5), percent (80 %), as now, or off.`;
+    return `${plain} could be stops or percent: add the unit (12 st, 80 %).`;
+  return `${plain} is not a level. Type stops from now (+1.5), percent (80 %), as now, or off.`;
 }
 
 /**

@@ -78,11 +78,11 @@ export class LightRow extends Component {
       store.set((ui) => ({ [key]: on ? ui[key].filter((one) => one !== k) : [...ui[key], k] }));
     const isHeld = asked.lock !== undefined || Boolean(asked.off);
     const lock = () => (isHeld ? session.release(k) : session.hold(k, this.props.rgb, true));
-    return html`<span class="marks" role="group" aria-label="Shown">
+    return html`<span class="marks" role="group" aria-label="Display">
       <${Button} label="S" class="letter" on=${isSolo} act=${() => turn('solo', isSolo)}
-        tip=${`Solo: show ${light.label} alone. The answer stays.`} />
+        tip=${`Solo: show ${light.label} alone. The answer does not change.`} />
       <${Button} label="M" class="letter" on=${isMute} act=${() => turn('mute', isMute)}
-        tip=${`Mute: show the picture without ${light.label}. The answer stays.`} />
+        tip=${`Mute: show the picture without ${light.label}. The answer does not change.`} />
     </span>
     ${
       !light.is_fixed &&
@@ -90,8 +90,8 @@ export class LightRow extends Component {
       aria-label="Solve">
       <${Button} icon="lock" on=${isHeld} act=${lock} tip=${
         isHeld
-          ? `Let the solve have ${light.label} again`
-          : `Hold ${light.label} as it is in the answer`
+          ? `Unlock ${light.label}: the solve sets it again`
+          : `Lock ${light.label} as it is in the answer`
       } />
     </span>`
     }`;
@@ -174,7 +174,7 @@ function Badge(props) {
   const isAsked = Boolean(tied ?? asked.limits ?? colourOf(asked));
   const isBack = Boolean(lit?.held) && isAsked && asked.lock === undefined && !asked.off;
   const words = said.map(([, its]) => `${its}.`);
-  if (isBack) words.push('That holds it back: the painting asks for something else.');
+  if (isBack) words.push('This keeps it from what the painting asks for.');
   const more = said.length > 1 ? ` +${said.length - 1}` : '';
   return html`<span class=${`badge ${isBack ? 'is-back' : ''}`} data-tip=${words.join(' ')}
     >${isBack ? 'held back' : `${said[0][0]}${more}`}</span>`;
@@ -195,12 +195,12 @@ const colourOf = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
 function notes({ light, lit, asked = {}, tied }) {
   /** @type {[unknown, string, string][]} */
   const all = [
-    [light.is_fixed, 'fixed', 'It stays as the scene has it'],
-    [asked.off, 'off', 'You have put it out'],
-    [asked.lock !== undefined, 'held', 'You hold it at this level'],
-    [asked.limits, 'limits', 'You have set limits to its level'],
-    [colourOf(asked), 'colour', 'You have said what colour it may have'],
-    [tied, 'tied', `It goes with ${tied?.filter((name) => name !== light.name).join(', ')}`],
+    [light.is_fixed, 'fixed', 'It stays as it is in the scene'],
+    [asked.off, 'off', 'You switched it off'],
+    [asked.lock !== undefined, 'locked', 'You locked it at this level'],
+    [asked.limits, 'limits', 'You limited its level'],
+    [colourOf(asked), 'colour', 'You limited its colour'],
+    [tied, 'tied', `It is tied to ${tied?.filter((name) => name !== light.name).join(', ')}`],
     [lit?.unreached, 'unseen', 'None of its light reaches the picture'],
   ];
   return all.filter(([isSo]) => isSo).map(([, ...words]) => words);

@@ -42,7 +42,7 @@ export function LightsPanel({ ui, hands }) {
         change=${(/** @type {any} */ sort) => store.set({ sort })} />
     </div>`
     }
-    ${ui.ready && !found.length && html`<p class="faint">No light is called so.</p>`}
+    ${ui.ready && !found.length && html`<p class="faint">No light has this name.</p>`}
     ${groups.map(({ name, members }) =>
       name === null
         ? members.map((k) => row(ui, hands, k, isMany))
@@ -57,17 +57,17 @@ export function LightsPanel({ ui, hands }) {
 export function OfAll({ ui, hands }) {
   const isPart = ui.solo.length > 0 || ui.mute.length > 0;
   if (ui.mix && !isPart) {
-    const whose = comparedAnswer(ui)?.name ?? 'the answer, not shown';
+    const whose = comparedAnswer(ui)?.name ?? 'the answer (not shown)';
     return html`<${Whole} class="whose" text=${`of ${whose}`} most=${20} />`;
   }
   const held = heldOf(ui).length;
   if (!isPart && held < 2) return null;
   if (!isPart) {
-    return html`<${Button} label="Free all" class="of-all" act=${() => hands.session.releaseAll()}
-      tip=${`${held} lights are held. Let the solve have them again.`} />`;
+    return html`<${Button} label="Unlock all" class="of-all" act=${() => hands.session.releaseAll()}
+      tip=${`${held} lights are locked or off. Let the solve set them again.`} />`;
   }
   return html`<${Button} label="Show all" class="of-all"
-    tip="Some lights are not shown. The answer has them all."
+    tip="Solo or mute hides some lights. The answer has them all."
     act=${() => hands.store.set({ solo: [], mute: [] })} />`;
 }
 
@@ -161,7 +161,7 @@ function groupOf(ui, k) {
   const { name, group } = ui.lights[k];
   const tie = tieOf(ui, k);
   const others = tie && (tie.length === 2 ? tie[1] : `${tie.length - 1} more`);
-  if (tie) return `${tie[0]} and ${others}, on one dimmer`;
+  if (tie) return `${tie[0]} and ${others}, tied`;
   return group ?? (ui.lights.length > MANY ? stemOf(name) : null);
 }
 

@@ -37,7 +37,7 @@ export function Looks({ ui, hands }) {
     ${
       !looks.length &&
       ui.ready &&
-      html`<p class="faint">No look kept yet: <kbd>${MOD} S</kbd> keeps painting and answer.</p>`
+      html`<p class="faint">No looks yet: <kbd>${MOD} S</kbd> saves painting and answer as a look.</p>`
     }
     ${looks.length > 1 && html`<${Mix} ui=${ui} hands=${hands} />`}
   </div></section>`;
@@ -51,12 +51,10 @@ function Kept({ one, isCurrent, ui, hands }) {
   const drop = () => (isSure ? session.send('drop_look', { look: one.id }) : setSure(true));
   const its = inView(one.thumbnail, ui.view);
   const picture = its in ui.resources ? its : one.thumbnail;
-  const tip = isCurrent
-    ? 'Painting and answer are this look'
-    : 'Go on from this look; undo comes back';
+  const tip = isCurrent ? 'Painting and answer equal this look' : 'Load this look. Undo goes back.';
   return html`<li class=${`look ${isCurrent ? 'is-current' : ''}`}
     onPointerLeave=${() => setSure(false)}>
-    <button type="button" class="look-picture" aria-label=${`Go on from ${one.name}`}
+    <button type="button" class="look-picture" aria-label=${`Load ${one.name}`}
       aria-current=${isCurrent ? 'true' : undefined} data-tip=${tip}
       onClick=${() => goOnFrom(hands, one.id)}>
       <${Thumb} name=${picture} generation=${ui.resources[picture] ?? 0} hands=${hands} />
@@ -71,7 +69,7 @@ function Kept({ one, isCurrent, ui, hands }) {
       <${Button} icon="copy" tip=${`Duplicate ${one.name}`}
         act=${() => session.send('copy_look', { look: one.id })} />
       <${Button} icon=${isSure ? 'check' : 'trash'} class=${isSure ? 'is-sure' : ''}
-        tip=${isSure ? `Delete ${one.name}: press again` : `Delete ${one.name}`} act=${drop} />
+        tip=${isSure ? `Delete ${one.name}: press again to confirm` : `Delete ${one.name}`} act=${drop} />
     </span>
   </li>`;
 }
@@ -126,17 +124,17 @@ function Mix({ ui, hands }) {
       html`<${Select} label="First look" hidden value=${String(now.a)} choices=${choices}
         tip=${`From ${nameOf(now.a)}`}
         change=${(/** @type {string} */ id) => set({ a: Number(id) })} />
-      <${Slider} label="Between" value=${100 * now.share} least=${0} most=${100} unit="%"
-        tip=${`How far from ${nameOf(now.a)} to ${nameOf(now.b)}`}
+      <${Slider} label="Crossfade" value=${100 * now.share} least=${0} most=${100} unit="%"
+        tip=${`Crossfade from ${nameOf(now.a)} to ${nameOf(now.b)}`}
         change=${(/** @type {number} */ share) => set({ share: share / 100 })} />
       <${Select} label="Second look" hidden value=${String(now.b)} choices=${choices}
         tip=${`To ${nameOf(now.b)}`}
         change=${(/** @type {string} */ id) => set({ b: Number(id) })} />
-      <${Button} icon="plus" label="Keep as look" class="keep" act=${keep}
-        tip=${`Keep ${betweenOf(ui.looks, now)}`} />`
+      <${Button} icon="plus" label="Save as look" class="keep" act=${keep}
+        tip=${`Save ${betweenOf(ui.looks, now)}`} />`
     }
     <${Button} icon="side" label=${ui.mix ? 'Back to the painting' : 'Compare looks'} class="compare"
-      tip=${ui.mix ? 'Painting and answer again' : 'Two looks side by side, and what lies between'}
+      tip=${ui.mix ? 'Show painting and answer again' : 'Two looks side by side, and a crossfade between them'}
       on=${Boolean(ui.mix)} act=${() => (ui.mix ? store.set(unmixed) : set({}))} />
   </div>`;
 }

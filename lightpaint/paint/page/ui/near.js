@@ -49,12 +49,10 @@ const within = (x, least, most) => Math.max(least, Math.min(most, x));
 /** @param {{stops: number, mired: number}} asking */
 function asked({ stops, mired }) {
   const bright =
-    Math.abs(stops) < 0.05
-      ? 'as bright'
-      : `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? 'brighter' : 'darker'}`;
+    Math.abs(stops) >= 0.05 &&
+    `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? 'brighter' : 'darker'}`;
   const warm =
-    Math.abs(mired) < 3
-      ? ''
-      : `, ${Math.abs(Math.round(mired))} mired ${mired > 0 ? 'warmer' : 'cooler'}`;
-  return bright + warm;
+    Math.abs(mired) >= 3 &&
+    `${Math.abs(Math.round(mired))} mired ${mired > 0 ? 'warmer' : 'cooler'}`;
+  return [bright, warm].filter(Boolean).join(', ') || 'no change';
 }

@@ -21,17 +21,17 @@ export function Toasts({ ui, hands }) {
 }
 
 const SILENT =
-  'The kernel has not answered for 10 s: it is busy, or it has ended. What you paint is heard when it is free; if it was restarted, run the cell again.';
+  'The kernel has not answered for 10 s. If it is busy, your strokes arrive when it is free. If it was restarted, run the cell again.';
 
 const LOST =
-  'The connection is lost; trying again … What is finished is kept. What you paint now is sent if the same painter comes back.';
+  'The connection is lost; reconnecting … Finished strokes are kept. What you paint now is sent if the same painter comes back.';
 
 /** @param {number} unheard strokes */
 function stale(unheard) {
   const lost = unheard
-    ? ` Painted on it, never heard, and lost: ${counted(unheard, 'stroke')}.`
+    ? ` ${counted(unheard, 'stroke')} painted here could not be sent, and ${unheard === 1 ? 'is' : 'are'} lost.`
     : '';
-  return `The painter that runs here does not know this page: open the address that its terminal shows.${lost}`;
+  return `This page belongs to a painter that has ended. Open the address that the terminal shows now.${lost}`;
 }
 
 /** Over the pictures; in the middle where there are none. @param {{ui: Ui, hands: Hands}} props */
@@ -52,11 +52,11 @@ export function Banner({ ui, hands }) {
 function WayOn({ ui, hands }) {
   const reason = ui.closed?.reason;
   if (reason === 'taken') {
-    return html`<${Button} label="Take over" primary tip="Go on here, and no longer there"
+    return html`<${Button} label="Take over" primary tip="Continue here instead of in the other tab"
       act=${() => hands.session.send('take_over')} />`;
   }
   if (reason !== 'version') return null;
-  return html`<${Button} label="Load the page anew" primary act=${() => location.reload()} />`;
+  return html`<${Button} label="Reload the page" primary act=${() => location.reload()} />`;
 }
 
 /**
@@ -88,7 +88,7 @@ function worksOf(ui, { session }) {
   const works = [];
   if ((ui.isWriting || writing) && ui.dialog !== 'export')
     works.push({
-      name: 'Writing files',
+      name: 'Exporting files',
       progress: writing ?? endless,
       stop: () => void session.write([]),
     });
@@ -98,11 +98,11 @@ function worksOf(ui, { session }) {
       progress: verifying,
       stop: () => void session.verify(false),
     });
-  if (ui.explaining && !isOpen) works.push({ name: 'Seeking reasons', progress: endless });
+  if (ui.explaining && !isOpen) works.push({ name: 'Finding reasons', progress: endless });
   if (basis)
     works.push({ name: 'Rendering the lights', progress: basis, text: 'You can paint already.' });
   else if (loading && loading.done < loading.total)
-    works.push({ name: 'Loading pictures of the lights', progress: loading });
+    works.push({ name: 'Loading the images of the lights', progress: loading });
   return works;
 }
 

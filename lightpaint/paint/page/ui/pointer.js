@@ -137,7 +137,7 @@ export class Pointer {
     const { left, right } = show;
     const isShown = left === 'painting' || right === 'painting';
     const way = mix ? 'press Back to the painting' : 'compare Painting | Answer';
-    if (!isShown) this.say(`The painting is not shown: ${way} to go on with it.`);
+    if (!isShown) this.say(`The painting is not shown: ${way} to paint.`);
     return isShown;
   }
 
@@ -150,7 +150,9 @@ export class Pointer {
     const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 };
     if (tool === 'pick') return take(this.store, this.engine.paintAt(pane.kind, point.x, point.y));
     if (tool === 'ask')
-      return this.say('Ask is a drag. In numbers, above the pictures, asks without one.');
+      return this.say(
+        'Adjust needs a drag. To type values instead, press By numbers above the pictures.',
+      );
     if (!this.canPaint()) return;
     remember(this.store);
     this.store.set({ hint: false });

@@ -115,7 +115,9 @@ export class Session {
       verified: (/** @type {Heard['verified']} */ m) => verifiedOf(m, this.store.value),
       explained: (/** @type {Heard['explained']} */ m) => explainedOf(m, this.store.value),
       previewed: (/** @type {Heard['previewed']} */ m) => previewedOf(m, this.store.value),
-      closed: (/** @type {Heard['closed']} */ m) => ({ closed: { reason: m.reason, text: m.text } }),
+      closed: (/** @type {Heard['closed']} */ m) => ({
+        closed: { reason: m.reason, text: m.text },
+      }),
       connection: (/** @type {Heard['connection']} */ m) => ({ connection: m.state }),
       silence: (/** @type {Heard['silence']} */ m) => ({ isSilent: m.isSilent }),
     })[message.kind]?.(message);
@@ -359,7 +361,7 @@ export class Session {
 
 /** What was written, in a sentence. @param {string[]} names @param {boolean} isStopped */
 function writtenText(names, isStopped) {
-  const written = names.length ? `Written: ${names.join(', ')}.` : 'Nothing was written.';
+  const written = names.length ? `Exported ${names.join(', ')}.` : 'Nothing was exported.';
   return isStopped ? `Stopped. ${written}` : written;
 }
 

@@ -8,43 +8,43 @@ import { number } from './format.js';
 /** @typedef {import("./model.js").Ui} Ui */
 /** @typedef {import("./keys.js").Hands} Hands */
 
-const AUTO = 'What suits a painting that was made here';
+const AUTO = 'The best choice for a painting made here';
 
 const SPACES = [
   { value: null, label: 'Automatic', tip: AUTO },
-  { value: 'display', label: 'Display', tip: 'Differences count as the eye sees them' },
-  { value: 'linear', label: 'Linear', tip: 'Differences count as light: bright places the most' },
+  { value: 'display', label: 'Display', tip: 'Differences as the eye sees them on a display' },
+  { value: 'linear', label: 'Linear', tip: 'Differences in linear light: bright areas count most' },
 ];
 const COLOURS = [
   { value: null, label: 'Automatic', tip: AUTO },
-  { value: 'free', label: 'Free', tip: 'Any colour, whatever is best' },
-  { value: 'gentle', label: 'Gentle', tip: 'Their own, unless the paint asks for others' },
-  { value: 'white', label: 'White', tip: 'Whites of 2200 to 9000 K' },
+  { value: 'free', label: 'Free', tip: 'Any colour' },
+  { value: 'gentle', label: 'Gentle', tip: 'Their own, unless the paint asks for another' },
+  { value: 'white', label: 'White', tip: 'Whites from 2200 to 9000 K' },
 ];
 const HOLDS = [
   { value: 'auto', label: 'Automatic', tip: AUTO },
-  { value: 'hold', label: 'Hold', tip: 'It stays near how it looks now' },
-  { value: 'go', label: 'Let go', tip: 'It may become anything: only the paint counts' },
+  { value: 'hold', label: 'Hold', tip: 'They stay near their present look' },
+  { value: 'go', label: 'Ignore', tip: 'They may change freely: only the paint counts' },
 ];
 const MEANT = [
-  { value: false, label: 'As a sketch', tip: 'Strokes say where it should go' },
-  { value: true, label: 'At its word', tip: 'Each stroke is the very light that is wanted' },
+  { value: false, label: 'Sketch', tip: 'Strokes show what should change' },
+  { value: true, label: 'Literal', tip: 'Each stroke is the exact light you want' },
 ];
 const UNSURE = [
-  { value: false, label: 'May change', tip: 'Whatever brings the answer closer, however little' },
-  { value: true, label: 'Stay', tip: 'As they are now, unless it brings much' },
+  { value: false, label: 'May change', tip: 'Every change that brings the answer closer' },
+  { value: true, label: 'Stay', tip: 'As they are now, unless a change helps much' },
 ];
 
 /** What a choice means, in a few words. @type {Record<string, Record<string, string>>} */
 const MEANS = {
   space: {
     display: 'differences as the eye sees them on a display',
-    linear: 'differences of light, of which bright places have most',
+    linear: 'differences in linear light, where bright areas count most',
   },
   colors: {
-    free: 'any colour, whatever is best',
-    gentle: 'their own, unless the paint asks for others',
-    white: 'whites of 2200 to 9000 K',
+    free: 'any colour',
+    gentle: 'their own, unless the paint asks for another',
+    white: 'whites from 2200 to 9000 K',
   },
 };
 
@@ -64,54 +64,54 @@ export function SettingsPanel({ ui, hands }) {
   const stays = settings.prefer_current || null;
   return html`<${Panel} labelledby=${id} close=${close}>
     <div class="panel-head">
-      <h2 id=${id}>How the painting is answered</h2>
+      <h2 id=${id}>Solve settings</h2>
       <${Button} icon="close" tip="Close" keys="Escape" act=${close} />
     </div>
-    <${Row} title="What you did not paint" says=${said(hold === null, ofUnpainted(meant.hold))}>
-      <${Choice} label="What you did not paint" value=${manner} choices=${HOLDS}
+    <${Row} title="Unpainted areas" says=${said(hold === null, ofUnpainted(meant.hold))}>
+      <${Choice} label="Unpainted areas" value=${manner} choices=${HOLDS}
         change=${(/** @type {string} */ to) => set('hold')({ auto: null, hold: hold || HOLD, go: 0 }[to])} />
       ${
         manner === 'hold' &&
-        html`<${Number_} label="How firmly" value=${hold} least=${0.01} most=${100} step=${0.1}
-        unit="×" tip="1: it counts as much as all that is painted; 3, as usual: three times as much"
+        html`<${Number_} label="Strength" value=${hold} least=${0.01} most=${100} step=${0.1}
+        unit="×" tip="1: they count as much as all paint together. 3 is the usual value."
         change=${set('hold')} />`
       }
     </${Row}>
-    <${Row} title="What counts as close" says=${said(!settings.space, MEANS.space[meant.space])}>
-      <${Choice} label="What counts as close" value=${settings.space ?? null} choices=${SPACES}
+    <${Row} title="Colour space of the match" says=${said(!settings.space, MEANS.space[meant.space])}>
+      <${Choice} label="Colour space of the match" value=${settings.space ?? null} choices=${SPACES}
         change=${set('space')} /></${Row}>
-    <${Row} title="Which colours lamps may have"
+    <${Row} title="Light colours"
       says=${said(!settings.colors, MEANS.colors[meant.colors])}>
-      <${Choice} label="Which colours lamps may have" value=${settings.colors ?? null}
+      <${Choice} label="Light colours" value=${settings.colors ?? null}
         choices=${COLOURS} change=${set('colors')} /></${Row}>
-    <${Row} title="How the paint is meant" says=${
+    <${Row} title="Read the paint as" says=${
       settings.literal
-        ? 'every stroke is exact: linear, nothing held, any colour, but for what is chosen above'
-        : 'strokes say where it should go, and the rest of the picture has a say, too'
+        ? 'Every stroke is exact: linear light, nothing held, any colour, unless set otherwise above'
+        : 'Strokes show what should change; the rest of the picture counts, too'
     }>
-      <${Choice} label="How the paint is meant" value=${Boolean(settings.literal)} choices=${MEANT}
+      <${Choice} label="Read the paint as" value=${Boolean(settings.literal)} choices=${MEANT}
         change=${set('literal')} /></${Row}>
-    <${Row} title="Lights that hardly help" says=${
-      stays ? 'they stay as they are now' : 'they may change, too'
+    <${Row} title="Lights that make little difference" says=${
+      stays ? 'They stay as they are now' : 'They may change, too'
     }>
-      <${Choice} label="Lights that hardly help" value=${stays !== null} choices=${UNSURE}
+      <${Choice} label="Lights that make little difference" value=${stays !== null} choices=${UNSURE}
         change=${(/** @type {boolean} */ stay) =>
           set('prefer_current')(stay ? (stays ?? PREFER_CURRENT) : null)} />
       ${
         stays !== null &&
-        html`<${Number_} label="How strongly" value=${stays} least=${0.001} most=${10} step=${0.01}
-        digits=${3} tip="0.01: where the paint leaves it open; 1: unless it brings very much"
+        html`<${Number_} label="Strength" value=${stays} least=${0.001} most=${10} step=${0.01}
+        digits=${3} tip="0.01: only where the paint leaves it open. 1: unless a change helps very much."
         change=${set('prefer_current')} />`
       }
     </${Row}>
-    <${Row} title="How many lights may be on" says=${
+    <${Row} title="Number of lights" says=${
       settings.sparse
-        ? 'those that serve best, beside locked ones; the others are off'
-        : 'all that serve'
+        ? 'The most useful ones, besides locked lights; the others are off'
+        : 'No limit'
     }>
       <${Number_} label="At most" value=${settings.sparse ?? null} least=${1} digits=${0}
         most=${ui.lights.length || 1} empty="all" unit="lights"
-        tip="Empty: as many as there are" change=${set('sparse')} /></${Row}>
+        tip="Empty: no limit" change=${set('sparse')} /></${Row}>
   </${Panel}>`;
 }
 
@@ -150,13 +150,13 @@ function Row({ title, says, children }) {
 /** What is so, and whether that follows from the painting. @param {boolean} isAuto
  * @param {string | undefined} text */
 function said(isAuto, text = '') {
-  return isAuto && text ? `at present: ${text}` : text;
+  return isAuto && text ? `Now: ${text}` : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 /** What becomes of what is not painted. @param {number | null | undefined} hold */
 function ofUnpainted(hold) {
   if (hold === undefined || hold === null) return '';
-  if (!hold) return 'it may become anything';
-  const much = hold === 1 ? 'as much' : `${number(hold)} times as much`;
-  return `it stays near how it looks now, and counts ${much} as all that is painted`;
+  if (!hold) return 'free to change';
+  const weight = hold === 1 ? 'the same weight as' : `${number(hold)} times the weight of`;
+  return `held near their present look, with ${weight} the paint`;
 }

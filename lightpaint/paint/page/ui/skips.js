@@ -14,9 +14,9 @@ export function Skips({ hands: { store } }) {
     store.set(({ open }) => ({ side: true, panel: null, open: { ...open, lights: true } }));
     comeInto(button, '.lights :is(.group-name, .light-name)', true);
   };
-  return html`<nav class="skips" aria-label="To what is wanted">
-    <${Button} label="To the pictures" act=${(/** @type {MouseEvent} */ event) =>
+  return html`<nav class="skips" aria-label="Skip links">
+    <${Button} label="Skip to the pictures" act=${(/** @type {MouseEvent} */ event) =>
       comeInto(within(event), '.stage', true)} />
-    <${Button} label="To the lights" act=${toLights} />
+    <${Button} label="Skip to the lights" act=${toLights} />
   </nav>`;
 }

@@ -54,9 +54,9 @@ function nameOf(ui, kind) {
 /** What a picture does not show yet; null where it is what it is called. @param {Ui} ui
  * @param {'solution' | 'painting'} kind */
 function waitingFor({ comingTo, loading }, kind) {
-  if (comingTo !== null) return `${comingTo} is coming …`;
+  if (comingTo !== null) return `loading ${comingTo} …`;
   const isShort = loading?.isFirst && loading.done < loading.total;
-  return kind === 'solution' && isShort ? 'some of its lights are still loading …' : null;
+  return kind === 'solution' && isShort ? 'some lights are still loading …' : null;
 }
 
 /** Whether a picture shows some of the lights only. @param {Ui} ui @param {string} kind */

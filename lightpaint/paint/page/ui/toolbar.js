@@ -28,8 +28,12 @@ const ABOUT = [
   { value: 'object', label: 'Object', tip: 'The whole object under the pointer' },
 ];
 const PAINT_AS = [
-  { value: 'light', label: 'Light', tip: 'Paint light: what the surface is made of stays visible' },
-  { value: 'look', label: 'Look', tip: 'Paint the look: the colour itself, as it is to appear' },
+  {
+    value: 'light',
+    label: 'Light',
+    tip: 'Paint the light on a surface: its own colour stays visible',
+  },
+  { value: 'look', label: 'Colour', tip: 'Paint the final colour, as it should appear' },
 ];
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -49,8 +53,8 @@ export function ToolBar({ ui, hands }) {
       disabled=${tool === 'fill' && !ui.state?.objects?.length} />`,
     )}
     <div class="spring"></div>
-    <button type="button" class="two-colours" style=${style} data-tip="Other colour" data-keys="X"
-      aria-keyshortcuts="X" aria-label=${`Swap colours: ${toHex(ui.colour)}, ${signed(ui.stops)} stops, in the hand`}
+    <button type="button" class="two-colours" style=${style} data-tip="Swap colours" data-keys="X"
+      aria-keyshortcuts="X" aria-label=${`Swap colours: the current one is ${toHex(ui.colour)}, ${signed(ui.stops)} stops`}
       onClick=${() => swap(store)}><i></i><i></i></button>
   </nav>`;
 }
@@ -74,15 +78,15 @@ export function ToolOptions({ ui, hands }) {
     }
     ${
       ui.tool === 'weight' &&
-      html`<${Slider} label="Counts" value=${ui.importance} least=${0.1}
+      html`<${Slider} label="Weight" value=${ui.importance} least=${0.1}
       most=${10} curve=${TIMES} step=${0.1} digits=${2} rest=${1} unit="×"
-      tip="How many times as much a place counts as it did: above 1 the answer fits better there"
+      tip="How many times as much the area counts: above 1 the answer matches better there"
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`
     }
     ${
       ui.tool === 'ask' &&
       ui.state?.objects?.length > 0 &&
-      html`<${Choice} label="Ask about"
+      html`<${Choice} label="Area"
       value=${ui.about} choices=${ABOUT} change=${(/** @type {any} */ about) =>
         store.set({ about })} />`
     }
@@ -102,16 +106,14 @@ export function ToolOptions({ ui, hands }) {
       (strokes || ui.tool === 'fill') &&
       html`<${Slider} label="Flow" value=${100 * flowOf(ui)}
       least=${1} most=${100} unit="%" keys="1 … 0" tip=${
-        strokes
-          ? 'Flow: how much paint each touch leaves'
-          : 'Flow of Fill: how much paint it leaves'
+        strokes ? 'Flow: how much paint each dab adds' : 'Flow: 100 % covers the object completely'
       }
       change=${(/** @type {number} */ flow) => setFlow(store, flow / 100)} />`
     }
     ${
       ui.tool === 'ask' &&
-      html`<${Button} label="In numbers" on=${isAsking}
-      tip="Ask for so many stops and mired, of an object or of the whole picture" act=${numbers} />`
+      html`<${Button} label="By numbers" on=${isAsking}
+      tip="Type stops and mired, for an object or the whole picture" act=${numbers} />`
     }
   </div>`;
 }
@@ -143,13 +145,13 @@ export function Ask({ ui, hands }) {
     if (event.detail) comeInto(/** @type {HTMLElement} */ (event.currentTarget), '.stage', true);
   };
   return html`<div class="ask" data-numbers>
-    <${Select} label="Where" value=${object ?? WHOLE} choices=${choices}
+    <${Select} label="Area" value=${object ?? WHOLE} choices=${choices}
       change=${(/** @type {string} */ to) => set({ object: to === WHOLE ? null : to })} />
     <${Number_} label="Brighter" value=${stops} least=${-8} most=${8} step=${0.1} unit="st"
       change=${(/** @type {number} */ to) => set({ stops: to })} />
     <${Number_} label="Warmer" value=${mired} least=${-300} most=${300} step=${5} digits=${0}
       unit="mired" change=${(/** @type {number} */ to) => set({ mired: to })} />
-    <${Button} label="Ask for it" disabled=${isMissing || (!stops && !mired)} act=${ask}
-      tip="As one stroke, which undo takes back" />
+    <${Button} label="Apply" disabled=${isMissing || (!stops && !mired)} act=${ask}
+      tip="Applied as one stroke, which can be undone" />
   </div>`;
 }

@@ -15,48 +15,48 @@ export const TOOLS = [
     label: 'Eraser',
     icon: 'eraser',
     keys: 'E',
-    tip: 'Eraser: take paint away; what is not painted stays near how it looks now',
+    tip: 'Eraser: remove paint. Unpainted areas stay near their present look.',
   },
   {
     tool: 'weight',
     label: 'Importance',
     icon: 'weight',
     keys: 'W',
-    tip: 'Importance: where the answer has to fit best',
+    tip: 'Importance: where the answer must match best',
   },
   {
     tool: 'pick',
     label: 'Picker',
     icon: 'pick',
     keys: 'I',
-    tip: 'Picker: take light from a picture',
+    tip: 'Picker: take paint from a picture',
   },
-  { tool: 'fill', label: 'Fill', icon: 'fill', keys: 'G', tip: 'Fill: one object' },
-  { tool: 'line', label: 'Line', icon: 'line', keys: 'L', tip: 'Straight line' },
+  { tool: 'fill', label: 'Fill', icon: 'fill', keys: 'G', tip: 'Fill: paint a whole object' },
+  { tool: 'line', label: 'Line', icon: 'line', keys: 'L', tip: 'Line: paint a straight line' },
   {
     tool: 'ask',
-    label: 'Ask',
+    label: 'Adjust',
     icon: 'ask',
     keys: 'A',
-    tip: 'Ask by dragging: up is brighter, right is warmer',
+    tip: 'Adjust: drag up for brighter, right for warmer',
   },
 ];
 
 const HINTS = /** @type {Record<Tool, string>} */ ({
-  brush: 'Drag on the painting. Shift-click draws a line, Alt-click takes a colour.',
-  eraser: 'Takes paint away. What is not painted is kept near how it looks now.',
-  weight: 'Paint where the answer has to fit best: a place counts so many times as much as before.',
-  pick: 'Click on either picture: the light there becomes the paint.',
-  fill: 'Click on an object to paint all of it.',
+  brush: 'Drag on the painting. Shift-click paints a line, Alt-click picks a colour.',
+  eraser: 'Removes paint. Unpainted areas stay near their present look.',
+  weight: 'Paint where the answer must match best. Above 1× an area counts more, below 1× less.',
+  pick: 'Click either picture: the light there becomes the paint.',
+  fill: 'Click an object to paint all of it.',
   line: 'Drag from one end of the line to the other.',
-  ask: 'Drag on a place: up brighter, down darker, right warmer, left cooler.',
+  ask: 'Drag on a picture: up brighter, down darker, right warmer, left cooler.',
 });
 
 /** Where fingers point. @type {Partial<Record<Tool, string>>} */
 const TOUCH_HINTS = {
-  brush: 'Drag on the painting with one finger. Two fingers move and zoom.',
-  pick: 'Tap on either picture: the light there becomes the paint.',
-  fill: 'Tap on an object to paint all of it.',
+  brush: 'Drag on the painting with one finger. Two fingers pan and zoom.',
+  pick: 'Tap either picture: the light there becomes the paint.',
+  fill: 'Tap an object to paint all of it.',
 };
 
 /** What a tool does. @param {Tool} tool */
@@ -67,24 +67,24 @@ export function hintOf(tool) {
 
 const PAINT = {
   title: 'Paint how it should look',
-  text: 'Choose a colour, drag over this picture. The lights follow on the other one.',
+  text: 'Choose a colour and drag over this picture. The other one shows what the lights can do.',
 };
 
 /** What is said first, on the painting, where it is not to be painted with a brush.
  * @type {Partial<Record<Tool, {title: string, text: string}>>} */
 const FIRST = {
-  weight: { title: 'Say where it has to fit', text: 'Drag over what matters on this picture.' },
+  weight: { title: 'Mark what matters most', text: 'Drag over it on this picture.' },
   pick: {
-    title: 'Take light from a picture',
+    title: 'Pick light from a picture',
     text: 'It becomes the paint. Then choose the brush.',
   },
   fill: {
     title: PAINT.title,
-    text: 'Choose a colour, then an object of this picture. The lights follow on the other one.',
+    text: 'Choose a colour, then click an object in this picture. The other one shows what the lights can do.',
   },
   ask: {
-    title: 'Ask how it should look',
-    text: 'Drag on a place of this picture: up brighter, down darker, right warmer, left cooler.',
+    title: 'Adjust how it should look',
+    text: 'Drag on this picture: up brighter, down darker, right warmer, left cooler.',
   },
 };
 

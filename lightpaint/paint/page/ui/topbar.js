@@ -31,23 +31,23 @@ export function TopBar({ ui, hands }) {
         disabled=${!redo} act=${() => session.send('redo')} />
     </div>
     <div class="spring"></div>
-    <${Choice} label="Pictures" icons value=${show.layout} choices=${LAYOUTS}
+    <${Choice} label="Layout" icons value=${show.layout} choices=${LAYOUTS}
       change=${(/** @type {any} */ layout) => look(store, { layout })} />
     <${Compare} ui=${ui} hands=${hands} />
     <${Slider} label="Exposure" value=${show.stops} least=${-6} most=${6} step=${0.1} digits=${1}
-      unit="st" rest=${0} keys=", ." tip="Exposure of the display. The light stays as it is."
+      unit="st" rest=${0} keys=", ." tip="Display exposure. The light does not change."
       text=${`${signed(show.stops)} stops`}
       change=${(/** @type {number} */ stops) => look(store, { stops })} />
     <${ViewChoice} ui=${ui} hands=${hands} />
     <${Zoom} ui=${ui} hands=${hands} />
     <div class="group" role="group" aria-label="Painter">
-      <${Button} icon="settings" tip="How the painting is answered"
+      <${Button} icon="settings" tip="Solve settings"
         on=${ui.panel === 'settings'}
         act=${() => store.set({ panel: ui.panel ? null : 'settings' })} />
-      <${Button} icon="export" tip="Write files"
+      <${Button} icon="export" tip="Export"
         act=${() => store.set({ dialog: 'export' })} />
-      <${Button} icon="keys" tip="All keys" keys="?" act=${() => store.set({ dialog: 'keys' })} />
-      <${Button} icon="panel" tip="Panels" keys="P" on=${ui.side || ui.panel !== null}
+      <${Button} icon="keys" tip="Keyboard shortcuts" keys="?" act=${() => store.set({ dialog: 'keys' })} />
+      <${Button} icon="panel" tip="Show or hide the panels" keys="P" on=${ui.side || ui.panel !== null}
         act=${() => fold(store)} />
     </div>
   </header>`;
@@ -60,10 +60,10 @@ function Zoom({ ui: { show, fit }, hands }) {
   const isFitted = show.zoom === 1 && show.pan.every((x) => x === 0);
   return html`<div class="group" role="group" aria-label="Zoom">
     <${Button} label=${isFitted ? 'Fit' : `${Math.round(100 * scale)} %`} class="zoom" keys="F"
-      tip="Zoom: fit all of the picture. Ctrl and wheel, or + and −, zoom."
+      tip="Fit the whole picture. Zoom with Ctrl and the wheel, or with + and −."
       act=${() => look(hands.store, { zoom: 1, pan: [0, 0] })} />
     <${Button} label="1:1" class="zoom pixels" keys="Shift+F" on=${Math.abs(scale - 1) < 1e-3}
-      tip="100 %: one pixel of the picture on one of the page" act=${() => showPixels(hands)} />
+      tip="100 %: one image pixel on one pixel of the page" act=${() => showPixels(hands)} />
   </div>`;
 }
 
@@ -73,10 +73,10 @@ function ViewChoice({ ui, hands }) {
   if (!ui.ready) return null;
   const names = (ui.state?.transforms ?? []).map((/** @type {any} */ one) => one.name ?? one);
   return html`<${Select} label="View" hidden value=${show.transform}
-    tip="View transform: how light becomes what the display shows"
+    tip="View transform: how the display shows linear light"
     choices=${names.map((/** @type {string} */ name) => ({ value: name, label: spoken(name) }))}
     change=${(/** @type {string} */ transform) => look(hands.store, { transform })} />
-  <${Check} label="Clean" on=${show.clean} tip="Without noise (C): for the eye only"
+  <${Check} label="Denoise" on=${show.clean} tip="Denoise the pictures (C). The solve does not change."
     change=${(/** @type {boolean} */ clean) => look(hands.store, { clean })} />`;
 }
 
@@ -104,7 +104,7 @@ function Compare({ ui, hands }) {
     ...(ui.mix ? [{ value: 'looks', label: 'Two looks' }] : []),
   ];
   return html`<${Select} label="Compare" hidden value=${value} choices=${choices}
-    tip="Which two pictures" change=${(/** @type {string} */ pair) => {
+    tip="Which two pictures to compare" change=${(/** @type {string} */ pair) => {
       if (pair === 'looks') return;
       const [left, right] = /** @type {any} */ (pair.split(' '));
       store.set({ mix: null });

@@ -16,20 +16,20 @@ import { hintOf, look } from './tools.js';
 
 const OVERLAYS = [
   { value: null, label: 'None' },
-  { value: 'missed', label: 'Missed', tip: 'Where the answer is not what was painted' },
+  { value: 'missed', label: 'Difference', tip: 'Where the answer differs from the painting' },
   { value: 'beyond', label: 'Out of reach', tip: 'What no setting of these lights can do' },
-  { value: 'falsecolor', label: 'False colour', tip: 'How bright, in stops' },
-  { value: 'importance', label: 'Painted', tip: 'What counts, and how much' },
+  { value: 'falsecolor', label: 'False colour', tip: 'Brightness in stops' },
+  { value: 'importance', label: 'Importance', tip: 'What is painted, and how much it counts' },
 ];
 
-const COUNTS = 'counts';
+const PAINTED = 'painted';
 
 /** What colours of an overlay mean; hatches say the same. @type {Record<string, string[]>} */
 const MEANINGS = {
-  missed: ['too dark', 'fits', 'too bright'],
+  missed: ['too dark', 'matches', 'too bright'],
   beyond: ['in reach', 'out of reach'],
   falsecolor: ['−6 stops', 'grey', '+6'],
-  importance: ['free', COUNTS],
+  importance: ['unpainted', PAINTED],
 };
 
 /** @param {{ui: Ui, hands: Hands}} props */
@@ -40,21 +40,22 @@ export function TruthPanel({ ui, hands }) {
   // Reasons take more room than what was there before them.
   useLayoutEffect(() => {
     const panel = /** @type {HTMLElement | null | undefined} */ (frame.current?.closest('.fold'));
-    if (panel && ui.explained.length && isInSight(panel)) panel.scrollIntoView({ block: 'nearest' });
+    if (panel && ui.explained.length && isInSight(panel))
+      panel.scrollIntoView({ block: 'nearest' });
   }, [ui.explained]);
   // The first of them stands below the pictures, too.
   const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
     (text) => text !== ui.headline,
   );
   return html`<div class="truth" ref=${frame}>
-    <${Choice} label="Over the pictures" value=${ui.show.overlay} choices=${OVERLAYS}
+    <${Choice} label="Overlay" value=${ui.show.overlay} choices=${OVERLAYS}
       change=${choose} />
     ${sentences.map((text) => html`<p key=${text}>${text}</p>`)}
     <div class="row">
-      <${Button} label=${ui.explaining ? 'Seeking reasons …' : 'Why not closer?'}
+      <${Button} label=${ui.explaining ? 'Finding reasons …' : 'Why not closer?'}
         disabled=${ui.explaining} act=${() => session.explain()}
-        tip="What keeps the lights from what was painted" />
-      ${ui.explaining && html`<${Bar} progress=${{ done: 0, total: 0 }} label="Seeking reasons" />`}
+        tip="What keeps the answer from matching the painting" />
+      ${ui.explaining && html`<${Bar} progress=${{ done: 0, total: 0 }} label="Finding reasons" />`}
       ${ui.state?.can_render && html`<${Verify} ui=${ui} hands=${hands} />`}
     </div>
     ${ui.verified && html`<${Verified} ui=${ui} hands=${hands} />`}
@@ -112,11 +113,11 @@ export function Legend({ ui, hands, panes }) {
   const isOld = overlay === 'beyond' && !ui.explained.length;
   const { left, top, isLow } = placed(pane, ui.state.size);
   const words = MEANINGS[overlay].map((text) =>
-    text === COUNTS && most > 1 ? `${text} ${number(most, 2)} ×` : text,
+    text === PAINTED && most > 1 ? `weight ${number(most, 2)} ×` : text,
   );
   return html`<div class=${`legend ${isLow ? 'is-low' : ''}`}
     style=${{ top: `${top}px`, left: `${left}px` }}>
-    <b>${label}${isOld && ui.deltaE !== null ? ', being found …' : ''}</b>
+    <b>${label}${isOld && ui.deltaE !== null ? ': computing …' : ''}</b>
     <i class=${`is-${overlay}`}></i>
     ${words.map((text, k) => html`<span key=${k}>${text}</span>`)}
   </div>`;
@@ -126,12 +127,12 @@ export function Legend({ ui, hands, panes }) {
 function Verify({ ui, hands }) {
   const { session } = hands;
   if (!ui.verifying) {
-    // Not by the second click of two on "How true?", under which it comes to lie.
+    // Not by the second click of a double click on "Analysis", under which it comes to lie.
     const begin = (/** @type {MouseEvent} */ { detail }) => detail < 2 && session.verify();
     return html`<${Button} label="Verify" icon="camera" act=${begin}
       tip="Render the scene with this lighting, and compare" />`;
   }
-  return html`<${Button} label="Stop the render" icon="close" act=${() => session.verify(false)} />
+  return html`<${Button} label="Stop" icon="close" act=${() => session.verify(false)} />
     <${Bar} progress=${ui.verifying} label="Verifying" />
     <span class="faint">${progressText(ui.verifying)}</span>`;
 }
@@ -162,22 +163,22 @@ function Verified({ ui, hands }) {
 }
 
 const DELTA_E =
-  'Mean difference to what was painted, as seen: 1 is just visible, 5 is clear; and of the light as it was';
+  'Mean colour difference from the painting (ΔE 2000), and what it was with the present lighting. 1 is just visible, 5 is obvious.';
 
 const STATES = {
-  live: 'A quick answer while you paint, without what takes longer; the exact one follows',
-  judging: 'The lights are found; how close they come is being worked out',
-  'answer not shown': 'It is said of the answer, which is neither of the looks that are compared',
+  live: 'A quick answer while you paint. The exact one follows.',
+  analysing: 'The lights are solved. The sentence still describes the answer before.',
+  'answer not shown': 'The sentence describes the answer, which is neither of the looks compared.',
 };
 
 /** Below the pictures, in one sentence: how close the answer comes.
  * @param {{ui: Ui, hands: Hands}} props */
 export function AnswerLine({ ui, hands }) {
   const { store } = hands;
-  const text = ui.headline || (ui.ready ? 'Finding the lighting …' : '');
+  const text = ui.headline || (ui.ready ? 'Solving …' : '');
   const isOpen = ui.side && !ui.panel && ui.open.truth;
   const isOld = ui.headline !== '' && !ui.isJudged;
-  const busy = ui.isLive ? 'live' : isOld ? 'judging' : null;
+  const busy = ui.isLive ? 'live' : isOld ? 'analysing' : null;
   const isApart = isUnseen(ui);
   const state = isApart && text ? 'answer not shown' : busy;
   const turn = (/** @type {MouseEvent} */ event) => {
@@ -203,13 +204,13 @@ export function AnswerLine({ ui, hands }) {
     <${Help} ui=${ui} hands=${hands} />
     ${
       ui.ready &&
-      html`<${Button} label="Keep look" icon="plus" keys="Control+S"
-      tip="Keep painting and answer under a name"
+      html`<${Button} label="Save look" icon="plus" keys="Control+S"
+      tip="Save painting and answer as a look"
       act=${() => keepLook(hands)} />`
     }
     ${
       // It stays where it is when it is pressed: nothing else slides under the pointer.
-      ui.ready && html`<${Button} label="How true?" on=${isOpen} act=${turn} />`
+      ui.ready && html`<${Button} label="Analysis" on=${isOpen} act=${turn} />`
     }
   </div>`;
 }

@@ -31,7 +31,7 @@ export function Views({ ui, hands }) {
       const its = ui.ofViews?.[k];
       const about = its ? `ΔE ${number(its.delta_e, 2)}` : ui.ofViews && 'not painted';
       return html`<button type="button" class=${`view-tab ${k === ui.view ? 'is-on' : ''}`}
-        key=${name} aria-pressed=${String(k === ui.view)} data-tip=${`See and paint ${name}`}
+        key=${name} aria-pressed=${String(k === ui.view)} data-tip=${`Show and paint ${name}`}
         data-keys="N" onClick=${() => see(hands, k)}>
         <${Thumb} name=${picture} generation=${ui.resources[picture]} hands=${hands} />
         <span class="view-name">${name}</span>
