@@ -47,7 +47,7 @@ def error_sentences(
         "painting_noise": painting_noise_clause(d),
     }
     shares = [f"{spoken_percent(share)} {words[part]}" for part, share in parts.items()]
-    sentences = [f"Of what is missed (in energy), {', '.join(shares)}."]
+    sentences = [f"Of the difference (in energy), {', '.join(shares)}."]
     is_told = seen is not None and seen.place is not None  # by the headline
     if d.place is not None and not is_told and d.share(d.unreachable) >= MIN_SHARE:
         sentences.append(spoken_place(d.place))
@@ -84,17 +84,17 @@ def bound_sentences(diagnosis: Diagnosis, seen: Seen | None = None) -> list[str]
 RELEASE_CLAUSES = {
     "off": ("switched off, as asked; switching it on", "switched off, as asked; switching them on"),
     "lock": ("locked; adjusting it", "locked; adjusting them"),
-    "limits": ("at a limit; letting go of that", "at their limits; letting go of these"),
-    "colour": ("held to a colour; any other", "held to colours; any others"),
+    "limits": ("at a limit; removing it", "at their limits; removing them"),
+    "colour": ("limited in colour; any other colour", "limited in colour; other colours"),
     "tie": (
-        "on a dimmer with others; adjusting it by itself",
-        "on one dimmer; adjusting each by itself",
+        "tied to other lights; adjusting it by itself",
+        "tied together; adjusting each by itself",
     ),
 }
 
 #: The same for all lights together.
 JOINT_RELEASE_CLAUSES = {
-    "colors": 'Lamps keep their colours; colors="free"',
+    "colors": 'Lights keep their colours; colors="free"',
     "sparse": "The number of lights is limited; allowing more",
     "prefer_current": "Lights are pulled towards their present setting; leaving them free",
 }
@@ -105,9 +105,9 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
 
     weaker: the words before the strength of a weaker hold.
     """
-    gained = f"would take away {spoken_percent(reason.share)} of the miss"
+    gained = f"would remove {spoken_percent(reason.share)} of the difference"
     if reason.is_joint:
-        gained += ", if the other conditions were lifted too"
+        gained += ", if the other constraints were lifted too"
     if reason.kind in RELEASE_CLAUSES:
         is_one = len(reason.names) == 1
         lights = spoken_lights(reason.names, start=True) + (" is" if is_one else " are")
@@ -118,10 +118,10 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
         return ""
     held = "Unpainted parts are held near their present look;"
     if (loosening := reason.loosening) is None:
-        return f"{held} letting it go {gained}."
+        return f"{held} releasing them {gained}."
     share, rest = spoken_percent(loosening.share), loosening.elsewhere
     cost = "" if rest is None else f", and change {spoken_changed(rest)}"
-    return f"{held} {weaker} {loosening.hold:g} would take away {share} of the miss{cost}."
+    return f"{held} {weaker} {loosening.hold:g} would remove {share} of the difference{cost}."
 
 
 def painting_noise_clause(diagnosis: Diagnosis) -> str:
@@ -138,13 +138,13 @@ def spoken_bound(bound: Bound, share: float) -> str:
     if bound.kind == "zero":
         return (
             f"{lights} {spoken_hold(bound)} and still too much: the painting is darker there than "
-            f"the other lights leave it ({spoken_percent(share)} of the miss)."
+            f"the other lights leave it ({spoken_percent(share)} of the difference)."
         )
     it = "it" if is_one else "them"
     if bound.tint:
         return (
             f"{spoken_lights(bound.lights, start=True)} would have to be {bound.tint} than its "
-            f"whites ({bound.held_by}): any colour would take away {spoken_percent(share)} of the "
+            f"whites ({bound.held_by}): any colour would remove {spoken_percent(share)} of the "
             "miss."
         )
     held = {
@@ -152,11 +152,11 @@ def spoken_bound(bound: Bound, share: float) -> str:
         "lock": f"locked; adjusting {it}",
         "off": f"switched off, as asked; switching {it} on",
         "left out": f"left out, since their number is limited; switching {it} on too",
-        "tie": "on one dimmer; adjusting each by itself",
-        "limits": f"at a limit ({bound.held_by}); letting go of that",
-        "colour": f"held to a colour ({bound.held_by}); any other",
+        "tie": "tied together; adjusting each by itself",
+        "limits": f"at a limit ({bound.held_by}); removing it",
+        "colour": f"limited in colour ({bound.held_by}); any other colour",
     }[bound.kind]
-    return f"{lights} {held} would take away {spoken_percent(share)} of the miss."
+    return f"{lights} {held} would remove {spoken_percent(share)} of the difference."
 
 
 def spoken_hold(bound: Bound) -> str:

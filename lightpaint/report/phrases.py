@@ -86,8 +86,8 @@ def spoken_place(place: Place) -> str:
     where = f"{spoken_region(place)} ({spoken_percent(place.share)})"
     change = spoken_difference(place.painted, place.reached)
     return (
-        f"Most of that out of reach is {where}: painted {change} than any mix of the lights "
-        "makes it."
+        f"Most of what is out of reach is {where}: the painting is {change} than any mix of the "
+        "lights."
     )
 
 

@@ -16,9 +16,9 @@ from lightpaint.report.phrases import CHANNELS, spoken_lights, spoken_percent
 from lightpaint.screen import some_of
 
 #: Texts for a light without a meaningful error: in a table, and in a sentence.
-UNTOLD = "cannot be told"
+UNTOLD = "undetermined"
 
-UNTOLD_HERE = f"{UNTOLD} at these samples"
+UNTOLD_HERE = f"{UNTOLD} at this number of samples"
 
 
 def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
@@ -38,11 +38,10 @@ def untold_lights(lighting: Lighting) -> str:
     names = [light.name for light in lighting.lights if light.untold]
     if not names:
         return ""
-    it = "it" if len(names) == 1 else "them"
+    it, is_ = ("it", "is") if len(names) == 1 else ("them", "are")
     return (
-        f"{spoken_lights(names, start=True)} {UNTOLD_HERE}: the samples show little but stray "
-        f"bright pixels "
-        f"of {it}. Render more samples, or keep {it}."
+        f"{spoken_lights(names, start=True)} {is_} {UNTOLD_HERE}: the samples show little "
+        f"but stray bright pixels of {it}. Render more samples, or keep {it}."
     )
 
 

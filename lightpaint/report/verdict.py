@@ -24,15 +24,15 @@ MAX_UNSEEN_NAMES = 2
 #: Clauses on reasons that hold the lights back: for one light, and for several.
 REASON_CLAUSES: dict[str, tuple[str, str]] = {
     "hold": ("unpainted parts are held near their present look",) * 2,
-    "colors": ("lamps keep their colours",) * 2,
+    "colors": ("lights keep their colours",) * 2,
     "off": ("{} is switched off", "{} are switched off"),
     "lock": ("{} is locked", "{} are locked"),
     "limits": ("{} is at a limit", "{} are at their limits"),
-    "colour": ("{} is held to a colour", "{} are held to their colours"),
-    "tie": ("{} is on a dimmer with others", "{} are on one dimmer"),
+    "colour": ("the colour of {} is limited", "the colours of {} are limited"),
+    "tie": ("{} is tied to other lights", "{} are tied together"),
     "sparse": ("the number of lights is limited",) * 2,
     "prefer_current": ("lights are pulled towards their present setting",) * 2,
-    "views": ("view {} asks for other light", "views {} ask for other light"),
+    "views": ("view {} asks for different light", "views {} ask for different light"),
 }
 
 #: The most names in one clause; of more it tells the number.
@@ -104,7 +104,7 @@ def _paint_headline(seen: Seen) -> str:
     if seen.is_far:
         where = spoken_where(seen.place)
         change = spoken_difference(seen.place.painted, seen.place.reached)
-        painted = f"{where} it is painted {change} than they make it"
+        painted = f"{where} the painting is {change} than the lights make it"
         return f"{_headline_start(seen)}: {painted}; {spoken_reason(seen)}."
     state = "is out of reach" if not seen.causes and seen.is_beyond else "is missing"
     return f"{_headline_start(seen)} the {spoken_missing(seen)} {state}: {spoken_reason(seen)}."
@@ -117,8 +117,8 @@ def _headline_start(seen: Seen) -> str:
         return "Part of the way, but"
     # "The lights cannot" would not be true if something else holds them.
     if seen.causes or _are_kept(seen):
-        return "Other conditions keep the lights from this"
-    return "These lights cannot make this" if seen.is_beyond else "The lights do not make this"
+        return "Constraints keep the lights from this"
+    return "These lights cannot match this" if seen.is_beyond else "The lights do not match this"
 
 
 def spoken_missing(seen: Seen) -> str:
@@ -147,8 +147,8 @@ def spoken_reason(seen: Seen) -> str:
     if not seen.does_much:
         return f"{some} {'does' if is_one else 'do'} little there"
     if _are_kept(seen):
-        its = "is held back by what you ask of it"
-        return f"{some} {its if is_one else 'are held back by what you ask of them'}"
+        its = "is limited by its constraints"
+        return f"{some} {its if is_one else 'are limited by their constraints'}"
     free = tuple(name for name in seen.there if name not in seen.kept_there)
     return f"{_spoken_some(free)[0]} would light too much else"
 
@@ -157,7 +157,7 @@ def spoken_holding(reason: Reason) -> str:
     """Return a reason that keeps the lights from the paint: `annex_window is switched off`."""
     one, several = REASON_CLAUSES[reason.kind]
     if len(reason.names) > MAX_NAMES and reason.kind == "views":
-        return "other views ask for other light"
+        return "other views ask for different light"
     if len(reason.names) > MAX_NAMES:
         which = f"{len(reason.names)} lights"
     else:
@@ -170,9 +170,9 @@ def spoken_noise(seen: Seen) -> str:
     """Return a clause on noise, if it is a third of the error; else ""."""
     share = spoken_percent(seen.parts.get(seen.noise_that_counts, 0.0))
     if seen.noise_that_counts == "noise":
-        return f"{share} of what is missed is noise of the samples"
+        return f"{share} of the difference is render noise"
     if seen.noise_that_counts == "painting_noise":
-        return f"{share} of what is missed is finer than light can be"
+        return f"{share} of the difference is finer detail than light can show"
     return ""
 
 

@@ -210,9 +210,13 @@ def test_what_became_of_a_light(now: Any, new: Any, said: str):
     [
         (Reason("off", ("cove",), 0.57), BY_OPTION, ": leave out --off co*."),
         (Reason("limits", ("key",), 0.5), BY_OPTION, ": leave out --limit key."),
-        (Reason("off", ("cove",), 0.57), "room.toml", "57 % of the miss."),  # of a lights file
-        (Reason("hold", loosening=Loosening(0.8, 0.35, None)), "", "; --hold 0.8 would take away"),
-        (Reason("colors", (), 0.5), "", "; --colors free would take away 50 % of the miss."),
+        (
+            Reason("off", ("cove",), 0.57),
+            "room.toml",
+            "57 % of the difference.",
+        ),  # of a lights file
+        (Reason("hold", loosening=Loosening(0.8, 0.35, None)), "", "; --hold 0.8 would remove"),
+        (Reason("colors", (), 0.5), "", "; --colors free would remove 50 % of the difference."),
     ],
 )
 def test_what_holds_the_lights_is_said_with_its_option(reason: Reason, where: str, said: str):

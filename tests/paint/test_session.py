@@ -414,7 +414,7 @@ def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
     session.handle(protocol.Set({"hold": 0}), {})
     assert session.edit_state["meant"].hold == session.snapshot().settings.hold == 0
     assert options_of(session.requests) == ["--hold 0"]
-    assert session.edit_state["history"].undo == ("Unpainted areas",)
+    assert session.edit_state["history"].undo == ("Unpainted parts",)
     session.handle(protocol.Set({"hold": None}), {})
     assert session.edit_state["meant"].hold == usual
     session.handle(protocol.Undo(), {})

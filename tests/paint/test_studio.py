@@ -519,7 +519,7 @@ def test_a_preview_shows_what_the_change_does_then(
         assert studio.session.version == version + 2 * number
         np.testing.assert_array_equal(studio.session.weights, before)
         assert not seen.fields["is_old"]
-        assert "of what is missed" in seen.fields["text"] or "no closer" in seen.fields["text"]
+        assert "of the difference" in seen.fields["text"] or "no closer" in seen.fields["text"]
         studio.handle(protocol.Set(values), {})
         heard.exact()
         mixed = studio.session.views[0].basis.mix(studio.session.weights)
@@ -545,7 +545,7 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: IncomingMess
         for _ in heard.studio.handle(protocol.Preview(1, {"hold": advised["hold"]}), {})
     ]
     share = round(100 * advised["closes"])
-    told = re.match(r"Closes (\d+) % of what is missed", found.fields["text"])
+    told = re.match(r"Removes (\d+) % of the difference", found.fields["text"])
     assert told is not None
     assert int(told[1]) == pytest.approx(share, abs=3)  # of enough pixels, not of all
     changed = []

@@ -36,45 +36,44 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         (
             18.0,
             {"reasons": (HOLD,)},
-            "A first step, 10 %: brighter light on the floor is missing; unpainted parts are "
-            "held near their present look. Paint more, or loosen it.",
+            "A first step (10 %). Brighter light on the floor is missing: unpainted parts are "
+            "held near their present look. Paint more, or loosen the hold.",
         ),
         (
             10.0,
             {"there": ("lamp",)},
-            "About half of the way, 50 %: brighter light on the floor is missing; lamp would light "
+            "About half way (50 %). Brighter light on the floor is missing: lamp would light "
             "too much else.",
         ),
         (
             6.0,
             {"reasons": (COLORS, SIDE)},
-            "Most of the way, 70 %: brighter light on the floor is missing; lamps keep "
+            "Most of the way (70 %). Brighter light on the floor is missing: lights keep "
             "their colours. The settings allow any colour.",
         ),
         (
             8.0,
             {"reasons": (SIDE,)},
-            "Most of the way, 60 %: brighter light on the floor is missing; view side asks for "
-            "other light.",
+            "Most of the way (60 %). Brighter light on the floor is missing: view side asks for "
+            "different light.",
         ),
         (
             23.0,
             {"reasons": (HOLD,)},
-            "Farther from the paint than it is now, which undo brings back: brighter light on the "
-            "floor is missing; unpainted parts are held near their present look. Paint more, or "
-            "loosen "
-            "it.",
+            "Farther from the paint than the present lighting, which undo brings back. Brighter "
+            "light on the floor is missing: unpainted parts are held near their present look. Paint "
+            "more, or loosen the hold.",
         ),
         (
             20.0,
             {"reasons": (HOLD,)},
-            "No closer than it is now: brighter light on the floor is missing; unpainted "
-            "parts are held near their present look. Paint more, or loosen it.",
+            "No closer than the present lighting. Brighter light on the floor is missing: "
+            "unpainted parts are held near their present look. Paint more, or loosen the hold.",
         ),
         (
             14.0,
             {"place": None},
-            "A part of the way, 30 %. Paint what matters most, or give it more importance.",
+            "Part of the way (30 %). Paint what matters most, or give it more importance.",
         ),
     ],
 )
@@ -108,16 +107,15 @@ def test_what_a_sentence_advises_is_said_as_data(about: Any, helps: str | None):
 
 def test_a_button_says_what_it_lets_go_and_what_that_brings():
     seen = replace(Seen(10.0, 0.0, 20.0, PLACE), reasons=(OFF, HOLD))
-    assert "; annex_window is switched off." in sketch_headline(seen)
+    assert ": annex_window is switched off." in sketch_headline(seen)
     fields = Advice("off", ("annex_window",), closes=0.57, hold=None)
     assert advice(seen) == fields
     weaker = Loosening(0.8, 0.35, UnpaintedChange(2.0, 12.0, "annex"))
     held = replace(seen, reasons=(replace(HOLD, loosening=weaker),))
     assert advice(held) == Advice("hold", (), closes=0.35, hold=0.8)
     assert spoken_cause(held.reasons[0]) == (
-        "Unpainted parts are held near their present look; a hold of 0.8 would take away 35 % of "
-        "the "
-        "miss, and change the annex by ΔE 12."
+        "Unpainted parts are held near their present look; a hold of 0.8 would remove 35 % of "
+        "the difference, and change the annex by ΔE 12."
     )
     # Of what takes several, none closes a share by itself.
     joint = replace(seen, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))
@@ -129,12 +127,12 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
 def test_a_preview_says_what_it_brings_and_what_it_costs():
     annex = UnpaintedChange(2.0, 12.0, "annex")
     its = {"delta_e": (17.2, 6.9), "is_at_cost": False}
-    told = "Closes 57 % of what is missed (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
+    told = "Removes 57 % of the difference (ΔE 17 becomes 6.9), and changes the annex by ΔE 12."
     assert preview_text(0.57, annex, **its) == (told, False)
     costly = preview_text(0.57, annex, **{**its, "is_at_cost": True})
-    assert costly == (f"{told} That is more than it brings.", True)
+    assert costly == (f"{told} That is more than it gains.", True)
     none = preview_text(0.004, None, **its)[0]
-    assert none == "Brings the answer no closer."
+    assert none == "The answer comes no closer."
 
 
 def test_what_harms_the_rest_is_not_praised():
@@ -143,9 +141,9 @@ def test_what_harms_the_rest_is_not_praised():
         8.6, 0.0, 20.0, PLACE, there=("lamp",), elsewhere=UnpaintedChange(19.0, 51.0, "annex")
     )
     said = sketch_headline(seen)
-    assert said.startswith("57 % of the way, at the cost of the annex (ΔE 51): ")
+    assert said.startswith("57 % of the way, at the cost of the annex (ΔE 51). ")
     mild = sketch_headline(replace(seen, elsewhere=UnpaintedChange(2.0, 7.0, "annex")))
-    assert mild.startswith("About half of the way, 57 %, and changes the annex by ΔE 7.0: ")
+    assert mild.startswith("About half way (57 %), and changes the annex by ΔE 7.0. ")
 
 
 def test_what_is_close_is_said_as_elsewhere():
@@ -163,16 +161,16 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
     target = lp.Target("t", image, np.ones(size, np.float32), everything=False)
     [analysis] = lp.analyse(lp.solve(basis, target, colors=colors))
     first, *rest = why_not_closer(analysis)
-    assert "% no setting of these lights reaches" in first
-    assert "% is grain of the samples" in first
-    colours = "% would need lights of other colours or levels than they may have"
+    assert "% is out of reach of these lights" in first
+    assert "% is render noise" in first
+    colours = "% would need colours or levels that the lights may not have"
     assert (colours in first) == (colors == "white")
     said = " ".join([first, *rest])
     for word in ("energy", "basis", "renders have", "below zero", "Most of that"):
         assert word not in said
     # Where it is missed most is told once: of a whole, or of a place that is seen.
     unseen = replace(analysis, seen=replace(analysis.seen, place=None))
-    assert "Most of that out of reach is" in why_not_closer(unseen)[1]
+    assert "Most of what is out of reach is" in why_not_closer(unseen)[1]
     met = replace(analysis, diagnosis=replace(analysis.diagnosis, missed=0.009))
     assert why_not_closer(met) == ["The lights can make what is painted."]
 

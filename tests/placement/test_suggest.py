@@ -259,7 +259,7 @@ def test_the_section_says_what_was_found():
     assert "No point light would surely" in suggestion_section((), transform=ViewTransform())
     two = (_made("a", 0.4, 0.6), _made("b & c", 0.2, 0.4, None))
     page = suggestion_section(two, transform=ViewTransform(), cd_per_unit=100)
-    assert "would take away 40 % of what is missed" in page
+    assert "would remove 40 % of the difference" in page
     assert "together, 60 %" in page
     assert page.count("<img") == 4
     assert page.count("left:25.00%;top:50.00%") == 1

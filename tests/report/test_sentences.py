@@ -63,7 +63,9 @@ def test_difference_of_colours(painted: Any, reached: Any, words: str):
 def test_places(region: tuple[int, int], where: str):
     place = Place(region, 0.38, (0, 0, 1, 1), (1, 1, 4), (1, 1, 1))
     assert where in spoken_place(place)
-    assert "(38 %): painted brighter and bluer than any mix of the lights" in spoken_place(place)
+    assert "(38 %): the painting is brighter and bluer than any mix of the lights." in spoken_place(
+        place
+    )
 
 
 def _bound(kind: Any, *lights: str, gain: float = 1.0, multiplier: Any = (1, 1, 1)) -> Bound:
@@ -109,7 +111,7 @@ def test_the_light_that_matters_is_named(make_basis: Any):
 def test_the_most_useful_comes_first(make_basis: Any):
     *_, found = _solved(make_basis)
     first, *rest = error_sentences(found)
-    assert first.startswith("Of what is missed (in energy), ")
+    assert first.startswith("Of the difference (in energy), ")
     assert "is out of reach of any mix of the lights" in first
     assert len(rest) <= 3
     met = replace(found, missed=0.009)
@@ -133,7 +135,7 @@ def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
 @pytest.mark.parametrize(
     ("bound", "words"),
     [
-        (_bound("kept", "rest"), "Light rest is kept as it is; adjusting it too would take away"),
+        (_bound("kept", "rest"), "Light rest is kept as it is; adjusting it too would remove"),
         (_bound("lock", "a"), "Light a is locked; adjusting it would"),
         (_bound("off", "a"), "Light a is switched off, as asked; switching it on would"),
         (
@@ -141,15 +143,15 @@ def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
             "Light a is left out, since their number is limited; switching it",
         ),
         (_bound("left out", "a", "b"), "Lights a, b are left out, since their number is limited"),
-        (_bound("tie", "a", "b"), "Lights a, b are on one dimmer; adjusting each by itself would"),
-        (_bound("limits", "a"), "Light a is at a limit (as asked); letting go of that would"),
-        (_bound("colour", "a"), "Light a is held to a colour (as asked); any other would"),
+        (_bound("tie", "a", "b"), "Lights a, b are tied together; adjusting each by itself would"),
+        (_bound("limits", "a"), "Light a is at a limit (as asked); removing it would"),
+        (_bound("colour", "a"), "Light a is limited in colour (as asked); any other colour would"),
     ],
 )
 def test_what_holds_a_light_is_said(bound: Bound, words: str):
     sentence = spoken_bound(bound, 0.38)
     assert words in sentence
-    assert sentence.endswith("would take away 38 % of the miss.")
+    assert sentence.endswith("would remove 38 % of the difference.")
 
 
 def test_the_switched_off_light_that_would_help_most_is_named(make_basis: Any):
@@ -157,7 +159,7 @@ def test_the_switched_off_light_that_would_help_most_is_named(make_basis: Any):
     shares = {"tie": 0.5, "off": 0.3, "left out": 0.2, "zero": 0.1}
     bounds = [_bound(kind, kind, gain=share * found.total) for kind, share in shares.items()]
     *_, first, second = error_sentences(replace(found, bounds=tuple(bounds)))
-    assert "on one dimmer" in first
+    assert "tied together" in first
     assert second == spoken_bound(bounds[1], 0.3)
     assert "30 %" in second
     # If it is what helps most of all, once is enough.
@@ -208,7 +210,7 @@ def test_lights_are_called_lights_once(names: list[str], words: str):
 def test_of_hundreds_of_names_the_first_are_said(make_basis: Any):
     names = [f"spot_{k}" for k in range(302)]
     said = spoken_bound(_bound("tie", *names), 0.5)
-    assert re.match(r"Lights spot_0, spot_1, .*… and 2\d\d more are on one dimmer", said)
+    assert re.match(r"Lights spot_0, spot_1, .*… and 2\d\d more are tied together", said)
     assert len(said) < 300
 
 

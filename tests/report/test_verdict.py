@@ -59,17 +59,17 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(14.0),
-            "These lights cannot make this: in the middle it is painted brighter than they make "
-            "it; no light reaches it.",
+            "These lights cannot match this: in the middle the painting is brighter "
+            "than the lights make it; no light reaches it.",
         ),
         (
             _seen(2.8, 3.0, reasons=(Reason("hold"),)),
-            "Other conditions keep the lights from this: in the middle it is painted brighter "
-            "than they make it; unpainted parts are held near their present look.",
+            "Constraints keep the lights from this: in the middle the painting is "
+            "brighter than the lights make it; unpainted parts are held near their present look.",
         ),
         (
             _seen(5.0, reasons=(Reason("colors"), Reason("lock", ("lamp",)))),
-            "Part of the way, but the brighter light in the middle is missing: lamps keep their "
+            "Part of the way, but the brighter light in the middle is missing: lights keep their "
             "colours, and lamp is locked.",
         ),
         (
@@ -79,18 +79,18 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(14.0, on="<b>\x1b[1m", there=("lamp",)),
-            "These lights cannot make this: on the <b>\\x1b[1m it is painted brighter than they "
-            "make it; lamp would light too much else.",
+            "These lights cannot match this: on the <b>\\x1b[1m the painting is "
+            "brighter than the lights make it; lamp would light too much else.",
         ),
         (
             _seen(5.0, reasons=(Reason("views", ("balcony",)),)),
             "Part of the way, but the brighter light in the middle is missing: view balcony "
-            "asks for other light.",
+            "asks for different light.",
         ),
         (
             _seen(5.0, reasons=(Reason("colors"), Reason("views", ("a", "b")))),
-            "Part of the way, but the brighter light in the middle is missing: lamps keep their "
-            "colours, and views a and b ask for other light.",
+            "Part of the way, but the brighter light in the middle is missing: lights keep their "
+            "colours, and views a and b ask for different light.",
         ),
         (
             _seen(5.0, there=("lamp", "sun", "sky"), kept_there=("lamp", "sun")),
@@ -99,13 +99,13 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             _seen(14.0, there=("lamp",), kept_there=("lamp",)),
-            "Other conditions keep the lights from this: in the middle it is painted brighter "
-            "than they make it; lamp is held back by what you ask of it.",
+            "Constraints keep the lights from this: in the middle the painting is "
+            "brighter than the lights make it; lamp is limited by its constraints.",
         ),
         (
             _seen(5.0, there=("lamp", "sun"), kept_there=("sun", "lamp")),
             "Part of the way, but the brighter light in the middle is out of reach: lamp and sun "
-            "are held back by what you ask of them.",
+            "are limited by their constraints.",
         ),
         (
             _seen(5.0, there=("sky",), kept_there=("sky",), at=((1, 0), DARK, LIT)),
@@ -113,7 +113,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
         ),
         (
             Seen(14.0, 0.0, 20.0),
-            "These lights cannot make this: too much of what was painted is out of reach.",
+            "These lights cannot match this: too much of what was painted is out of reach.",
         ),
     ],
 )
@@ -127,8 +127,8 @@ PARTS = ("unreachable", "forbidden", "noise", "painting_noise")
 SAID = {
     "unreachable": "is out of reach: lamp would light too much else.",
     "forbidden": "is out of reach: lamp would light too much else.",
-    "noise": "of what is missed is noise of the samples.",
-    "painting_noise": "of what is missed is finer than light can be.",
+    "noise": "of the difference is render noise.",
+    "painting_noise": "of the difference is finer detail than light can show.",
 }
 
 

@@ -36,34 +36,32 @@ WHITE, OFF = 0.02, 1e-4
 PROGRESS_PHRASES = (
     (0.85, "Nearly there"),
     (0.6, "Most of the way"),
-    (0.4, "About half of the way"),
-    (0.15, "A part of the way"),
+    (0.4, "About half way"),
+    (0.15, "Part of the way"),
     (0.0, "A first step"),
 )
 
 #: Phrase for an answer that is no closer to the paint than the present look.
-NO_CLOSER_TEXT = "No closer than it is now"
+NO_CLOSER_TEXT = "No closer than the present lighting"
 
 #: Phrase for an answer that is farther from it.
-WORSE_TEXT = "Farther from the paint than it is now, which undo brings back"
+WORSE_TEXT = "Farther from the paint than the present lighting, which undo brings back"
 
 #: Advice on what keeps the lights from the paint; a page has a button for each.
 ADVICE_TEXTS: dict[str, str] = {
-    "hold": "Paint more, or loosen it.",
+    "hold": "Paint more, or loosen the hold.",
     "colors": "The settings allow any colour.",
 }
 
 #: Reasons for a miss, for the painter; and where lights have constraints.
 MISS_TEXTS = {
-    "unreachable": "no setting of these lights reaches",
-    "forbidden": "would need a light to be darker than off",
+    "unreachable": "is out of reach of these lights",
+    "forbidden": "would need a light darker than off",
     "compromise": "is given up for the other views",
-    "noise": "is grain of the samples (more of them take it away)",
-    "painting_noise": "is finer than light can be here: grain, edges and texture of the paint",
+    "noise": "is render noise, which more samples reduce",
+    "painting_noise": "is finer detail than light can show: grain, edges and texture of the paint",
 }
-CONSTRAINED_MISS_TEXTS = {
-    "forbidden": "would need lights of other colours or levels than they may have"
-}
+CONSTRAINED_MISS_TEXTS = {"forbidden": "would need colours or levels that the lights may not have"}
 
 
 def light_info(light: BasisLight, scale: float) -> LightInfo:
@@ -178,9 +176,9 @@ def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
     """
     stay = "the answer is the present lighting"
     if is_white:
-        stay = "every light has the white that is nearest to its colour, as bright as it is"
+        stay = "every light has the white nearest to its colour, at the same brightness"
     if is_asked:
-        also = ", and keeps to what you ask of it" if is_white else ", but for what you ask of them"
+        also = ", within your constraints" if is_white else ", except for your constraints"
         stay = f"{stay if is_white else 'the lights stay as they are'}{also}"
     return f"Nothing is painted: {stay}."
 
@@ -198,7 +196,8 @@ def sketch_headline(seen: Seen) -> str:
         return f"{phrase}. Paint what matters most, or give it more importance."
     # One reason at a time: the next one is told when that has been seen to.
     first = replace(seen, reasons=seen.causes[:1])
-    text = f"{phrase}: {spoken_missing(seen)} is missing; {spoken_reason(first)}."
+    missing = spoken_missing(seen)
+    text = f"{phrase}. {missing[0].upper()}{missing[1:]} is missing: {spoken_reason(first)}."
     cause = removable_reason(seen)
     if cause is None or cause.kind not in ADVICE_TEXTS:
         return text
@@ -206,7 +205,7 @@ def sketch_headline(seen: Seen) -> str:
 
 
 def _progress_phrase(seen: Seen) -> str:
-    """Return `About half of the way, 50 %, and changes the annex by ΔE 12`.
+    """Return `About half way (50 %), and changes the annex by ΔE 12`.
 
     The phrase praises nothing where the rest has changed by more than the paint has come closer.
     """
@@ -218,7 +217,7 @@ def _progress_phrase(seen: Seen) -> str:
         return f"{spoken_percent(seen.share_met)} of the way, at the cost of {cost}"
     else:
         far = next(words for least, words in PROGRESS_PHRASES if seen.share_met >= least)
-        phrase = f"{far}, {spoken_percent(seen.share_met)}"
+        phrase = f"{far} ({spoken_percent(seen.share_met)})"
     return phrase if rest is None else f"{phrase}, and changes {spoken_changed(rest)}"
 
 
@@ -236,7 +235,7 @@ def why_not_closer(analysis: Analysis) -> list[str]:
     )
     words |= {"unreachable": MISS_TEXTS["unreachable"] + hold_clause(seen)}
     shares = ", ".join(f"{spoken_percent(share)} {words[part]}" for part, share in parts.items())
-    sentences = [f"Of what is missed (great misses count most), {shares}."]
+    sentences = [f"Of the difference (large errors count most), {shares}."]
     if seen.place is None and diagnosis.place is not None:
         sentences.append(spoken_place(diagnosis.place))
     return sentences + bound_sentences(diagnosis, seen)
@@ -285,11 +284,11 @@ def preview_text(
     """
     now, then = map(spoken_amount, delta_e)
     if closes >= 0.005:
-        text = f"Closes {spoken_percent(closes)} of what is missed (ΔE {now} becomes {then})"
+        text = f"Removes {spoken_percent(closes)} of the difference (ΔE {now} becomes {then})"
     else:
-        text = "Brings the answer no closer"
+        text = "The answer comes no closer"
     if rest is None or rest.worst < INVISIBLE:
         return f"{text}.", False
     text = f"{text}, and changes {spoken_changed(rest)}."
-    more = " That is more than it brings." if is_at_cost else ""
+    more = " That is more than it gains." if is_at_cost else ""
     return text + more, is_at_cost

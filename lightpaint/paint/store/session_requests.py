@@ -18,7 +18,7 @@ HOLD_KEYS = ("lock", "off")
 
 #: Titles of these settings on the page.
 TITLES = {
-    "hold": "Unpainted areas",
+    "hold": "Unpainted parts",
     "space": "Colour space of the match",
     "colors": "Light colours",
     "literal": "Read the paint as",

@@ -23,10 +23,10 @@ RING = (
 def spoken_suggestions(suggestions: Sequence[Suggestion]) -> str:
     """Return the gain of the suggested lights in one sentence."""
     if not suggestions:
-        return "No point light would surely take away a hundredth of what is missed."
+        return "No point light would certainly remove a hundredth of the difference."
     first, last = suggestions[0], suggestions[-1]
-    beginning = f"A light at {spoken_position(first)} would take away "
-    share = f"{spoken_percent(first.gain_share)} of what is missed (in energy)"
+    beginning = f"A light at {spoken_position(first)} would remove "
+    share = f"{spoken_percent(first.gain_share)} of the difference (in energy)"
     if len(suggestions) == 1:
         return f"{beginning}{share}."
     together = spoken_percent(1 - last.missed_share)
@@ -86,7 +86,7 @@ def _suggestion_html(
         ("intensity", f"{' '.join(f'{v:.4g}' for v in suggestion.emission)} W/sr"),
         ("colour", seen.color),
         ("amount", amounts),
-        ("takes away", f"{spoken_percent(suggestion.gain_share)} of what is missed"),
+        ("removes", f"{spoken_percent(suggestion.gain_share)} of the difference"),
         ("leaves", f"{spoken_percent(suggestion.missed_share)} of it"),
     ]
     listed = facts((k, v) for k, v in told if v)

@@ -101,7 +101,7 @@ def test_a_light_that_cannot_be_told_is_so_in_words(make_basis: Any):
     solution = with_error_bars(solve(basis, target), found)
     assert [light.untold for light in solution.lighting.lights] == [False, False, True]
     errors = spoken_errors(found, 3)
-    assert errors[2] == "cannot be told"
+    assert errors[2] == "undetermined"
     assert all(error.endswith(" %") for error in errors[:2])
     assert untold_lights(solution.lighting).startswith(f"Light c {UNTOLD_HERE}: ")
     assert untold_lights(solution.lighting) in uncertainty_sentence(basis, solution, found)

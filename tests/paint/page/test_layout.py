@@ -247,7 +247,7 @@ LOW = [(1280, 300), (970, 260), (780, 300), (690, 300), (584, 260), (480, 300)]
 
 #: A long one.
 SENTENCE = (
-    "About half of the way, 46 %: brighter and redder light on the left is missing; what keeps it"
+    "About half way, 46 %: brighter and redder light on the left is missing; what keeps it"
     " from coming closer is that no light reaches the floor there, and the cove is at its limit."
 )
 

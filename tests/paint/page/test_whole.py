@@ -57,7 +57,7 @@ def cut_off(painter: Painter, where: str = ".lightpaint") -> list[str]:
 def how_true(painter: Painter) -> None:
     painter.button("Analysis").click()
     painter.button("Why not closer?").click()
-    painter.page.get_by_text("Of what is missed").wait_for()
+    painter.page.get_by_text("Of the difference").wait_for()
 
 
 def verified(painter: Painter) -> None:

@@ -50,7 +50,7 @@ function nameOf({ kind, names }, most = Infinity) {
 /** The same at length. @param {Cause} cause @param {string} name */
 function titleOf({ kind, hold }, name) {
   if (kind !== 'hold') return name;
-  return hold ? `Loosen the hold to ${number(hold, 2)}` : 'Ignore unpainted areas';
+  return hold ? `Loosen the hold to ${number(hold, 2)}` : 'Ignore unpainted parts';
 }
 
 /** The message that lets go of it; null of what was not asked on this page, or is let go already.

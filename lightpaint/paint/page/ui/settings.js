@@ -67,8 +67,8 @@ export function SettingsPanel({ ui, hands }) {
       <h2 id=${id}>Solve settings</h2>
       <${Button} icon="close" tip="Close" keys="Escape" act=${close} />
     </div>
-    <${Row} title="Unpainted areas" says=${said(hold === null, ofUnpainted(meant.hold))}>
-      <${Choice} label="Unpainted areas" value=${manner} choices=${HOLDS}
+    <${Row} title="Unpainted parts" says=${said(hold === null, ofUnpainted(meant.hold))}>
+      <${Choice} label="Unpainted parts" value=${manner} choices=${HOLDS}
         change=${(/** @type {string} */ to) => set('hold')({ auto: null, hold: hold || HOLD, go: 0 }[to])} />
       ${
         manner === 'hold' &&

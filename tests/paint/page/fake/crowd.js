@@ -5,34 +5,34 @@ const OBJECT = 'Marble relief of the four seasons, second from the left';
 const OTHERS = ['limits', 'color', 'kelvin', 'primaries', 'lock', 'off', 'present'];
 
 /** What is said of an error, in each form that it has. */
-const ERRORS = ['± 4 %', '−54 % … +454 %', '0 … +1200 %', '−100 % … 0', 'cannot be told', '0 … 0.0093'];
+const ERRORS = ['± 4 %', '−54 % … +454 %', '0 … +1200 %', '−100 % … 0', 'undetermined', '0 … 0.0093'];
 const UNITS = ['W/(m² sr)', 'W/sr', 'W/m²'];
 
 const named = (k) =>
   `${LONG}.${k % 2 ? 'wall_washer' : 'spot_on_the_second_picture'}_${String(k).padStart(2, '0')}`;
 
 export const HEADLINE =
-  `About half of the way, 46 %, and changes the annex by ΔE 12: slightly brighter light on the ` +
-  `${OBJECT} is missing; unpainted parts are held near their present look. Paint more, or loosen it.`;
+  `About half way (46 %), and changes the annex by ΔE 12. Slightly brighter light on the ` +
+  `${OBJECT} is missing: unpainted parts are held near their present look. Paint more, or loosen the hold.`;
 
 export const LONGEST =
-  `35 % of the way, at the cost of the ${OBJECT} (ΔE 49): darker and bluer shade on the ${OBJECT} ` +
-  `is missing; ` +
-  `${named(12)} and ${named(13)} are held back by what you ask of them.`;
+  `35 % of the way, at the cost of the ${OBJECT} (ΔE 49). Darker and bluer shade on the ${OBJECT} ` +
+  `is missing: ` +
+  `${named(12)} and ${named(13)} are limited by their constraints.`;
 
 /** What has a button, of the name of a light. */
 export const HELP = { kind: 'limits', names: [named(0)], closes: 0.57, hold: null };
 
 export const SENTENCES = [
-  'Of what is missed (great misses count most), 41 % would need lights of other colours or levels ' +
-    'than they may have, 27 % is given up for the other views, 22 % no setting of these lights ' +
-    'reaches, 6 % is finer than light can be here: grain, edges and texture of the paint, 4 % is ' +
-    'grain of the samples (more of them take it away).',
-  'Most of that out of reach is at the bottom right (38 %): painted a little brighter and yellower ' +
-    'than any mix of the lights makes it.',
-  `Lights ${named(12)}, ${named(13)} are held to a colour (2700 to 6500 K, duv 0.003); any other ` +
-    'would take away 12 % of the miss.',
-  `Light ${named(30)} is switched off, as asked; switching it on would take away 9 % of the miss.`,
+  'Of the difference (large errors count most), 41 % would need colours or levels that the ' +
+    'lights may not have, 27 % is given up for the other views, 22 % is out of reach of these lights, ' +
+    '6 % is finer detail than light can show: grain, edges and texture of the paint, 4 % is render ' +
+    'noise, which more samples reduce.',
+  'Most of what is out of reach is at the bottom right (38 %): the painting is a little brighter and ' +
+    'yellower than any mix of the lights.',
+  `Lights ${named(12)}, ${named(13)} are limited in colour (2700 to 6500 K, duv 0.003); any other colour ` +
+    'would remove 12 % of the difference.',
+  `Light ${named(30)} is switched off, as asked; switching it on would remove 9 % of the difference.`,
 ];
 
 const VERIFIED =

@@ -341,7 +341,7 @@ export class FakeHost {
         kind: 'previewed',
         number,
         view,
-        text: 'Closes 63 % of what is missed, and changes the annex by ΔE 49. That is more than it brings.',
+        text: 'Removes 63 % of the difference, and changes the annex by ΔE 49. That is more than it gains.',
         is_at_cost: true,
         is_old: false,
         arrays: { before: picture, after: picture },
