@@ -61,8 +61,8 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             23.0,
             {"reasons": (HOLD,)},
             "Farther from the paint than the present lighting, which undo brings back. Brighter "
-            "light on the floor is missing: unpainted parts are held near their present look. Paint "
-            "more, or loosen the hold.",
+            "light on the floor is missing: unpainted parts are held near their present look. "
+            "Paint more, or loosen the hold.",
         ),
         (
             20.0,
