@@ -189,7 +189,7 @@ def test_numbers_in_other_words_of_the_help_are_those_of_the_code():
 
 
 def test_numbers_of_settings_are_the_same_in_documents_and_on_the_page():
-    page = (ROOT / "lightpaint/paint/page/ui/settings.js").read_text()
+    page = (ROOT / "lightpaint/paint/page/ui/settings_panel.js").read_text()
     solving, method = ((ROOT / "docs" / name).read_text() for name in ("solving.md", "method.md"))
     assert f"const HOLD = {DEFAULT_HOLD:g};" in page
     assert f"`--hold {DEFAULT_HOLD:g}`" in solving

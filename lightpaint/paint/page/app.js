@@ -1,31 +1,31 @@
 /** The painter in an element: pictures, tools and panels over a host that has the session. */
 
 import { html, render, useEffect, useState } from './vendor/preact.js';
-import { ColourPanel } from './ui/colour.js';
+import { ColourPanel } from './ui/colour_panel.js';
 import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
-import { PreviewDialog } from './ui/help.js';
+import { PreviewDialog } from './ui/advice.js';
 import { counted } from './ui/format.js';
-import { hearWithin, press } from './ui/keys.js';
-import { LightsPanel, OfAll } from './ui/lights.js';
-import { Looks } from './ui/looks.js';
-import { handBefore, keep, openBefore, sizeBefore } from './ui/memory.js';
-import { first } from './ui/model.js';
+import { hearWithin, press } from './ui/shortcuts.js';
+import { LightsPanel, OfAll } from './ui/light_list.js';
+import { Looks } from './ui/look_strip.js';
+import { handBefore, keep, openBefore, sizeBefore } from './ui/browser_storage.js';
+import { first } from './ui/ui_state.js';
 import { Banner, Tips, Toasts, Working } from './ui/notices.js';
-import { Session } from './ui/session.js';
-import { SettingsPanel } from './ui/settings.js';
-import { Skips } from './ui/skips.js';
+import { Session } from './ui/session_controller.js';
+import { SettingsPanel } from './ui/settings_panel.js';
+import { Skips } from './ui/skip_links.js';
 import { Stage } from './ui/stage.js';
-import { Store } from './ui/store.js';
+import { Store } from './ui/ui_store.js';
 import { Ask, ToolBar, ToolOptions } from './ui/toolbar.js';
 import { TopBar } from './ui/topbar.js';
-import { AnswerLine, Here, TruthPanel } from './ui/truth.js';
-import { Views, see } from './ui/views.js';
+import { AnswerLine, Here, TruthPanel } from './ui/analysis_panel.js';
+import { Views, see } from './ui/view_tabs.js';
 
-/** @typedef {import("./ui/engine.js").Host} Host */
-/** @typedef {import("./ui/engine.js").Engine} Engine */
-/** @typedef {import("./ui/model.js").Ui} Ui */
-/** @typedef {import("./ui/keys.js").Hands} Hands */
+/** @typedef {import("./ui/engine_interface.js").Host} Host */
+/** @typedef {import("./ui/engine_interface.js").Engine} Engine */
+/** @typedef {import("./ui/ui_state.js").Ui} Ui */
+/** @typedef {import("./ui/shortcuts.js").Hands} Hands */
 
 /**
  * Show the painter in an element.

@@ -1,7 +1,7 @@
 /** The painter as a page of its own: its session is behind the server that the page came from. */
 
 import { mount } from './app.js';
-import { openEngine, openHost } from './engine/painter.js';
+import { openEngine, openHost } from './engine/picture_engine.js';
 
 const element = document.getElementById('lightpaint');
 if (element) {

@@ -1,10 +1,10 @@
 /** The painter in a notebook: the same page, over the model of an anywidget. */
 import { mount } from './app.js';
-import { openEngine } from './engine/painter.js';
-import { ModelHost } from './engine/model_host.js';
+import { openEngine } from './engine/picture_engine.js';
+import { ModelHost } from './engine/notebook_host.js';
 
 /** What anywidget calls for each place where the painter is shown; what it returns ends it.
- * @param {{model: import("./engine/model_host.js").Model, el: HTMLElement}} notebook */
+ * @param {{model: import("./engine/notebook_host.js").Model, el: HTMLElement}} notebook */
 async function render({ model, el }) {
   const style = document.createElement('style');
   style.textContent = String(model.get('_sheet'));

@@ -1,8 +1,8 @@
 /** What tests of the picture engine call in the browser. */
-import { PaintCanvas } from "/engine/canvas.js";
+import { PaintCanvas } from "/engine/paint_canvas.js";
 import { chooseView } from "/viewer/drawing/choose.js";
 import { SRGB, lutOf } from "/viewer/drawing/lut.js";
-import { pictureOf } from "/engine/protocol.js";
+import { pictureOf } from "/engine/message_frames.js";
 import { DEFAULTS } from "/viewer/drawing/view.js";
 
 /** An array of the site. */

@@ -1,5 +1,5 @@
 /** Sessions that are none, for tests of what is sent. */
-import { Hearers } from "/engine/host.js";
+import { Hearers } from "/engine/socket_host.js";
 
 /** Keeps what is said until a test answers it. */
 export class SlowHost extends Hearers {

@@ -1,5 +1,5 @@
 /** A session that is none: it answers at once, from the pictures of the site. */
-import { Hearers } from "/engine/host.js";
+import { Hearers } from "/engine/socket_host.js";
 import { array } from "/bench.js";
 
 export class SiteHost extends Hearers {

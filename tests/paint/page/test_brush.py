@@ -14,7 +14,7 @@ def painted(page: Any, script: str, *, light: float = 0, objects: Any = None) ->
     image, importance = page.evaluate(
         f"""async ([H, W, light, objects]) => {{
             const brush = await import("/engine/brush.js");
-            const hand = await import("/engine/hand.js");
+            const hand = await import("/engine/stroke.js");
             const canvas = bench.plain(H, W, light, objects);
             {script}
             return [Array.from(canvas.image), Array.from(canvas.importance)];
@@ -295,7 +295,7 @@ def test_a_stroke_may_leave_the_picture_on_any_side(page: Any):
         for begin, to in ((inside, outside), (outside, inside), (outside, outside)):
             regions = page.evaluate(
                 f"""async ([H, W]) => {{
-                    const hand = await import("/engine/hand.js");
+                    const hand = await import("/engine/stroke.js");
                     const canvas = bench.plain(H, W, 0, null);
                     const use = {{ ...hand.FIRST, size: 20 }};
                     const stroke = new hand.Stroke(canvas, use, {begin}, 1);

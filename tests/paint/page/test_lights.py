@@ -332,7 +332,7 @@ def test_a_light_is_held_at_a_white(painter: Painter) -> None:
     luminance = [0.2126, 0.7152, 0.0722]
     assert lock @ luminance == pytest.approx(np.array(before) @ luminance)
     white = painter.page.evaluate(
-        "async () => (await import('/ui/colours.js')).ofKelvin(2700)",
+        "async () => (await import('/ui/paint_colour.js')).ofKelvin(2700)",
     )
     np.testing.assert_allclose(lock / lock[0], np.array(white) / white[0], rtol=1e-9)
 

@@ -52,7 +52,7 @@ def run(page: Any, site_of: Any) -> Any:
         return page.evaluate(
             f"""async ([state, view, W, H]) => {{
                 const {{ SiteHost, until }} = await import("/session.js");
-                const {{ openEngine }} = await import("/engine/painter.js");
+                const {{ openEngine }} = await import("/engine/picture_engine.js");
                 const host = new SiteHost(state);
                 const engine = openEngine(host, {{ view }});
                 document.body.replaceChildren(engine.element);

@@ -18,7 +18,7 @@ def told(page: Any) -> Any:
         return page.evaluate(
             f"""async () => {{
                 const {{ SlowHost, settle }} = await import("/fake_host.js");
-                const {{ Strokes }} = await import("/engine/strokes.js");
+                const {{ Strokes }} = await import("/engine/stroke_sender.js");
                 const canvas = bench.plain(20, 30, 0);
                 const host = new SlowHost();
                 const strokes = new Strokes(
@@ -221,7 +221,7 @@ def test_frames_are_those_of_the_library(page: Any):
     image = np.arange(24, dtype=np.float32).reshape(2, 4, 3)
     frame = page.evaluate(
         """async () => {
-            const { frame } = await import("/engine/protocol.js");
+            const { frame } = await import("/engine/message_frames.js");
             const data = Float32Array.from({ length: 24 }, (_, i) => i);
             const image = { data, shape: [2, 4, 3] };
             const importance = { data: new Float32Array(8).fill(1), shape: [2, 4] };
@@ -242,7 +242,7 @@ def test_frames_are_those_of_the_library(page: Any):
     sent = list(to_frame(message.content(7), message.buffers()))
     got = page.evaluate(
         """async (bytes) => {
-            const { unframe } = await import("/engine/protocol.js");
+            const { unframe } = await import("/engine/message_frames.js");
             const made = unframe(Uint8Array.from(bytes).buffer);
             const { weights, b } = made.arrays;
             return [made.kind, made.reply, made.name, Array.from(weights.data), weights.shape,
@@ -261,8 +261,8 @@ def test_a_socket_says_hello_again_and_numbers_what_it_says(page: Any, tab: Any,
     heard = page.evaluate(
         """async () => {
             const { FakeSocket, settle } = await import("/fake_host.js");
-            const { frame, unframe } = await import("/engine/protocol.js");
-            const { SocketHost } = await import("/engine/host.js");
+            const { frame, unframe } = await import("/engine/message_frames.js");
+            const { SocketHost } = await import("/engine/socket_host.js");
             const real = window.WebSocket;
             window.WebSocket = FakeSocket;
             const host = new SocketHost(document.baseURI, { key: async () => "k" });

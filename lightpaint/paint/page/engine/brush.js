@@ -1,7 +1,7 @@
 /** What the brush leaves: round stamps along a path. Places and sizes in pixels of the picture. */
 
-/** @typedef {import("./protocol.js").Region} Region */
-/** @typedef {import("./canvas.js").PaintCanvas} PaintCanvas */
+/** @typedef {import("./message_frames.js").Region} Region */
+/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {{x: number, y: number, pressure: number}} Point */
 /** size: diameter. hardness: part of the radius that is covered whole. flow: how far one stamp
  * covers, at full pressure.

@@ -1,13 +1,13 @@
 /** Windows over the painter: all keys, files to write. */
 
 import { html, useState } from '../vendor/preact.js';
-import { Bar } from './bar.js';
+import { Bar } from './progress_bar.js';
 import { Button, Check, Dialog } from './controls.js';
 import { progressText, within } from './format.js';
-import { KEYS, MOD } from './keys.js';
+import { KEYS, MOD } from './shortcuts.js';
 
-/** @typedef {import("./model.js").Ui} Ui */
-/** @typedef {import("./keys.js").Hands} Hands */
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function Dialogs({ ui, hands }) {

@@ -1,6 +1,6 @@
 /** Numbers as people read them. A true minus, a thin choice of digits, the unit behind. */
 
-import { luminance, toKelvin } from './colours.js';
+import { luminance, toKelvin } from './paint_colour.js';
 
 const MINUS = '\u2212';
 

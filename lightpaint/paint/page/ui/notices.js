@@ -4,10 +4,10 @@ import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button } from './controls.js';
 import { counted, progressText } from './format.js';
 import { Icon } from './icons.js';
-import { Bar } from './bar.js';
+import { Bar } from './progress_bar.js';
 
-/** @typedef {import("./model.js").Ui} Ui */
-/** @typedef {import("./keys.js").Hands} Hands */
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
 
 /** @param {{ui: Ui, hands: Hands}} props */
 export function Toasts({ ui, hands }) {

@@ -1,25 +1,25 @@
 /** The pictures, and what lies over them: names, the brush, the wipe, a hint for the first stroke. */
 
-import { inView } from '../engine/protocol.js';
+import { inView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useMemo, useRef, useState } from '../vendor/preact.js';
-import { toHex } from './colours.js';
-import { point, pointAgain, pointAway, ring } from './cursor.js';
+import { toHex } from './paint_colour.js';
+import { point, pointAgain, pointAway, ring } from './brush_cursor.js';
 import { counted } from './format.js';
-import { isTyping } from './keys.js';
-import { betweenOf, gainOf, paintOf, shown } from './model.js';
-import { Near } from './near.js';
-import { Outline } from './outline.js';
-import { Pointer } from './pointer.js';
+import { isTyping } from './shortcuts.js';
+import { betweenOf, gainOf, paintOf, shown } from './ui_state.js';
+import { Near } from './pointer_label.js';
+import { Outline } from './object_outline.js';
+import { Pointer } from './pointer_input.js';
 import { firstHintOf, flowOf, look } from './tools.js';
-import { Legend } from './truth.js';
-import { Bar } from './bar.js';
+import { Legend } from './analysis_panel.js';
+import { Bar } from './progress_bar.js';
 import { Button } from './controls.js';
 
-/** @typedef {import("./engine.js").Engine} Engine */
-/** @typedef {import("./engine.js").Pane} Pane */
-/** @typedef {import("./model.js").Ui} Ui */
-/** @typedef {import("./model.js").UiStore} UiStore */
-/** @typedef {import("./keys.js").Hands} Hands */
+/** @typedef {import("./engine_interface.js").Engine} Engine */
+/** @typedef {import("./engine_interface.js").Pane} Pane */
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./ui_state.js").UiStore} UiStore */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
 
 /** @type {Record<string, string>} */
 const NAMES = {
@@ -188,7 +188,7 @@ function Tag({ ui, hands, pane, panes }) {
     }</span>`;
 }
 
-/** @param {{panes: Pane[], tool: import("./engine.js").Tool}} props */
+/** @param {{panes: Pane[], tool: import("./engine_interface.js").Tool}} props */
 function Hint({ panes, tool }) {
   const pane = panes.find((one) => one.kind === 'painting');
   if (!pane) return null;

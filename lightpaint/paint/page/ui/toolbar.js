@@ -1,15 +1,15 @@
 /** The tools at the side, and above the pictures what the one in the hand can be set to. */
 
-import { inView } from '../engine/protocol.js';
+import { inView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
-import { toHex } from './colours.js';
-import { shownAs } from './colour.js';
+import { toHex } from './paint_colour.js';
+import { shownAs } from './colour_panel.js';
 import { Button, Choice, Number_, Select, Slider, comeInto } from './controls.js';
 import { signed } from './format.js';
 import { choose, flowOf, LEAST_SIZE, MOST_SIZE, setFlow, swap, TOOLS } from './tools.js';
 
-/** @typedef {import("./model.js").Ui} Ui */
-/** @typedef {import("./keys.js").Hands} Hands */
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
 
 /** Sizes are felt as ratios. */
 const RATIO = {

@@ -1,11 +1,11 @@
 /** The tools, and what a person does with them that is no stroke: colours, sizes, looks of it. */
 
-import { toHex } from './colours.js';
-import { exposureOf } from './model.js';
+import { toHex } from './paint_colour.js';
+import { exposureOf } from './ui_state.js';
 
-/** @typedef {import("./engine.js").Tool} Tool */
-/** @typedef {import("./engine.js").RGB} RGB */
-/** @typedef {import("./model.js").UiStore} UiStore */
+/** @typedef {import("./engine_interface.js").Tool} Tool */
+/** @typedef {import("./engine_interface.js").RGB} RGB */
+/** @typedef {import("./ui_state.js").UiStore} UiStore */
 
 /** @type {{tool: Tool, label: string, icon: string, keys: string, tip: string}[]} */
 export const TOOLS = [
@@ -146,7 +146,7 @@ const isSame = (one, other) =>
   toHex(one.colour) === toHex(other.colour) && Math.abs(one.stops - other.stops) < 0.01;
 
 /** That of the tool in the hand: who fills wants all of it, whatever the brush leaves.
- * @param {import("./model.js").Ui} ui */
+ * @param {import("./ui_state.js").Ui} ui */
 export const flowOf = (ui) => (ui.tool === 'fill' ? ui.fillFlow : ui.flow);
 
 /** @param {UiStore} store @param {number} flow */
@@ -166,7 +166,7 @@ export function harden(store, way) {
   store.set({ hardness: Math.min(1, Math.max(0, Math.round(hardness * 10) / 10)) });
 }
 
-/** @param {UiStore} store @param {Partial<import("./engine.js").Show>} changes */
+/** @param {UiStore} store @param {Partial<import("./engine_interface.js").Show>} changes */
 export function look(store, changes) {
   store.set((ui) => ({ show: { ...ui.show, ...changes } }));
 }

@@ -3,11 +3,11 @@
 import { html } from '../vendor/preact.js';
 import { Button, Check, Choice, Select, Slider, Whole } from './controls.js';
 import { signed } from './format.js';
-import { showPixels } from './keys.js';
+import { showPixels } from './shortcuts.js';
 import { fold, look } from './tools.js';
 
-/** @typedef {import("./model.js").Ui} Ui */
-/** @typedef {import("./keys.js").Hands} Hands */
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
 
 const LAYOUTS = [
   { value: 'side', label: 'Side by side', icon: 'side', keys: 'V' },

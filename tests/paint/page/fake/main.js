@@ -3,7 +3,7 @@
  * `?model`: that of a notebook, `?model=taken`: at a place that loses the painter at once. */
 
 import { mount } from '../app.js';
-import { ModelHost } from '../engine/model_host.js';
+import { ModelHost } from '../engine/notebook_host.js';
 import { crowd } from './crowd.js';
 import { FakeEngine } from './engine.js';
 import { FakeHost } from './host.js';
@@ -33,7 +33,7 @@ model.isTaken = asked.get('model') === 'taken';
 const session = asked.has('model') ? new ModelHost(model) : host;
 // `?engine`: the one that ships, over the same session.
 const engine = asked.has('engine')
-  ? (await import('../engine/painter.js')).openEngine(session)
+  ? (await import('../engine/picture_engine.js')).openEngine(session)
   : new FakeEngine(session, room);
 const painter = await mount(element, session, { global: !asked.has('shadow'), engine });
 Object.assign(window, { painter, host, engine, model });

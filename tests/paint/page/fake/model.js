@@ -1,6 +1,6 @@
 /** A notebook's model, with a session that is made up at the other end of its comm. */
 
-import { pictureOf } from '../engine/protocol.js';
+import { pictureOf } from '../engine/message_frames.js';
 
 const NAMES = new Map([
   [Uint8Array, 'uint8'],

@@ -1,0 +1,270 @@
+/**
+ * The picture engine: what the interface calls (ui/engine.js says what it wants of it).
+ *
+ * It holds the painting, shows the pictures, turns what the hand does into strokes, and follows
+ * what the session says of pixels and weights.
+ */
+import { luminance } from '../../../viewer/drawing/colour.js';
+import { VALUES } from '../../../viewer/drawing/half.js';
+import { FIRST, LABELS, Stroke, askFor } from './stroke.js';
+import { Hearers, SocketHost } from './socket_host.js';
+import { union } from '../../../viewer/drawing/layer.js';
+import { Encoder } from '../../../viewer/drawing/lut.js';
+import { fullOf } from '../../../viewer/drawing/overlay.js';
+import { Screen } from './screen.js';
+import { at, zoomed } from '../../../viewer/drawing/view.js';
+import { Work } from './session_mirror.js';
+
+/** @typedef {import("./brush.js").Point} Point */
+/** @typedef {import("./stroke.js").Use} Use */
+/** @typedef {import("./socket_host.js").Host} Host */
+/** @typedef {import("./message_frames.js").Region} Region */
+/** @typedef {import("./message_frames.js").RGB} RGB */
+/** @typedef {import("../../../viewer/drawing/view.js").Kind} Kind */
+/** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
+
+/** Albedo that is black: what falls there is not seen. */
+const LEAST_ALBEDO = 0.02;
+
+/** The session behind the server that the page came from. @returns {Host} */
+export function openHost() {
+  const host = new SocketHost();
+  void host.open();
+  return host;
+}
+
+/** @param {Host} host @param {{view?: 'gl' | 'cpu' | null}} [options]
+ * @returns {Painter} */
+export function openEngine(host, options = {}) {
+  const asked = new URLSearchParams(location.search).get('view');
+  const view = options.view ?? (asked === 'gl' || asked === 'cpu' ? asked : null);
+  return new Painter(host, { view });
+}
+
+export class Painter extends Hearers {
+  /** @param {Host} host @param {{view: 'gl' | 'cpu' | null}} options */
+  constructor(host, { view }) {
+    super();
+    this.element = document.createElement('div');
+    this.element.className = 'pictures';
+    this.screen = new Screen(this.element, { view, refill: () => this.work.refill() });
+    this.work = new Work(host, this.screen, (kind, event) => this.tell(kind, event));
+    this.on('lost', () => this.given());
+    /** @type {Stroke | null} */
+    this.stroke = null;
+    /** @type {Use} */
+    this.hand = FIRST;
+    /** @type {Encoder | null} */
+    this.encoder = null;
+  }
+
+  // What is shown
+
+  /** @param {number} width @param {number} height in CSS pixels */
+  resize(width, height) {
+    this.screen.resize(width, height);
+  }
+
+  /** @param {import("./session_mirror.js").Show} show */
+  show(show) {
+    this.work.show(show);
+  }
+
+  /** In CSS pixels of the element. @returns {(Omit<Pane, 'middle'>)[]} */
+  panes() {
+    const { ratio } = this.screen;
+    return this.screen.panes().map(({ kind, ...pane }) => ({
+      kind,
+      x: pane.x / ratio,
+      y: pane.y / ratio,
+      width: pane.width / ratio,
+      height: pane.height / ratio,
+      scale: pane.scale / ratio,
+      left: pane.left / ratio,
+      top: pane.top / ratio,
+    }));
+  }
+
+  /** What to show for the pictures to be larger by a factor around a place, in CSS pixels.
+   * @param {number} x @param {number} y @param {number} factor */
+  zoomAt(x, y, factor) {
+    const { ratio, params } = this.screen;
+    const panes = this.screen.panes();
+    const [px, py] = [x * ratio, y * ratio];
+    return zoomed(params, at(panes, px, py)?.pane ?? panes[0], px, py, factor);
+  }
+
+  /** Light of a picture at a pixel. @param {Kind} kind @param {number} x @param {number} y
+   * @returns {RGB} */
+  lightAt(kind, x, y) {
+    const place = this.within(x, y);
+    return place && this.screen.view ? this.screen.view.lightAt(kind, ...place) : [0, 0, 0];
+  }
+
+  /** What to paint with, in the manner that is in the hand, for a pixel to have the light that a
+   * picture has there: as light, what falls on it.
+   * @param {Kind} kind @param {number} x @param {number} y @param {RGB} [light] that light, where it
+   * is known: the GPU is waited for else @returns {RGB} */
+  paintAt(kind, x, y, light = this.lightAt(kind, x, y)) {
+    const place = this.within(x, y);
+    const { albedo, width } = this.work.canvas ?? {};
+    if (this.hand.as === 'look' || !place || !albedo || !width) return light;
+    const at = 3 * (place[1] * width + place[0]);
+    return /** @type {RGB} */ (
+      light.map((x, c) => x / Math.max(LEAST_ALBEDO, VALUES[albedo[at + c]]))
+    );
+  }
+
+  /** What is seen at a pixel, and the share of each light in the answer's luminance there.
+   * @param {number} x @param {number} y
+   * @returns {{object: string | null, index: number, shares: number[]} | null} */
+  pointed(x, y) {
+    const place = this.within(x, y);
+    const { canvas, state, weights } = this.work;
+    if (!place || !this.screen.view || !canvas || !state) return null;
+    const light = this.screen.view.planesAt(...place).map((one, i) => one * weights[i]);
+    const levels = Array.from({ length: weights.length / 3 }, (_, k) =>
+      Math.max(0, luminance(light.subarray(3 * k, 3 * k + 3))),
+    );
+    const whole = levels.reduce((a, b) => a + b, 0);
+    const index = canvas.objectAt(...place);
+    const object = state.objects?.[index] ?? null;
+    return { object, index, shares: levels.map((level) => (whole > 0 ? level / whole : 0)) };
+  }
+
+  /** Which object each pixel shows, once that is known.
+   * @returns {{data: Int16Array, width: number, height: number} | null} */
+  objects() {
+    const { objects, width, height } = this.work.canvas ?? {};
+    return objects && width && height ? { data: objects, width, height } : null;
+  }
+
+  /** The greatest importance that is painted, and 1 at least: what an overlay shows as all. */
+  greatest() {
+    return fullOf(this.work.canvas?.importance ?? new Float32Array(0));
+  }
+
+  /** Codes that light is shown with, at an exposure. @param {RGB} rgb @param {number} stops */
+  codes(rgb, stops) {
+    const { lut } = this.work;
+    if (this.encoder?.lut !== lut || this.encoder.stops !== stops)
+      this.encoder = new Encoder(lut, stops);
+    const rgba = new Uint8ClampedArray(4);
+    this.encoder.pixels(Float32Array.from(rgb), rgba, 0, 1);
+    return [...rgba.subarray(0, 3)];
+  }
+
+  /** @param {number} x @param {number} y @returns {[number, number] | null} */
+  within(x, y) {
+    const [height, width] = this.screen.size;
+    const [column, row] = [Math.floor(x), Math.floor(y)];
+    return column >= 0 && row >= 0 && column < width && row < height ? [column, row] : null;
+  }
+
+  /** Show, and paint, another view of the session. @param {number} view */
+  see(view) {
+    if (this.stroke) this.end();
+    this.work.see(view);
+  }
+
+  // What the hand does
+
+  /** @param {Use} use */
+  use(use) {
+    this.hand = use;
+  }
+
+  /** Where strokes go, if there is any painting to be done. */
+  get place() {
+    const { canvas, strokes, isReady } = this.work;
+    return canvas && strokes && isReady ? { canvas, strokes } : null;
+  }
+
+  /** @param {Point} point in pixels of the picture */
+  begin(point) {
+    if (this.stroke) this.end();
+    const { place } = this;
+    if (!place || place.strokes.isTaken || this.hand.tool === 'pick') return;
+    const scale = this.panes()[0]?.scale ?? 1;
+    this.stroke = new Stroke(place.canvas, this.hand, point, scale);
+    this.work.isPainting = this.screen.isHeld = true;
+    place.strokes.begin();
+    this.touched(this.stroke.begin());
+  }
+
+  /** @param {Point[]} points */
+  move(points) {
+    if (!this.stroke) return;
+    this.touched(this.stroke.move(points));
+    if (this.stroke.use.tool === 'ask') this.tell('asking', this.stroke.asked);
+  }
+
+  end() {
+    const { stroke, place } = this;
+    if (!stroke || !place) return;
+    const { stops, mired } = stroke.asked;
+    if (stroke.use.tool === 'ask' && !stops && !mired) return void this.cancel();
+    this.ended();
+    place.canvas.end();
+    place.strokes.end(LABELS[stroke.use.tool]);
+  }
+
+  /** The stroke that has begun is none. @returns {boolean} whether one had begun */
+  cancel() {
+    const { stroke, place } = this;
+    if (!stroke || !place) return false;
+    this.ended();
+    const region = place.canvas.drop();
+    place.strokes.drop();
+    if (region) this.work.redraw([region]);
+    return true;
+  }
+
+  /** The stroke in the hand is given up: it would lie over what another page has painted, or be
+   * heard by nobody. */
+  given() {
+    if (!this.stroke) return;
+    this.ended();
+    const region = this.work.canvas?.drop();
+    if (region) this.work.redraw([region]);
+  }
+
+  ended() {
+    this.stroke = null;
+    this.work.isPainting = this.screen.isHeld = false;
+  }
+
+  /** A straight stroke, whole. @param {Point} from @param {Point} to */
+  line(from, to) {
+    this.begin(from);
+    this.move([to]);
+    this.end();
+  }
+
+  /** Brighter and warmer by so much, in an object, or for null everywhere.
+   * @param {{stops: number, mired: number, object: number | null}} asked */
+  ask(asked) {
+    if (this.stroke) this.end();
+    const { place } = this;
+    if (!place || place.strokes.isTaken) return;
+    place.strokes.begin();
+    this.touched([askFor(place.canvas, asked)]);
+    place.canvas.end();
+    place.strokes.end(LABELS.ask);
+  }
+
+  /** @param {Region[]} regions */
+  touched(regions) {
+    this.work.redraw(regions);
+    const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
+    if (region) this.work.strokes?.touch(region);
+  }
+
+  close() {
+    this.work.strokes?.hurry();
+    this.work.strokes?.close();
+    this.work.loader.close();
+    this.screen.close();
+    this.element.remove();
+  }
+}

@@ -1,0 +1,328 @@
+/**
+ * What the page has of the session: the painting, weights, pictures; and how they follow it.
+ */
+import { PaintCanvas } from './paint_canvas.js';
+import { union } from '../../../viewer/drawing/layer.js';
+import { Loader } from './picture_loader.js';
+import { SRGB, lutOf } from '../../../viewer/drawing/lut.js';
+import { VERSION, inView, stateOfView } from './message_frames.js';
+import { Strokes } from './stroke_sender.js';
+
+/** @typedef {import("./socket_host.js").Host} Host */
+/** @typedef {import("./message_frames.js").Message} Message */
+/** @typedef {import("./message_frames.js").Picture} Picture */
+/** @typedef {import("./message_frames.js").Region} Region */
+/** @typedef {import("./message_frames.js").RGB} RGB */
+/** @typedef {import("./screen.js").Screen} Screen */
+
+/**
+ * What is shown. gains: which lights are heard, null for all. instead, other: weights that the
+ * solution and the other mix are shown with.
+ * @typedef {Omit<import("../../../viewer/drawing/view.js").Params, 'live'> & {transform: string, clean: boolean,
+ *   gains: boolean[] | null, instead: RGB[] | null, other: RGB[] | null}} Show
+ */
+
+/** Pictures that are wanted as soon as there are any, by name. */
+const WANTED = ['present', 'albedo', 'objects', 'verified', 'beyond'];
+
+export class Work {
+  /** @param {Host} host @param {Screen} screen
+   * @param {(kind: string, event: any) => void} tell */
+  constructor(host, screen, tell) {
+    this.host = host;
+    this.screen = screen;
+    this.tell = tell;
+    this.loader = new Loader(
+      host,
+      (slot, name, picture) => this.loaded(slot, name, picture),
+      (done, total, isFirst) => tell('loading', { done, total, isFirst }),
+    );
+    /** As the session said it last, and as it is of the view. @type {Message | null} */
+    this.said = null;
+    /** @type {Message | null} */
+    this.state = null;
+    /** Which view is shown, and painted. */
+    this.view = 0;
+    /** @type {PaintCanvas | null} */
+    this.canvas = null;
+    /** @type {Strokes | null} */
+    this.strokes = null;
+    /** @type {Show | null} */
+    this.shown = null;
+    this.weights = new Float64Array();
+    /** How often the session had changed, as its last message says. */
+    this.version = -1;
+    /** @type {import("../../../viewer/drawing/lut.js").Lut} */
+    this.lut = SRGB;
+    /** Whether the present look is there, and whether the view has it. */
+    this.knowsPresent = false;
+    this.hasPresent = false;
+    /** How often the session has said what the canvas holds. */
+    this.patches = 0;
+    /** Whether the canvas is what the session has. */
+    this.isReady = false;
+    /** Whether a stroke is in progress. */
+    this.isPainting = false;
+    host.on('state', (message) => this.begin(message));
+    host.on('answer', (message) => this.answered(message));
+    host.on('patch', (message) => this.patched(message));
+    host.on('closed', () => this.loader.hold());
+    host.on('renewed', ({ resources }) => {
+      this.loader.know(resources);
+      this.want();
+    });
+    host.on('verified', ({ view = 0 }) => this.loader.renew(inView('verified', view)));
+    host.on('explained', ({ view = 0 }) => this.loader.renew(inView('beyond', view)));
+  }
+
+  /** @param {Message} state */
+  begin(state) {
+    this.version = -1;
+    this.open(state, this.view);
+    this.mix(state);
+    this.loader.begin(state.resources);
+    this.want();
+    if (this.loader.there.has('present')) this.sync();
+  }
+
+  /** Show another view. @param {number} view */
+  see(view) {
+    const { said } = this;
+    if (!said?.views?.[view] || view === this.view) return;
+    // Whatever was done since is to be asked for.
+    this.open({ ...said, first: false }, view);
+    this.weigh();
+    this.want();
+  }
+
+  /** @param {Message} said @param {number} view */
+  open(said, view) {
+    const before = this.state;
+    const state = stateOfView(said, view);
+    const isOther = !before || !this.said || sizes(this.said) !== sizes(said);
+    const isSame = !isOther && this.view === view;
+    this.said = said;
+    this.state = state;
+    this.view = view;
+    if (isSame) return;
+    const [height, width] = /** @type {[number, number]} */ (state.size);
+    this.screen.begin([height, width], state.lights.length, this.screen.view?.name);
+    this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
+    if (isOther || !this.strokes) {
+      const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {});
+      this.strokes?.close();
+      const lost = (/** @type {number} */ count, /** @type {boolean} */ isStale) =>
+        this.tell('lost', { count, isStale });
+      this.strokes = new Strokes(this.host, refused, lost);
+      this.strokes.count = Math.max(0, Number(state.stroke) || 0);
+    }
+    this.strokes.paintOn(this.canvas, view);
+    this.isReady = false;
+    this.knowsPresent = false;
+    this.loader.forget();
+    this.setLut(this.lut);
+  }
+
+  /** What an answer or a patch says of weights, unless it is of before what was said already.
+   * @param {Message} message */
+  answered(message) {
+    if (message.version < this.version) return;
+    this.version = message.version ?? this.version;
+    this.mix(message);
+  }
+
+  /** Weights that come with a message. @param {Message} message */
+  mix(message) {
+    const weights = message.arrays?.weights?.data;
+    if (!weights) return;
+    this.weights = Float64Array.from(weights);
+    this.weigh();
+    // The exact one comes at rest, and is to be looked at.
+    this.screen.request(!message.exact);
+  }
+
+  /** @param {Message} message */
+  patched(message) {
+    const { canvas, strokes } = this;
+    this.answered(message);
+    const { image, importance } = message.arrays;
+    const isOwn = strokes?.isDropping;
+    if (strokes) strokes.isDropping = false;
+    if (!canvas || !image || !importance || isOwn) return;
+    const { view = 0, views = [] } = message;
+    if (view !== this.view) {
+      // What is undone is seen.
+      if (views.length && !views.includes(this.view)) this.tell('view', { view });
+      return;
+    }
+    const region = /** @type {Region} */ (message.region);
+    this.patches++;
+    canvas.set(
+      region,
+      /** @type {Float32Array} */ (image.data),
+      /** @type {Float32Array} */ (importance.data),
+    );
+    this.redraw([region]);
+  }
+
+  /** The canvas as the session has it, once it has all strokes. */
+  async sync() {
+    const { canvas, strokes } = this;
+    if (!canvas || !strokes) return;
+    await strokes.settled();
+    if (strokes.isPending) return;
+    const [{ count }, { patches }] = [strokes, this];
+    try {
+      const [image, importance] = await Promise.all(
+        ['painting', 'importance'].map((name) => this.host.fetch(inView(name, this.view))),
+      );
+      // What has been painted or undone since then is newer.
+      if (strokes.isPending || canvas !== this.canvas) return;
+      if (strokes.count !== count || this.patches !== patches) {
+        if (!this.isReady) this.sync();
+        return;
+      }
+      canvas.set(
+        canvas.whole,
+        /** @type {Float32Array} */ (image.data),
+        /** @type {Float32Array} */ (importance.data),
+      );
+      this.isReady = true;
+      this.redraw([canvas.whole]);
+    } catch (error) {
+      // Who does not have the session has been told so.
+      if (this.loader.isHeld) return;
+      this.tell('trouble', { text: error instanceof Error ? error.message : String(error) });
+    }
+  }
+
+  /** Which pictures are to be there. */
+  want() {
+    const { state, shown, loader } = this;
+    if (!state) return;
+    const isClean = shown?.clean ?? true;
+    /** @type {[slot: string, name: string | null][]} */
+    const named = WANTED.map((name) => [name, inView(name, this.view)]);
+    for (let k = 0; k < state.lights.length; k++) {
+      const clean = inView(`clean/${k}`, this.view);
+      const isThere = isClean && clean in loader.resources;
+      named.push([`plane ${k}`, isThere ? clean : inView(`plane/${k}`, this.view)]);
+    }
+    const transform = shown?.transform ?? 'srgb';
+    named.push(['lut', transform === 'srgb' ? null : `lut/${transform}`]);
+    loader.want(named);
+    if (transform === 'srgb') this.setLut(SRGB);
+  }
+
+  /** @param {string} slot @param {string} name @param {Picture} picture */
+  loaded(slot, name, picture) {
+    const { view } = this.screen;
+    const { canvas, state } = this;
+    if (!view || !canvas || !state) return;
+    const { data } = picture;
+    if (slot.startsWith('plane ')) {
+      const light = Number(slot.slice(6));
+      view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1);
+    } else if (slot === 'lut') this.setLut(lutOf(name.slice(4), picture, state.lut));
+    else if (slot === 'present') this.setPresent(/** @type {Uint16Array} */ (data));
+    else if (slot === 'albedo') canvas.albedo = /** @type {Uint16Array} */ (data);
+    else if (slot === 'objects') canvas.objects = /** @type {Int16Array} */ (data);
+    else if (slot === 'verified') view.setPicture('verified', /** @type {Uint16Array} */ (data));
+    else if (slot === 'beyond') view.setBeyond(/** @type {Uint8Array} */ (data));
+    this.screen.request();
+  }
+
+  /** @param {Uint16Array} present */
+  setPresent(present) {
+    const { canvas, state } = this;
+    if (!canvas || !state) return;
+    canvas.setPresent(present);
+    this.knowsPresent = true;
+    this.weigh();
+    this.showPresent();
+    if (!this.isReady && state.first) this.isReady = true;
+    else if (!this.isReady) this.sync();
+    this.redraw([canvas.whole]);
+  }
+
+  /** @param {import("../../../viewer/drawing/lut.js").Lut} lut */
+  setLut(lut) {
+    this.lut = lut;
+    this.screen.view?.setLut(lut);
+  }
+
+  /** Set all of it again: the view is another one, or has lost it. */
+  refill() {
+    this.setLut(this.lut);
+    this.weigh();
+    this.showPresent();
+    if (this.canvas) this.redraw([this.canvas.whole]);
+    this.loader.forget(
+      (slot) => slot.startsWith('plane ') || slot === 'verified' || slot === 'beyond',
+    );
+    this.want();
+  }
+
+  /** @param {Show} show */
+  show(show) {
+    const before = this.shown;
+    this.shown = show;
+    this.screen.params = { ...show, live: false };
+    if (before?.transform !== show.transform || before?.clean !== show.clean) this.want();
+    this.weigh();
+    if (showsPresent(show) !== showsPresent(before)) this.showPresent();
+    this.screen.request();
+  }
+
+  /** Tell the view which weights are shown. */
+  weigh() {
+    const { view } = this.screen;
+    if (!view || !this.state) return;
+    const { gains = null, instead = null, other = null } = this.shown ?? {};
+    const weights = Float64Array.from(instead?.flat() ?? this.weights);
+    if (gains) weights.forEach((weight, i) => (weights[i] = gains[Math.floor(i / 3)] ? weight : 0));
+    if (weights.length === 3 * this.state.lights.length) view.setWeights(weights);
+    if (other) view.setWeights(Float64Array.from(other.flat()), 'other');
+    this.stand(weights);
+  }
+
+  /** Lights that are as they were make the present look, which is there before their planes are,
+   * and is clean. @param {Float64Array} weights */
+  stand(weights) {
+    const { screen, canvas, state, shown } = this;
+    const present =
+      state?.lights.flatMap((/** @type {{present: number[]}} */ light) => light.present) ?? [];
+    const isClean = shown?.clean ?? true;
+    const isPresent =
+      isClean && weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
+    screen.isPresent = isPresent && this.knowsPresent;
+    if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
+  }
+
+  /** Give the view the present look while it is shown. */
+  showPresent() {
+    const { screen, canvas, shown } = this;
+    const isShown = screen.isPresent || showsPresent(shown);
+    this.hasPresent = screen.isPresent;
+    screen.view?.setPicture('present', isShown && canvas ? canvas.present : null);
+  }
+
+  /** @param {Region[]} regions */
+  redraw(regions) {
+    const { canvas } = this;
+    const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
+    if (!canvas || !region) return;
+    this.screen.view?.setCanvas(region, canvas.image, canvas.importance);
+    this.screen.request(this.isPainting);
+  }
+}
+
+/** How many lights there are, and how large each view is. @param {Message} state */
+function sizes({ lights, size, views = [{ size }] }) {
+  return String([lights.length, ...views.map((/** @type {any} */ view) => view.size)]);
+}
+
+/** @param {Show | null} show */
+function showsPresent(show) {
+  return show?.left === 'present' || show?.right === 'present';
+}

@@ -1,0 +1,209 @@
+/**
+ * The session, wherever it is; here behind a socket and HTTP.
+ *
+ * Every message has a number, and is answered by one that gives it back. A lost connection is
+ * made anew, and begins with `hello`.
+ */
+import { Entry, PROTOCOL, REFUSALS, shown } from './access_key.js';
+import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
+
+/** @typedef {import("./message_frames.js").Arrays} Arrays */
+/** @typedef {import("./message_frames.js").Message} Message */
+/** @typedef {import("./messages.js").Requests} Requests */
+/** @typedef {import("./messages.js").Events} Events */
+/** @typedef {import("./message_frames.js").Picture} Picture */
+
+/**
+ * What the page knows of its session. `on` hears messages of a kind, asked for or not, and
+ * `connection` with {state: 'open' | 'lost' | 'stale'}; stale: it is there, and does not know this
+ * page; and `silence` with {isSilent} where an answer is long in coming. `send` is answered by the reply, which may be
+ * `failed`, and rejects where there is no connection. `fetch` is the newest picture of a name.
+ * @typedef {object} Host
+ * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K], arrays?: Arrays) =>
+ *   Promise<Message>} send
+ * @property {<K extends keyof Heard>(kind: K, hear: (message: Heard[K]) => void) => void} on
+ * @property {(name: string) => Promise<Picture>} fetch
+ * @property {() => void} close
+ * @property {() => Promise<void>} [gate] is waited for by what is said after strokes
+ */
+
+/** What a page hears: what the session tells, and what its host knows of the connection.
+ * @typedef {Events & {connection: {kind: 'connection', state: 'open' | 'lost' | 'stale'},
+ *   silence: {kind: 'silence', isSilent: boolean}}} Heard */
+
+/** What does not wait for strokes that are on their way. */
+export const AT_ONCE = ['paint', 'drop', 'hello', 'take_over', 'fetch'];
+
+/** Who hears what: the part that all hosts share. */
+export class Hearers {
+  constructor() {
+    /** Until strokes that are done have been answered: what else is said comes after them.
+     * @type {() => Promise<void>} */
+    this.gate = async () => {};
+    /** @type {Map<string, ((message: any) => void)[]>} */
+    this.hearers = new Map();
+  }
+
+  /** @param {string} kind @param {(message: any) => void} hear */
+  on(kind, hear) {
+    this.hearers.set(kind, [...(this.hearers.get(kind) ?? []), hear]);
+  }
+
+  /** One who fails does not keep it from the others. @param {string} kind @param {any} message */
+  tell(kind, message) {
+    for (const hear of this.hearers.get(kind) ?? [])
+      try {
+        hear(message);
+      } catch (error) {
+        console.error(error);
+      }
+  }
+}
+
+/** Milliseconds before a lost connection is tried again: at first, and at most. */
+const WAITS = { first: 250, most: 5000 };
+
+/** @implements {Host} */
+export class SocketHost extends Hearers {
+  /** Where the page came from, and what knows the key to it.
+   * @param {string | URL} [base] @param {{key: () => Promise<string | null>}} [entry] */
+  constructor(base = document.baseURI, entry = new Entry(base)) {
+    super();
+    this.base = new URL('.', base);
+    this.entry = entry;
+    /** Without which nothing is answered. @type {string | null} */
+    this.key = null;
+    /** By which the session knows this page when it is back. */
+    this.page = crypto.randomUUID?.() ?? String(Math.random());
+    this.seq = 0;
+    /** @type {Map<number, {resolve: (message: Message) => void, reject: (error: Error) => void}>} */
+    this.asked = new Map();
+    /** @type {Record<string, number>} */
+    this.generations = {};
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    this.wait = WAITS.first;
+    this.isOver = false;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this.timer = undefined;
+  }
+
+  /** Connect, now and whenever the connection is lost. */
+  async open() {
+    try {
+      this.key ??= await this.entry.key();
+    } catch {
+      return this.retry(); // It is not there.
+    }
+    if (this.isOver) return;
+    if (this.key === null) this.refuse();
+    else this.connect(this.key);
+  }
+
+  /** @param {string} key */
+  connect(key) {
+    const url = new URL(`live?page=${this.page}`, this.base);
+    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+    const socket = new WebSocket(url, [PROTOCOL, `${PROTOCOL}-key.${key}`]);
+    socket.binaryType = 'arraybuffer';
+    this.socket = socket;
+    let wasOpen = false;
+    socket.onopen = () => {
+      wasOpen = true;
+      this.send('hello', { version: VERSION }).catch(() => {});
+    };
+    socket.onmessage = ({ data }) => this.receive(unframe(data));
+    socket.onclose = () => {
+      this.dropped(socket);
+      // Of a socket that was refused a page is not told why.
+      if (!wasOpen && !this.isOver) void this.askWhy();
+    };
+  }
+
+  /** @param {WebSocket} socket */
+  dropped(socket) {
+    if (socket !== this.socket) return;
+    this.socket = null;
+    const gone = new Error('the connection to the painter is lost');
+    for (const { reject } of this.asked.values()) reject(gone);
+    this.asked.clear();
+    this.retry();
+  }
+
+  /** Connect again, after a while. */
+  retry() {
+    if (this.isOver) return;
+    this.tell('connection', { kind: 'connection', state: 'lost' });
+    this.timer = setTimeout(() => void this.open(), this.wait);
+    this.wait = Math.min(WAITS.most, 2 * this.wait);
+  }
+
+  /** Say that the server does not know this page, and ask it no more. */
+  refuse() {
+    this.close();
+    this.tell('connection', { kind: 'connection', state: 'stale' });
+  }
+
+  /** Whether a server is there that does not know this page; then it is not asked again, since the
+   * page of the new address would find the session taken. */
+  async askWhy() {
+    try {
+      const how = /** @type {RequestInit} */ ({ method: 'HEAD', cache: 'no-store' });
+      const { status } = await fetch(new URL('key', this.base), { ...how, ...shown(this.key) });
+      if (!REFUSALS.includes(status) || this.socket?.readyState === WebSocket.OPEN) return;
+      this.refuse();
+    } catch {
+      // It is not there.
+    }
+  }
+
+  /** @param {Message} message */
+  receive(message) {
+    const { kind, reply } = message;
+    if (kind === 'state' || kind === 'renewed')
+      this.generations = { ...this.generations, ...message.resources };
+    const isThere = kind === 'state' || kind === 'waiting';
+    if (isThere) this.wait = WAITS.first;
+    if (kind === 'state') this.generations = { ...message.resources };
+    // Who is of another version, or has been told to leave, does not come back by itself.
+    if (kind === 'closed' && message.reason === 'version') this.isOver = true;
+    this.tell(kind, message);
+    if (isThere) this.tell('connection', { kind: 'connection', state: 'open' });
+    if (reply === undefined) return;
+    this.asked.get(reply)?.resolve(message);
+    this.asked.delete(reply);
+  }
+
+  /** @template {keyof Requests} K @param {K} kind @param {Requests[K]} [fields]
+   * @param {Arrays} [arrays] @returns {Promise<Message>} */
+  async send(kind, fields, arrays = {}) {
+    const isOpen = this.socket?.readyState === WebSocket.OPEN;
+    if (isOpen && !AT_ONCE.includes(kind)) await this.gate();
+    return new Promise((resolve, reject) => {
+      if (this.socket?.readyState !== WebSocket.OPEN)
+        return reject(new Error('there is no connection to the painter'));
+      const seq = ++this.seq;
+      this.asked.set(seq, { resolve, reject });
+      this.socket.send(frame({ kind, seq, ...fields }, arrays));
+    });
+  }
+
+  /** @param {string} name @returns {Promise<Picture>} */
+  async fetch(name) {
+    const path = name.split('/').map(encodeURIComponent).join('/');
+    const url = new URL(`data/${path}`, this.base);
+    const generation = this.generations[name];
+    if (generation !== undefined) url.searchParams.set('g', String(generation));
+    const response = await fetch(url, shown(this.key));
+    if (!response.ok) throw new Error(`${name}: ${await response.text()}`);
+    const shape = (response.headers.get('x-shape') ?? '').split(',').map(Number);
+    const dtype = response.headers.get('x-dtype') ?? '';
+    return pictureOf(dtype, shape, await response.arrayBuffer());
+  }
+
+  close() {
+    this.isOver = true;
+    clearTimeout(this.timer);
+    this.socket?.close();
+  }
+}

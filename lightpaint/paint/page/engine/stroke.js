@@ -1,0 +1,177 @@
+/**
+ * The tool in the hand: what a stroke of it does to the canvas, from where it begins to its end.
+ */
+import { Path, fill, flood, stamp } from './brush.js';
+import { warmer } from '../../../viewer/drawing/colour.js';
+import { groundOf } from './whole_adjustment.js';
+
+/** @typedef {import("./brush.js").Point} Point */
+/** @typedef {import("./stroke_effects.js").Effect} Effect */
+/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @typedef {import("./message_frames.js").Region} Region */
+/** @typedef {import("./message_frames.js").RGB} RGB */
+/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'ask'} Tool */
+
+/**
+ * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: how many
+ * times as much as before counts what the importance brush goes over. about: whether a drag asks at
+ * a soft spot of that size, or of the object under it; a spot, where that is not said.
+ * @typedef {{tool: Tool, rgb: RGB, as: 'light' | 'look', size: number, hardness: number,
+ *   flow: number, importance: number, about?: 'spot' | 'object'}} Use */
+
+/** Pixels of the screen that a drag goes for one stop, and for one mired. */
+export const DRAG = { stop: 80, mired: 1 };
+
+/** Stops that a drag asks for at most. */
+const MOST_STOPS = 8;
+
+/** @type {Use} */
+export const FIRST = {
+  tool: 'brush',
+  rgb: [1, 1, 1],
+  as: 'look',
+  size: 60,
+  hardness: 0.5,
+  flow: 1,
+  importance: 1,
+};
+
+/** What undo calls a stroke. @type {Record<Tool, string>} */
+export const LABELS = {
+  brush: 'brush',
+  eraser: 'eraser',
+  weight: 'importance',
+  pick: 'pick',
+  fill: 'fill',
+  line: 'line',
+  ask: 'adjust',
+};
+
+/** What brighter and warmer light is. @param {number} stops @param {number} mired
+ * @returns {Effect} */
+export function asking(stops, mired) {
+  return { kind: 'ask', gain: 2 ** stops, tint: warmer(mired) };
+}
+
+/** One stroke. Its methods say what they have changed. */
+export class Stroke {
+  /** @param {PaintCanvas} canvas @param {Use} use @param {Point} point where it begins
+   * @param {number} scale pixels of the screen for each of the picture */
+  constructor(canvas, use, point, scale) {
+    this.canvas = canvas;
+    this.use = use;
+    this.start = point;
+    this.scale = scale;
+    canvas.begin();
+    this.effect = effectOf(canvas, use);
+    this.path = new Path(canvas, use);
+    /** What a drag asks for. */
+    this.asked = { stops: 0, mired: 0 };
+  }
+
+  /** @returns {Region[]} */
+  begin() {
+    const { canvas, use, start } = this;
+    if (use.tool === 'fill') {
+      const object = canvas.objectAt(start.x, start.y);
+      return this.applied([fill(canvas, object, use.flow)]);
+    }
+    if (use.tool !== 'ask') return this.applied(this.path.to(start));
+    const object = canvas.objectAt(start.x, start.y);
+    if (use.about === 'object' && object >= 0) fill(canvas, object, 1);
+    else stamp(canvas, { ...start, pressure: 1 }, { size: 2 * use.size, hardness: 0, flow: 1 });
+    return [];
+  }
+
+  /** @param {Point[]} points @returns {Region[]} */
+  move(points) {
+    const { tool } = this.use;
+    const last = points.at(-1);
+    if (!last || tool === 'fill') return [];
+    if (tool === 'ask') return this.ask(last);
+    if (tool === 'line') return this.line(last);
+    return this.applied(points.flatMap((point) => this.path.to(point)));
+  }
+
+  /** A straight line from where it began. @param {Point} to @returns {Region[]} */
+  line(to) {
+    const { canvas, use, start } = this;
+    const before = canvas.uncover();
+    canvas.region = null;
+    const path = new Path(canvas, use);
+    // Its last stamp is at its end.
+    const length = Math.hypot(to.x - start.x, to.y - start.y);
+    path.step = length / Math.max(1, Math.ceil(length / path.step)) || path.step;
+    const regions = [...path.to({ ...start, pressure: 1 }), ...path.to({ ...to, pressure: 1 })];
+    return [...(before ? [before] : []), ...this.applied(regions)];
+  }
+
+  /** @param {Point} to @returns {Region[]} */
+  ask(to) {
+    const { start, scale, canvas } = this;
+    const stops = ((start.y - to.y) * scale) / DRAG.stop;
+    const mired = ((to.x - start.x) * scale) / DRAG.mired;
+    this.asked = { stops: Math.min(MOST_STOPS, Math.max(-MOST_STOPS, stops)), mired };
+    this.effect = asking(this.asked.stops, mired);
+    return this.applied(canvas.region ? [canvas.region] : []);
+  }
+
+  /** @param {Region[]} regions @returns {Region[]} */
+  applied(regions) {
+    for (const region of joined(regions)) this.canvas.apply(region, this.effect);
+    return regions;
+  }
+}
+
+/** Brighter and warmer in an object, or for null everywhere, as a stroke of its own.
+ * @param {PaintCanvas} canvas @param {{stops: number, mired: number, object: number | null}} asked
+ * @returns {Region} */
+export function askFor(canvas, { stops, mired, object }) {
+  canvas.begin();
+  const region = object === null ? flood(canvas) : fill(canvas, object, 1);
+  canvas.apply(region, asking(stops, mired));
+  return region;
+}
+
+/** @param {PaintCanvas} canvas @param {Use} use @returns {Effect} */
+function effectOf(canvas, use) {
+  if (use.tool === 'eraser') return { kind: 'erase', ground: groundOf(canvas) };
+  if (use.tool === 'weight') return { kind: 'weigh', times: use.importance };
+  if (use.tool === 'ask') return asking(0, 0);
+  return { kind: 'paint', rgb: use.rgb, as: use.as };
+}
+
+/** Regions in a few, of which none lies within another: stamps overlap, and each of them would
+ * be worked out again. @param {Region[]} regions @returns {Region[]} */
+function joined(regions) {
+  /** @type {Region[]} */
+  const made = [];
+  for (const region of regions) {
+    const last = made.at(-1);
+    const isNear =
+      last &&
+      region[0] < last[1] &&
+      last[0] < region[1] &&
+      region[2] < last[3] &&
+      last[2] < region[3];
+    if (
+      last &&
+      isNear &&
+      made.length > 0 &&
+      area(around(last, region)) < 2 * area(last) + area(region)
+    )
+      made[made.length - 1] = around(last, region);
+    else made.push(region);
+  }
+  return made;
+}
+
+/** @param {Region} a @param {Region} b @returns {Region} */
+function around(a, b) {
+  return [Math.min(a[0], b[0]), Math.max(a[1], b[1]), Math.min(a[2], b[2]), Math.max(a[3], b[3])];
+}
+
+/** @param {Region} region */
+function area([top, bottom, left, right]) {
+  return (bottom - top) * (right - left);
+}

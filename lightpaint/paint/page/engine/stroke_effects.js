@@ -1,0 +1,98 @@
+/** What a stroke makes of the pixels that it covers. */
+import { luminance } from '../../../viewer/drawing/colour.js';
+import { VALUES } from '../../../viewer/drawing/half.js';
+
+/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @typedef {import("./paint_canvas.js").Tile} Tile */
+/** @typedef {import("./whole_adjustment.js").Ground} Ground */
+/** @typedef {import("./message_frames.js").RGB} RGB */
+
+/**
+ * What a stroke does. paint: the pixel becomes a colour, or light of that colour on its albedo; of
+ * light on what reflects none, as a flame, nothing can be said, and it stays as it is.
+ * erase: it is the present look again, and not painted; of a picture that was asked for as a whole
+ * it is what was asked of that. weigh: it counts so many times as much
+ * as it did; what is not painted is kept as it is, and counts as a stroke would. ask: its light is
+ * multiplied, its luminance times `gain` and its colour by `tint`.
+ * @typedef {{kind: 'paint', rgb: RGB, as: 'light' | 'look'} | {kind: 'erase', ground: Ground | null} |
+ *   {kind: 'weigh', times: number} | {kind: 'ask', gain: number, tint: RGB}} Effect
+ */
+
+/** Importance that is left, or reached, however often it is made less or more. */
+const [LEAST, MOST] = [0.01, 1000];
+
+/** So many times as much, within these; what lies beyond them already does not come nearer.
+ * @param {number} importance @param {number} times */
+function multiplied(importance, times) {
+  const least = Math.min(LEAST, importance);
+  return Math.min(Math.max(MOST, importance), Math.max(least, importance * times));
+}
+
+/** Make light brighter, and warmer. Its luminance is what the gain makes of it, whatever its colour
+ * was. @param {Float64Array} light changed @param {Ground} by */
+function ask(light, { gain, tint }) {
+  const before = luminance(light);
+  for (let c = 0; c < 3; c++) light[c] *= tint[c];
+  const after = luminance(light);
+  const level = after > 0 ? (gain * before) / after : gain;
+  for (let c = 0; c < 3; c++) light[c] *= level;
+}
+
+/** What a stroke does to one pixel, by how that was before and how far it is covered.
+ * @param {PaintCanvas} canvas @param {Effect} effect
+ * @returns {(tile: Tile, q: number, p: number, covered: number) => void} */
+export function changing(canvas, effect) {
+  const { image, importance, present, albedo } = canvas;
+  /** @type {(tile: Tile, q: number, p: number, covered: number, to: (c: number) => number) => void} */
+  const towards = (tile, q, p, covered, to) => {
+    for (let c = 0; c < 3; c++) {
+      const before = tile.image[3 * q + c];
+      image[3 * p + c] = before + covered * (to(c) - before);
+    }
+  };
+  const { full, lift } = canvas;
+  const its = new Float64Array(3); // one for all pixels: they are many
+  /** @type {(tile: Tile, q: number, p: number, covered: number) => void} */
+  const count = (tile, q, p, covered) => {
+    const before = multiplied(tile.importance[q], lift);
+    importance[p] = before < full ? before + covered * (full - before) : before;
+  };
+  switch (effect.kind) {
+    case 'paint': {
+      const { rgb } = effect;
+      const on = effect.as === 'light' ? albedo : null;
+      return (tile, q, p, covered) => {
+        if (on && !VALUES[on[3 * p]] && !VALUES[on[3 * p + 1]] && !VALUES[on[3 * p + 2]]) return;
+        towards(tile, q, p, covered, (c) => (on ? VALUES[on[3 * p + c]] * rgb[c] : rgb[c]));
+        count(tile, q, p, covered);
+      };
+    }
+    case 'erase': {
+      const { ground } = effect;
+      if (ground)
+        return (tile, q, p, covered) => {
+          for (let c = 0; c < 3; c++) its[c] = VALUES[present[3 * p + c]];
+          ask(its, ground);
+          towards(tile, q, p, covered, (c) => its[c]);
+          importance[p] = tile.importance[q] + covered * (1 - tile.importance[q]);
+        };
+      return (tile, q, p, covered) => {
+        towards(tile, q, p, covered, (c) => VALUES[present[3 * p + c]]);
+        importance[p] = tile.importance[q] * (1 - covered);
+      };
+    }
+    case 'weigh':
+      return (tile, q, p, covered) => {
+        towards(tile, q, p, 0, () => 0);
+        const before = tile.importance[q];
+        importance[p] = before + covered * (multiplied(before || 1, effect.times) - before);
+      };
+    case 'ask':
+      return (tile, q, p, covered) => {
+        for (let c = 0; c < 3; c++) its[c] = tile.image[3 * q + c];
+        ask(its, effect);
+        towards(tile, q, p, covered, (c) => its[c]);
+        count(tile, q, p, covered);
+      };
+  }
+}

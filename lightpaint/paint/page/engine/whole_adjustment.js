@@ -1,0 +1,52 @@
+/** What was asked of a whole picture: what lies below the strokes on it. */
+import { luminance } from '../../../viewer/drawing/colour.js';
+import { VALUES } from '../../../viewer/drawing/half.js';
+
+/** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
+/** @typedef {import("./message_frames.js").RGB} RGB */
+/** Luminance times `gain`, colour by `tint`, as an ask has it.
+ * @typedef {{gain: number, tint: RGB}} Ground */
+
+/** Pixels that are looked at, and that are enough. */
+const LOOKED_AT = 4096;
+const ENOUGH = 32;
+
+/** Stops by which one half of them may lie beside the middle. */
+const ALIKE = 0.1;
+
+/** Luminance that says something of a ratio, beside that of the picture's mean. */
+const DARK = 0.01;
+
+/**
+ * Of a picture of which all is painted, by how much it was asked to be brighter and warmer where
+ * nothing else was painted; null where that was not the same all over.
+ * @param {PaintCanvas} canvas @returns {Ground | null}
+ */
+export function groundOf({ isAll, importance, image, present }) {
+  if (!isAll) return null;
+  /** Stops of luminance, and of red and blue over green. @type {[number[], number[], number[]]} */
+  const ratios = [[], [], []];
+  const step = Math.max(1, Math.floor(importance.length / LOOKED_AT));
+  const at = (/** @type {number} */ p, /** @type {boolean} */ isNow) =>
+    [0, 1, 2].map((c) => (isNow ? VALUES[present[3 * p + c]] : image[3 * p + c]));
+  let sum = 0;
+  for (let p = 0; p < importance.length; p += step) sum += luminance(at(p, true));
+  const dark = (DARK * sum * step) / importance.length;
+  for (let p = 0; p < importance.length; p += step) {
+    const [now, then] = [at(p, true), at(p, false)];
+    const isGround = importance[p] <= 1 && luminance(now) > dark;
+    if (!isGround || Math.min(...now, ...then) <= 0) continue;
+    ratios[0].push(Math.log2(luminance(then) / luminance(now)));
+    ratios[1].push(Math.log2((then[0] * now[1]) / (now[0] * then[1])));
+    ratios[2].push(Math.log2((then[2] * now[1]) / (now[2] * then[1])));
+  }
+  if (ratios[0].length < ENOUGH) return null;
+  const [gain, red, blue] = ratios.map(median);
+  const isSame = [gain, red, blue].every(
+    (middle, i) => median(ratios[i].map((x) => Math.abs(x - middle))) <= ALIKE,
+  );
+  return isSame ? { gain: 2 ** gain, tint: [2 ** red, 1, 2 ** blue] } : null;
+}
+
+/** @param {number[]} values */
+const median = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];

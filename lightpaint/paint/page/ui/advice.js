@@ -1,0 +1,125 @@
+/** What keeps the lights from the paint as a button: what letting go of it would do is seen first. */
+
+import { html, useEffect, useRef } from '../vendor/preact.js';
+import { Button, Dialog } from './controls.js';
+import { number, shortened } from './format.js';
+import { Icon } from './icons.js';
+import { put } from './thumbnail.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./ui_state.js").Help} Cause */
+/** @typedef {import("./ui_state.js").Change} Change */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
+
+/** Keys of a light that each kind of wish has. @type {Record<string, string[]>} */
+const KEYS = {
+  off: ['off'],
+  lock: ['lock'],
+  limits: ['limits'],
+  colour: ['color', 'kelvin', 'primaries', 'duv'],
+};
+
+/** What a button does, of one light and of several. @type {Record<string, [string, string]>} */
+const WORDS = {
+  off: ['Turn on', 'Turn on'],
+  lock: ['Unlock', 'Unlock'],
+  limits: ['Remove the limit of', 'Remove the limits of'],
+  colour: ['Any colour for', 'Any colour for'],
+  tie: ['Untie', 'Untie'],
+};
+
+/** The same of all lights. @type {Record<string, string>} */
+const OF_ALL = {
+  hold: 'Loosen hold',
+  colors: 'Any colour',
+  sparse: 'More lights',
+  prefer_current: 'Let lights change',
+};
+
+/** Characters of a light's name on a button, beside which a sentence stands. */
+const ON_BUTTON = 14;
+
+/** What is called so, with its lights. @param {Cause} cause @param {number} [most] characters of a
+ * light's name */
+function nameOf({ kind, names }, most = Infinity) {
+  if (kind in OF_ALL) return OF_ALL[kind];
+  const which = names.length === 1 ? shortened(names[0], most) : `${names.length} lights`;
+  return `${WORDS[kind][names.length === 1 ? 0 : 1]} ${which}`;
+}
+
+/** The same at length. @param {Cause} cause @param {string} name */
+function titleOf({ kind, hold }, name) {
+  if (kind !== 'hold') return name;
+  return hold ? `Loosen the hold to ${number(hold, 2)}` : 'Ignore unpainted parts';
+}
+
+/** The message that lets go of it; null of what was not asked on this page, or is let go already.
+ * @param {Cause} cause @param {Ui} ui @param {Hands["session"]} session @returns {Change | null} */
+function changeOf({ kind, names, hold }, ui, session) {
+  /** @param {string} key @param {any} value @returns {Change} */
+  const set = (key, value) => ({ kind: 'set', fields: { values: { [key]: value } } });
+  if (kind === 'hold') return ui.meant.hold === hold ? null : set('hold', hold);
+  if (kind === 'colors') return ui.meant.colors === 'free' ? null : set('colors', 'free');
+  if (kind === 'sparse' || kind === 'prefer_current')
+    return ui.settings[kind] ? set(kind, null) : null;
+  if (kind === 'tie') {
+    const ties = ui.ties.filter((tie) => !names.some((name) => tie.includes(name)));
+    return ties.length < ui.ties.length ? { kind: 'tie', fields: { ties } } : null;
+  }
+  const keys = KEYS[kind] ?? [];
+  if (!names.every((name) => keys.some((key) => key in (ui.asked[name] ?? {})))) return null;
+  const asked = names.map((name) => [name, without(name, keys, ui, session)]);
+  return { kind: 'ask_all', fields: { asked: Object.fromEntries(asked) } };
+}
+
+/** What stays asked of a light: what a hand had held has before it.
+ * @param {string} name @param {string[]} keys @param {Ui} ui @param {Hands["session"]} session */
+function without(name, keys, ui, session) {
+  const light = ui.lights.findIndex((one) => one.name === name);
+  const isLevel = keys.includes('off') || keys.includes('lock');
+  const asked = (isLevel && session.before.get(light)) || ui.asked[name];
+  return Object.fromEntries(Object.entries(asked).filter(([key]) => !keys.includes(key)));
+}
+
+/** @param {{ui: Ui, hands: Hands}} props */
+export function Help({ ui, hands }) {
+  const { help } = ui;
+  const change = help && changeOf(help, ui, hands.session);
+  if (!help || !change) return null;
+  const name = nameOf(help);
+  const closes = help.closes === null ? '' : `: ${Math.round(100 * help.closes)} % closer`;
+  return html`<${Button} label=${`${nameOf(help, ON_BUTTON)}${closes}`} class="help"
+    tip=${`${name}${closes}. Shows a preview first.`}
+    act=${() => hands.session.preview(titleOf(help, name), change)} />`;
+}
+
+/** The answer as it is and as it would be, before anything is done. @param {{ui: Ui, hands: Hands}}
+ * props */
+export function PreviewDialog({ ui, hands }) {
+  const { preview } = ui;
+  if (!preview) return null;
+  const close = () => hands.store.set({ preview: null });
+  const { label, text, isAtCost, before, after } = preview;
+  return html`<${Dialog} title=${label} close=${close} class="preview">
+    <div class="pair">
+      <${Small} picture=${before} caption="Before" /><${Small} picture=${after} caption="After" />
+    </div>
+    <p class=${isAtCost ? 'is-bad' : ''} role="status">
+      ${isAtCost && html`<${Icon} name="warn" />`}
+      <span>${text || 'Computing the preview …'}</span></p>
+    <div class="row"><${Button} label="Cancel" act=${close} />
+      <${Button} label="Apply" primary disabled=${!text} act=${() => hands.session.makeChange()} />
+    </div>
+  </${Dialog}>`;
+}
+
+/** @param {{picture: import("./engine_interface.js").Picture | null, caption: string}} props */
+function Small({ picture, caption }) {
+  const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  useEffect(() => {
+    if (picture && ref.current) put(ref.current, picture);
+  }, [picture]);
+  return html`<figure><canvas ref=${ref} width="16" height="9" role="img"
+    aria-label=${caption === 'Before' ? 'The answer before the change' : 'The answer after it'}></canvas>
+    <figcaption>${caption}</figcaption></figure>`;
+}

@@ -1,0 +1,240 @@
+/** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
+
+import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/preact.js';
+import { Bar } from './progress_bar.js';
+import { Button, Choice, Whole, comeInto } from './controls.js';
+import { lightText, number, progressText, shortened } from './format.js';
+import { Help } from './advice.js';
+import { Icon } from './icons.js';
+import { isUnseen, keepLook } from './look_actions.js';
+import { exposureOf, overlayOf } from './ui_state.js';
+import { hintOf, look } from './tools.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./engine_interface.js").Pane} Pane */
+
+const OVERLAYS = [
+  { value: null, label: 'None' },
+  { value: 'missed', label: 'Difference', tip: 'Where the answer differs from the painting' },
+  { value: 'beyond', label: 'Out of reach', tip: 'What no setting of these lights can do' },
+  { value: 'falsecolor', label: 'False colour', tip: 'Brightness in stops' },
+  { value: 'importance', label: 'Importance', tip: 'What is painted, and how much it counts' },
+];
+
+const PAINTED = 'painted';
+
+/** What colours of an overlay mean; hatches say the same. @type {Record<string, string[]>} */
+const MEANINGS = {
+  missed: ['too dark', 'matches', 'too bright'],
+  beyond: ['in reach', 'out of reach'],
+  falsecolor: ['−6 stops', 'grey', '+6'],
+  importance: ['unpainted', PAINTED],
+};
+
+/** @param {{ui: Ui, hands: Hands}} props */
+export function TruthPanel({ ui, hands }) {
+  const { session, store } = hands;
+  const choose = (/** @type {any} */ overlay) => look(store, { overlay });
+  const frame = useRef(/** @type {HTMLElement | null} */ (null));
+  // Reasons take more room than what was there before them.
+  useLayoutEffect(() => {
+    const panel = /** @type {HTMLElement | null | undefined} */ (frame.current?.closest('.fold'));
+    if (panel && ui.explained.length && isInSight(panel))
+      panel.scrollIntoView({ block: 'nearest' });
+  }, [ui.explained]);
+  // The first of them stands below the pictures, too.
+  const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
+    (text) => text !== ui.headline,
+  );
+  return html`<div class="truth" ref=${frame}>
+    <${Choice} label="Overlay" value=${ui.show.overlay} choices=${OVERLAYS}
+      change=${choose} />
+    ${sentences.map((text) => html`<p key=${text}>${text}</p>`)}
+    <div class="row">
+      <${Button} label=${ui.explaining ? 'Finding reasons …' : 'Why not closer?'}
+        disabled=${ui.explaining} act=${() => session.explain()}
+        tip="What keeps the answer from matching the painting" />
+      ${ui.explaining && html`<${Bar} progress=${{ done: 0, total: 0 }} label="Finding reasons" />`}
+      ${ui.state?.can_render && html`<${Verify} ui=${ui} hands=${hands} />`}
+    </div>
+    ${ui.verified && html`<${Verified} ui=${ui} hands=${hands} />`}
+  </div>`;
+}
+
+/** Whether somebody sees some of a panel among those at the side. @param {HTMLElement} panel */
+function isInSight(panel) {
+  const [its, room] = [panel, /** @type {HTMLElement} */ (panel.parentElement)].map((one) =>
+    one.getBoundingClientRect(),
+  );
+  return its.top < room.bottom - 60 && its.bottom > room.top + 60;
+}
+
+/** CSS pixels of a legend, of one on a single line, and between it and its picture. */
+const LEGEND = { width: 210, height: 60, low: 22, gap: 8 };
+
+/** Where it covers nothing: below the picture, else beside it; where its pane has no room for that,
+ * on it, on a low line. @param {Pane} pane @param {[height: number, width: number]} size */
+function placed(pane, [rows, columns]) {
+  const { width, height, low, gap } = LEGEND;
+  const left = Math.max(pane.x, pane.left);
+  // The handle of the wipe lies there.
+  const inside = left > Math.max(0, pane.left) ? 3 * gap : gap;
+  const right = Math.min(pane.x + pane.width, pane.left + columns * pane.scale);
+  const bottom = Math.min(pane.y + pane.height, pane.top + rows * pane.scale);
+  const below = pane.y + pane.height - bottom;
+  if (below >= height + gap) return { left: left + inside, top: bottom + gap };
+  if (below >= low + 4) return { left: left + inside, top: bottom + 2, isLow: true };
+  const room = width + 2 * gap;
+  if (pane.x + pane.width - right >= room) return { left: right + gap, top: bottom - height };
+  if (left - pane.x >= room) return { left: left - gap - width, top: bottom - height };
+  return { left: left + inside, top: bottom - low - gap, isLow: true };
+}
+
+/** What the colours over a picture mean, at that picture. What is out of reach is found anew when it
+ * is looked at and the answer is another one.
+ * @param {{ui: Ui, hands: Hands, panes: Pane[]}} props */
+export function Legend({ ui, hands, panes }) {
+  const overlay = overlayOf(ui);
+  const isSought = overlay === 'beyond' && ui.deltaE !== null && !ui.isLive && !ui.explained.length;
+  useEffect(() => {
+    if (isSought && !ui.explaining) hands.session.explain();
+  }, [isSought, ui.explaining]);
+  const isCounted = overlay === 'importance';
+  const most = useMemo(
+    () => (isCounted ? hands.engine.greatest() : 1),
+    [isCounted, ui.version, ui.weights, ui.view],
+  );
+  const on = overlay === 'importance' ? 'painting' : 'solution';
+  const pane =
+    panes.find(({ kind }) => kind === on) ?? (overlay === 'falsecolor' ? panes[0] : undefined);
+  if (!overlay || !pane) return null;
+  const { label } = OVERLAYS.find(({ value }) => value === overlay) ?? OVERLAYS[0];
+  const isOld = overlay === 'beyond' && !ui.explained.length;
+  const { left, top, isLow } = placed(pane, ui.state.size);
+  const words = MEANINGS[overlay].map((text) =>
+    text === PAINTED && most > 1 ? `weight ${number(most, 2)} ×` : text,
+  );
+  return html`<div class=${`legend ${isLow ? 'is-low' : ''}`}
+    style=${{ top: `${top}px`, left: `${left}px` }}>
+    <b>${label}${isOld && ui.deltaE !== null ? ': computing …' : ''}</b>
+    <i class=${`is-${overlay}`}></i>
+    ${words.map((text, k) => html`<span key=${k}>${text}</span>`)}
+  </div>`;
+}
+
+/** @param {{ui: Ui, hands: Hands}} props */
+function Verify({ ui, hands }) {
+  const { session } = hands;
+  if (!ui.verifying) {
+    // Not by the second click of a double click on "Analysis", under which it comes to lie.
+    const begin = (/** @type {MouseEvent} */ { detail }) => detail < 2 && session.verify();
+    return html`<${Button} label="Verify" icon="camera" act=${begin}
+      tip="Render the scene with this lighting, and compare" />`;
+  }
+  return html`<${Button} label="Stop" icon="close" act=${() => session.verify(false)} />
+    <${Bar} progress=${ui.verifying} label="Verifying" />
+    <span class="faint">${progressText(ui.verifying)}</span>`;
+}
+
+/** @param {{ui: Ui, hands: Hands}} props */
+function Verified({ ui, hands }) {
+  const { verified, show } = ui;
+  const frame = useRef(/** @type {HTMLElement | null} */ (null));
+  // It may have come below what there is room for.
+  useLayoutEffect(() => frame.current?.scrollIntoView?.({ block: 'nearest' }), [verified]);
+  if (!verified) return null;
+  const isShown = show.left === 'solution' && show.right === 'verified';
+  const compare = () => {
+    hands.store.set({ mix: null });
+    look(
+      hands.store,
+      isShown
+        ? { left: 'painting', right: 'solution', layout: 'side' }
+        : { left: 'solution', right: 'verified', layout: 'wipe', instead: null },
+    );
+  };
+  return html`<div ref=${frame} class=${`verified ${verified.agrees ? 'is-good' : 'is-bad'}`}>
+    <p><${Icon} name=${verified.agrees ? 'check' : 'warn'} /><span>${verified.text}${
+      verified.isOld ? ' (of an earlier answer)' : ''
+    }</span></p>
+    <${Button} label="Answer | Render" icon="wipe" on=${isShown} act=${compare} />
+  </div>`;
+}
+
+const DELTA_E =
+  'Mean colour difference from the painting (ΔE 2000), and what it was with the present lighting. 1 is just visible, 5 is obvious.';
+
+const STATES = {
+  live: 'A quick answer while you paint. The exact one follows.',
+  analysing: 'The lights are solved. The sentence still describes the answer before.',
+  'answer not shown': 'The sentence describes the answer, which is neither of the looks compared.',
+};
+
+/** Below the pictures, in one sentence: how close the answer comes.
+ * @param {{ui: Ui, hands: Hands}} props */
+export function AnswerLine({ ui, hands }) {
+  const { store } = hands;
+  const text = ui.headline || (ui.ready ? 'Solving …' : '');
+  const isOpen = ui.side && !ui.panel && ui.open.truth;
+  const isOld = ui.headline !== '' && !ui.isJudged;
+  const busy = ui.isLive ? 'live' : isOld ? 'analysing' : null;
+  const isApart = isUnseen(ui);
+  const state = isApart && text ? 'answer not shown' : busy;
+  const turn = (/** @type {MouseEvent} */ event) => {
+    const button = /** @type {HTMLElement} */ (event.currentTarget);
+    store.set({ side: true, panel: null, open: { ...ui.open, truth: !isOpen } });
+    if (!isOpen) comeInto(button, '.is-truth');
+  };
+  return html`<div class="answer">
+    <p class=${`headline ${isOld || isApart ? 'is-old' : ''}`} role="status">
+      <${Whole} class="said" text=${text} most=${100} />
+      ${
+        // In one place, so that the sentence keeps its lines.
+        state && html`<span class="live" data-tip=${STATES[state]}><b>${state}</b></span>`
+      }
+      ${
+        !state &&
+        ui.deltaE !== null &&
+        html`<span class="faint" data-tip=${DELTA_E}>ΔE ${number(ui.deltaE, 2)}${
+          ui.deltaAsked !== null && html`<span class="was">, was ${number(ui.deltaAsked, 2)}</span>`
+        }</span>`
+      }
+    </p>
+    <${Help} ui=${ui} hands=${hands} />
+    ${
+      ui.ready &&
+      html`<${Button} label="Save look" icon="plus" keys="Control+S"
+      tip="Save painting and answer as a look"
+      act=${() => keepLook(hands)} />`
+    }
+    ${
+      // It stays where it is when it is pressed: nothing else slides under the pointer.
+      ui.ready && html`<${Button} label="Analysis" on=${isOpen} act=${turn} />`
+    }
+  </div>`;
+}
+
+/** What light is under the pointer, and which lights make it up; else what the tool does.
+ * @param {{ui: Ui}} props */
+export function Here({ ui }) {
+  if (!ui.pointed) {
+    const text = ui.ready ? hintOf(ui.tool) : ''; // there is nothing to drag on yet
+    return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;
+  }
+  const { object, shares, light } = ui.pointed;
+  const exposed = light.map((x) => x * 2 ** exposureOf(ui.state));
+  const most = (isUnseen(ui) ? [] : shares)
+    .map((share, k) => ({ share, k }))
+    .filter(({ share }) => share >= 0.01)
+    .sort((a, b) => b.share - a.share)
+    .slice(0, 5);
+  return html`<p class="here" id="lp-status">${object && html`<span class="object">${shortened(object, 40)}</span>`}
+    <span class="light-here">${lightText(exposed)}${
+      ui.tool === 'pick' && html` · RGB ${exposed.map((x) => number(x, 3)).join(' ')}`
+    }</span>
+    ${most.map(
+      ({ share, k }) => html`<span key=${k}>${shortened(ui.lights[k]?.label ?? '', 24)}
+      <b>${Math.round(100 * share)} %</b></span>`,
+    )}</p>`;
+}

@@ -1,0 +1,103 @@
+/** What a browser remembers of the interface from one time to the next: folds, and what the hand had. */
+
+import { LEAST_SIZE, MOST_SIZE, used } from './tools.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./ui_state.js").UiStore} UiStore */
+/** @typedef {import("./tools.js").Paint} Paint */
+/** @typedef {import("./engine_interface.js").RGB} RGB */
+
+/** Where it lies. What was kept by an older page, or by somebody else, is looked at before it counts. */
+const [FOLDS, HAND] = ['lightpaint.open', 'lightpaint.hand'];
+
+/** @param {string} key @returns {Record<string, unknown>} */
+function read(key) {
+  try {
+    const found = JSON.parse(localStorage.getItem(key) ?? '{}');
+    return found && typeof found === 'object' ? found : {};
+  } catch {
+    return {};
+  }
+}
+
+/** @param {string} key @param {object} value */
+function write(key, value) {
+  try {
+    localStorage.setItem(key, JSON.stringify(value));
+  } catch {
+    // Private windows, and frames of some notebooks, keep nothing.
+  }
+}
+
+/** What was unfolded the last time. @returns {Record<string, boolean>} */
+export function openBefore() {
+  const folds = Object.entries(read(FOLDS)).filter(([, value]) => typeof value === 'boolean');
+  return /** @type {Record<string, boolean>} */ (Object.fromEntries(folds));
+}
+
+/** What the hand had the last time, of that what is sound.
+ * @returns {Partial<Ui>} the size as it is kept: as a part of the picture's height, in `share` */
+export function handBefore() {
+  const kept = read(HAND);
+  const paint = paintIn(kept);
+  const second = paintIn(kept.second);
+  const shares = { flow: 0.01, fillFlow: 0.01, hardness: 0 };
+  const found = Object.entries(shares).filter(([key, least]) => isWithin(kept[key], least, 1));
+  return {
+    ...Object.fromEntries(found.map(([key]) => [key, kept[key]])),
+    ...paint,
+    ...(second ? { second } : {}),
+    recent: usedIn(kept),
+  };
+}
+
+/** Colours that were used lately. @param {Record<string, unknown>} kept @returns {Paint[]} */
+function usedIn({ recent }) {
+  const all = Array.isArray(recent) ? recent.map(paintIn) : [];
+  return used(/** @type {Paint[]} */ (all.filter((one) => one !== null)));
+}
+
+/** The size of the brush in a picture of a height: what it was in another one, else a seventh.
+ * @param {number} height in pixels */
+export function sizeBefore(height) {
+  const { share } = read(HAND);
+  const size = isWithin(share, 0, 10) ? Number(share) * height : Math.max(4, 0.14 * height);
+  return Math.round(Math.min(MOST_SIZE, Math.max(LEAST_SIZE, size)));
+}
+
+/** @param {any} kept @returns {Paint | null} */
+function paintIn(kept) {
+  const { colour, stops } = kept ?? {};
+  const isColour =
+    Array.isArray(colour) && colour.length === 3 && colour.every((x) => isWithin(x, 0, 1));
+  return isColour && isWithin(stops, -32, 32)
+    ? { colour: /** @type {RGB} */ (colour), stops }
+    : null;
+}
+
+/** @param {unknown} x @param {number} least @param {number} most */
+const isWithin = (x, least, most) => typeof x === 'number' && x >= least && x <= most;
+
+/** Keep it from now on. @param {UiStore} store @returns {() => void} what ends it */
+export function keep(store) {
+  let last = store.value;
+  return store.listen(() => {
+    const before = last;
+    last = store.value;
+    if (last.open !== before.open) write(FOLDS, last.open);
+    // The hand that a page begins with is what was read, maybe long before there is a scene.
+    if (!last.state || !before.state) return;
+    if (HELD.some((key) => last[key] !== before[key])) write(HAND, handOf(last));
+  });
+}
+
+/** What the hand has. @type {(keyof Ui)[]} */
+const HELD = ['colour', 'stops', 'second', 'recent', 'flow', 'fillFlow', 'hardness', 'size'];
+
+/** What is in the hand; and what was used lately, also in a painter that is open beside this one.
+ * @param {Ui} ui */
+function handOf({ colour, stops, second, recent: own, flow, fillFlow, hardness, size, state }) {
+  const share = size / state.size[0];
+  const recent = used([...own, ...usedIn(read(HAND))]);
+  return { colour, stops, second, recent, flow, fillFlow, hardness, share };
+}

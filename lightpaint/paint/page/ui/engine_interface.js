@@ -1,0 +1,106 @@
+/**
+ * What the interface wants of the picture engine and of its host: all that crosses between them.
+ * Whoever mounts the painter brings both.
+ */
+
+/** @typedef {import("../engine/messages.js").RGB} RGB */
+/** @typedef {import("../engine/messages.js").Requests} Requests */
+/** @typedef {import("../engine/socket_host.js").Heard} Heard */
+/** @typedef {{data: any, shape: number[]}} Picture */
+/** @typedef {{kind: string, reply?: number, arrays?: Record<string, Picture>, [field: string]: any}} Message */
+
+/**
+ * The session, wherever it is: behind a socket, or a notebook's model.
+ * `on` hears messages of a kind, asked for or not, and "connection" with
+ * {state: "open" | "lost" | "stale"}, and "silence" with {isSilent}. `send` is answered by the reply.
+ * @typedef {object} Host
+ * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K],
+ *   arrays?: Record<string, Picture>) => Promise<Message>} send
+ * @property {<K extends keyof Heard>(kind: K, hear: (message: Heard[K]) => void) => void} on
+ * @property {(name: string) => Promise<Picture>} fetch
+ * @property {() => void} close
+ */
+
+/** @typedef {"painting" | "solution" | "other" | "verified" | "present"} Kind */
+
+/**
+ * What is drawn, and how. `gains`: which lights are heard, by solo and mute; null for all.
+ * `instead`, `other`: weights that "solution" and "other" are shown with; null for the answer's.
+ * @typedef {object} Show
+ * @property {Kind} left
+ * @property {Kind} right
+ * @property {"side" | "wipe" | "blink"} layout
+ * @property {number} wipe
+ * @property {"left" | "right"} blink
+ * @property {number} zoom
+ * @property {[number, number]} pan
+ * @property {number} stops
+ * @property {string} transform
+ * @property {boolean} clean
+ * @property {null | "missed" | "beyond" | "falsecolor" | "importance"} overlay
+ * @property {boolean[] | null} gains
+ * @property {RGB[] | null} instead
+ * @property {RGB[] | null} other
+ */
+
+/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "ask"} Tool */
+
+/**
+ * The tool in the hand. `rgb`: linear light of the colour, its stops included. `size`: diameter in
+ * pixels of the picture. `importance`: how many times as much as before counts what the importance
+ * brush goes over.
+ * @typedef {object} Use
+ * @property {Tool} tool
+ * @property {RGB} rgb
+ * @property {"light" | "look"} as
+ * @property {number} size
+ * @property {number} hardness
+ * @property {number} flow
+ * @property {number} importance
+ * @property {"spot" | "object"} about what a drag asks about
+ */
+
+/** In pixels of the picture. @typedef {{x: number, y: number, pressure: number}} Point */
+/** In CSS pixels of the element. @typedef {{kind: Kind, x: number, y: number, width: number,
+ *   height: number, left: number, top: number, scale: number}} Pane */
+
+/**
+ * What is under the pointer. `object`: its name, `index`: its number, -1 for none. `shares`: of
+ * each light in the answer's light there. `light`: that of the picture that is pointed at.
+ * @typedef {{object: string | null, index: number, shares: number[], light: RGB,
+ *   paint: RGB}} Pointed paint: what to paint with, as the hand does, to have that light there */
+/** Numbers of objects, (height, width).
+ * @typedef {{data: ArrayLike<number>, width: number, height: number}} Objects */
+
+/**
+ * @typedef {object} Engine
+ * @property {HTMLElement} element where the pictures are drawn
+ * @property {(width: number, height: number) => void} resize in CSS pixels
+ * @property {(show: Show) => void} show
+ * @property {(use: Use) => void} use
+ * @property {() => Pane[]} panes
+ * @property {(view: number) => void} see another view: what is shown, and painted
+ * @property {(x: number, y: number, factor: number) => {zoom: number, pan: [number, number]}} zoomAt
+ * @property {(point: Point) => void} begin a stroke of the tool in the hand
+ * @property {(points: Point[]) => void} move
+ * @property {() => void} end
+ * @property {() => boolean} cancel the stroke that has begun; whether there was one
+ * @property {(from: Point, to: Point) => void} line a straight stroke, whole
+ * @property {(asked: {stops: number, mired: number, object: number | null}) => void} ask
+ *   brighter and warmer by so much, in an object or, for null, in the whole picture
+ * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
+ * @property {(kind: Kind, x: number, y: number, light?: RGB) => RGB} paintAt what to paint with, in the manner
+ *   that is in the hand, to have that light there
+ * @property {(x: number, y: number) => Omit<Pointed, 'light' | 'paint'> | null} pointed
+ * @property {() => Objects | null} objects which object each pixel shows, once that is known
+ * @property {() => number} greatest importance that is painted; 1 at least
+ * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
+ * @property {(name: string, hear: (event: any) => void) => void} on "message": an answer to a
+ *   stroke; "loading": {done, total, isFirst} pictures, where some of
+ *   the lights have none yet; "asking": {stops, mired} while a drag asks;
+ *   "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not
+ *   sent any more, since another page has painted meanwhile, or the session is there no more; "trouble": {text}
+ * @property {() => void} close
+ */
+
+export {};

@@ -1,0 +1,176 @@
+/** The list of lights: search, sort, groups that fold, a row for each light. */
+
+import { inView } from '../engine/message_frames.js';
+import { html } from '../vendor/preact.js';
+import { luminance } from './paint_colour.js';
+import { Button, Select, Whole } from './controls.js';
+import { askedOf, heldOf, tieOf } from './tied_lights.js';
+import { counted, percent } from './format.js';
+import { Icon } from './icons.js';
+import { comparedAnswer, isUnseen } from './look_actions.js';
+import { LightRow } from './light_row.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./ui_state.js").UiStore} UiStore */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
+
+const SORTS = [
+  { value: 'scene', label: 'Scene order' },
+  { value: 'name', label: 'Name' },
+  { value: 'share', label: 'Largest share' },
+  { value: 'change', label: 'Most changed' },
+];
+
+/** With more lights than these, only rows that are unfolded have their slider. */
+const MANY = 16;
+
+/** @param {{ui: Ui, hands: Hands}} props */
+export function LightsPanel({ ui, hands }) {
+  const { store } = hands;
+  const found = sorted(ui, matching(ui));
+  const groups = grouped(ui, found);
+  const isMany = ui.lights.length > MANY;
+  return html`<div class=${`lights ${isUnseen(ui) ? 'is-unseen' : ''}`}>
+    ${
+      ui.lights.length > 5 &&
+      html`<div class="lights-tools">
+      <label class="field search"><span class="only-read">Search lights</span>
+        <${Icon} name="search" /><input type="search" value=${ui.search} placeholder="Search"
+          onInput=${(/** @type {any} */ event) =>
+            store.set({ search: event.currentTarget.value })} /></label>
+      <${Select} label="Sort by" hidden value=${ui.sort} choices=${SORTS} tip="Sort by"
+        change=${(/** @type {any} */ sort) => store.set({ sort })} />
+    </div>`
+    }
+    ${ui.ready && !found.length && html`<p class="faint">No light has this name.</p>`}
+    ${groups.map(({ name, members }) =>
+      name === null
+        ? members.map((k) => row(ui, hands, k, isMany))
+        : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} hands=${hands}
+          members=${members} isMany=${isMany} />`,
+    )}
+  </div>`;
+}
+
+/** Beside the title, where it moves no row: some lights are not shown; or of which of two looks
+ * they are; or several are held. @param {{ui: Ui, hands: Hands}} props */
+export function OfAll({ ui, hands }) {
+  const isPart = ui.solo.length > 0 || ui.mute.length > 0;
+  if (ui.mix && !isPart) {
+    const whose = comparedAnswer(ui)?.name ?? 'the answer (not shown)';
+    return html`<${Whole} class="whose" text=${`of ${whose}`} most=${20} />`;
+  }
+  const held = heldOf(ui).length;
+  if (!isPart && held < 2) return null;
+  if (!isPart) {
+    return html`<${Button} label="Unlock all" class="of-all" act=${() => hands.session.releaseAll()}
+      tip=${`${held} lights are locked or off. Let the solve set them again.`} />`;
+  }
+  return html`<${Button} label="Show all" class="of-all"
+    tip="Solo or mute hides some lights. The answer has them all."
+    act=${() => hands.store.set({ solo: [], mute: [] })} />`;
+}
+
+/** @param {Ui} ui @param {Hands} hands @param {number} k @param {boolean} isMany */
+function row(ui, hands, k, isMany) {
+  const light = ui.lights[k];
+  const isOpen = ui.unfolded.includes(k);
+  return html`<${LightRow} key=${light.name} k=${k} light=${light} hands=${hands}
+    rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${askedOf(ui, k)} tied=${tieOf(ui, k)}
+    isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
+    here=${ui.pointed?.shares[k]} hasSlider=${isOpen || !isMany}
+    picture=${inView(`thumb/${k}`, ui.view)} thumb=${ui.resources[inView(`thumb/${k}`, ui.view)]}
+    others=${isOpen ? ui.lights : undefined} />`;
+}
+
+/** @param {{name: string, ui: Ui, hands: Hands, members: number[], isMany: boolean}} props */
+function Group({ name, ui, hands, members, isMany }) {
+  const { store } = hands;
+  const key = `group ${name}`;
+  const open = ui.open[key] ?? true;
+  const share = members.reduce((sum, k) => sum + (ui.lit[k]?.share ?? 0), 0);
+  const isSolo = members.every((k) => ui.solo.includes(k));
+  const solo = ui.solo.filter((k) => !members.includes(k));
+  return html`<div class="light-group" role="group" aria-label=${name}>
+    <div class="group-head">
+      <button type="button" class="group-name" aria-expanded=${String(open)} data-tip=${name}
+        onClick=${() => store.set({ open: { ...ui.open, [key]: !open } })}>
+        <${Icon} name="fold" /><strong>${name}</strong>
+        <span class="faint">${counted(members.length, 'light')} · ${percent(share)}</span></button>
+      <${Button} label="S" class="letter" on=${isSolo} tip=${`Show ${name} alone`}
+        act=${() => store.set({ solo: isSolo ? solo : [...solo, ...members] })} />
+    </div>
+    ${open && members.map((k) => row(ui, hands, k, isMany))}
+  </div>`;
+}
+
+/** @param {Ui} ui @returns {number[]} */
+function matching(ui) {
+  const words = ui.search.toLowerCase().split(/\s+/).filter(Boolean);
+  return ui.lights
+    .map((_, k) => k)
+    .filter((k) => {
+      const { name, label, group, members } = ui.lights[k];
+      const text = [name, label, group, ...members].join(' ').toLowerCase();
+      return words.every((word) => text.includes(word));
+    });
+}
+
+/** @param {Ui} ui @param {number[]} found @returns {number[]} */
+function sorted(ui, found) {
+  const name = (/** @type {number} */ k) => ui.lights[k].label;
+  const share = (/** @type {number} */ k) => ui.lit[k]?.share ?? 0;
+  const change = (/** @type {number} */ k) => {
+    const [a, b] = [
+      luminance(ui.lit[k]?.emission ?? ui.lights[k].present),
+      luminance(ui.lights[k].present),
+    ];
+    return Math.abs(Math.log2((a + 1e-9) / (b + 1e-9)));
+  };
+  const made = [...found];
+  if (ui.sort === 'name') {
+    made.sort((a, b) => name(a).localeCompare(name(b), undefined, { numeric: true }));
+  }
+  if (ui.sort === 'share') made.sort((a, b) => share(b) - share(a));
+  if (ui.sort === 'change') made.sort((a, b) => change(b) - change(a));
+  return made;
+}
+
+/** Lights that belong together come under one name, at the place of the first of them.
+ * @param {Ui} ui @param {number[]} found @returns {{name: string | null, members: number[]}[]} */
+function grouped(ui, found) {
+  const names = ui.lights.map((_, k) => groupOf(ui, k));
+  /** @type {{name: string | null, members: number[]}[]} */
+  const made = [];
+  for (const k of found) {
+    const count = names.filter((one) => one === names[k]).length;
+    const name = count >= (isStem(ui, k) ? FEWEST : 2) ? names[k] : null;
+    const same = name === null ? undefined : made.find((one) => one.name === name);
+    if (same) same.members.push(k);
+    else made.push({ name, members: [k] });
+  }
+  return made;
+}
+
+/** Lights whose names begin alike that are folded together, at least. */
+const FEWEST = 3;
+
+/** On one dimmer; of one group; or, of many lights, of names that begin alike.
+ * @param {Ui} ui @param {number} k @returns {string | null} */
+function groupOf(ui, k) {
+  const { name, group } = ui.lights[k];
+  const tie = tieOf(ui, k);
+  const others = tie && (tie.length === 2 ? tie[1] : `${tie.length - 1} more`);
+  if (tie) return `${tie[0]} and ${others}, tied`;
+  return group ?? (ui.lights.length > MANY ? stemOf(name) : null);
+}
+
+/** @param {Ui} ui @param {number} k */
+function isStem(ui, k) {
+  return !ui.lights[k].group && !tieOf(ui, k);
+}
+
+/** `window` of `window_12`, `cyc` of `cyc left`. @param {string} name @returns {string | null} */
+function stemOf(name) {
+  return /^[^\s_.:/\-\d]+/.exec(name)?.[0] ?? null;
+}

@@ -1,0 +1,216 @@
+/** One light: what it is in the answer, whether it is shown, and its dimmer. */
+
+import { Component, html } from '../vendor/preact.js';
+import { atFull, luminance, toHex, toKelvin } from './paint_colour.js';
+import { Asking } from './light_constraints.js';
+import { Button, Slider } from './controls.js';
+import { number, percent, stopsText, whiteText } from './format.js';
+import { Icon } from './icons.js';
+import { BRIGHTEST, DARKEST, Level, atLevel, nowOf, stopsOf } from './level_field.js';
+import { Thumb } from './thumbnail.js';
+
+/** @typedef {import("./ui_state.js").Light} Light */
+/** @typedef {import("./ui_state.js").Lit} Lit */
+/** @typedef {import("./ui_state.js").Asked} Asked */
+/** @typedef {import("./engine_interface.js").RGB} RGB */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
+/**
+ * @typedef {{k: number, light: Light, hands: Hands, rgb: RGB, lit?: Lit, asked?: Asked,
+ *   tied?: string[], isLive: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
+ *   here?: number, hasSlider: boolean, picture: string, thumb?: number, others?: Light[]}} Props
+ */
+
+/** @extends {Component<Props>} */
+export class LightRow extends Component {
+  /** The light as it was when its dimmer was taken in hand: on the way through the dark it keeps its
+   * colour. @type {RGB | null} */
+  grasped = null;
+
+  /** A pointer that moves over the picture changes few of many rows. @param {Props} next */
+  shouldComponentUpdate(next) {
+    const keys = /** @type {(keyof Props)[]} */ (Object.keys({ ...this.props, ...next }));
+    return keys.some((key) =>
+      key === 'here' ? heard(this.props.here) !== heard(next.here) : next[key] !== this.props[key],
+    );
+  }
+
+  /** A row that goes away under the pointer is not told that the pointer has left. */
+  componentWillUnmount() {
+    const { k, hands } = this.props;
+    if (hands.store.value.hovered === k) hands.store.set({ hovered: null });
+  }
+
+  render() {
+    const { k, light, hands, isOpen, hasSlider, here, isMute, asked } = this.props;
+    const { store } = hands;
+    const dim = isMute || asked?.off ? 'is-dim' : '';
+    const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered });
+    return html`<div class=${`light ${dim} ${isOpen ? 'is-open' : ''}`} role="group"
+      aria-label=${light.label} data-light=${light.name}>
+      <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}>
+        <${Thumb} name=${this.props.picture} generation=${this.props.thumb} hands=${hands} />
+        <${Share} share=${this.props.lit?.share ?? 0} here=${here} />
+        <${Badge} ...${this.props} />
+      </div>
+      <div class="light-main">
+        <div class="light-head">
+          <button type="button" class="light-name" aria-expanded=${String(isOpen)}
+            aria-label=${light.label} onClick=${() => unfold(store, k)} data-tip=${
+              light.members.length > 1
+                ? `${light.label}: ${light.members.join(', ')}`
+                : `${light.label}, ${light.plugin}`
+            }>
+            <${Icon} name="fold" /><span class="its-name"><${Name} name=${light.label} /></span></button>
+          ${this.marks()}
+        </div>
+        ${this.numbers()}
+        ${hasSlider && !light.is_fixed && this.dimmer()}
+      </div>
+      ${isOpen && html`<${Asking} ...${this.props} />`}
+    </div>`;
+  }
+
+  /** Shown or not; then, apart, what is asked of the solve. */
+  marks() {
+    const { k, light, hands, isSolo, isMute, asked = {} } = this.props;
+    const { store, session } = hands;
+    const turn = (/** @type {"solo" | "mute"} */ key, /** @type {boolean} */ on) =>
+      store.set((ui) => ({ [key]: on ? ui[key].filter((one) => one !== k) : [...ui[key], k] }));
+    const isHeld = asked.lock !== undefined || Boolean(asked.off);
+    const lock = () => (isHeld ? session.release(k) : session.hold(k, this.props.rgb, true));
+    return html`<span class="marks" role="group" aria-label="Display">
+      <${Button} label="S" class="letter" on=${isSolo} act=${() => turn('solo', isSolo)}
+        tip=${`Solo: show ${light.label} alone. The answer does not change.`} />
+      <${Button} label="M" class="letter" on=${isMute} act=${() => turn('mute', isMute)}
+        tip=${`Mute: show the picture without ${light.label}. The answer does not change.`} />
+    </span>
+    ${
+      !light.is_fixed &&
+      html`<span class="marks is-solve" role="group"
+      aria-label="Solve">
+      <${Button} icon="lock" on=${isHeld} act=${lock} tip=${
+        isHeld
+          ? `Unlock ${light.label}: the solve sets it again`
+          : `Lock ${light.label} as it is in the answer`
+      } />
+    </span>`
+    }`;
+  }
+
+  numbers() {
+    const { light, rgb, lit, isLive } = this.props;
+    const level = luminance(rgb);
+    const found = toKelvin(rgb);
+    const kelvin = isLive || !lit ? found?.kelvin : lit.kelvin;
+    const white = kelvin && whiteText(kelvin, found?.green ?? 0);
+    const value = [white, number(level)].filter(Boolean).join(' · ');
+    const error = lit?.error ?? '';
+    const whole = [value, light.unit, isLive ? '' : error].filter(Boolean).join(' ');
+    // The error of the answer before keeps its room while the next one is sought.
+    return html`<div class=${`light-numbers ${this.props.hasSlider ? '' : 'is-two'}`}>
+      <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
+        style=${{ background: level > 0 ? toHex(atFull(rgb)) : 'none' }}></span>
+      <span class="values" data-tip=${level > 0 ? whole : undefined}
+        >${level > 0 ? value : 'off'}</span>
+      <span class=${`error ${isLive ? 'is-old' : ''}`} aria-hidden=${isLive ? 'true' : undefined}
+        >${level > 0 || !this.props.hasSlider ? error : ''}</span>
+      ${!this.props.hasSlider && html`<span class="stops">${stopsText(stopsOf(rgb, light))}</span>`}
+    </div>`;
+  }
+
+  dimmer() {
+    const { k, light, rgb, hands, asked } = this.props;
+    const stops = stopsOf(rgb, light) ?? DARKEST;
+    const move = (/** @type {number} */ to, /** @type {boolean} */ done) => {
+      this.grasped ??= rgb;
+      hands.session.hold(k, moved(this.grasped, light, to), done);
+      if (done) this.grasped = null;
+    };
+    const text = luminance(rgb) > 0 ? stopsText(stops) : 'off';
+    return html`<div class=${`dimmer ${asked?.lock !== undefined ? 'is-held' : ''}`}>
+      <${Slider} plain label=${`${light.label}, stops from now`} value=${clamp(stops)}
+        least=${DARKEST} most=${BRIGHTEST} step=${0.05} rest=${0} text=${text}
+        disabled=${Boolean(asked?.off)} change=${move} />
+      <${Level} light=${light} rgb=${rgb} disabled=${Boolean(asked?.off)}
+        say=${(/** @type {string} */ words) => hands.session.toast(words)}
+        change=${(/** @type {RGB} */ made) => hands.session.hold(k, made, true)} />
+    </div>`;
+  }
+}
+
+/** The end of a long name that is always seen, since there names of many lights differ: a space or the
+ * like, and what comes after it; of names without one there, so many characters. */
+const END = /[^\p{L}\p{N}].{4,8}$/u;
+const END_LENGTH = 9;
+
+/** On two lines, where one has no room for it; what has none on these is left out before the end.
+ * @param {{name: string}} props */
+function Name({ name }) {
+  const line = name.replace(/\s+/g, ' ');
+  const found = line.length < 14 ? line.length : line.search(END);
+  const at = found < 0 ? line.length - END_LENGTH : found;
+  return html`<span class="name-start">${line.slice(0, at)}</span><span>${line.slice(at)}</span>`;
+}
+
+/** @param {number | undefined} share */
+const heard = (share) => (share === undefined ? '' : percent(share));
+
+/** @param {{share: number, here?: number}} props */
+function Share({ share, here }) {
+  const isHere = here !== undefined;
+  const value = isHere ? here : share;
+  return html`<span class=${`share ${isHere ? 'is-here' : ''}`}
+    data-tip=${isHere ? 'Share of the light here' : "Share of the picture's light"}>
+    <i style=${{ '--share': String(value) }}></i><span>${percent(value)}</span></span>`;
+}
+
+/** What is worth a word, below the picture: the rows keep their height while lights change.
+ * @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} props */
+function Badge(props) {
+  const { lit, asked = {}, tied } = props;
+  const said = notes(props);
+  if (!said.length) return null;
+  // What is asked of all lights, as their colours, says nothing of this one.
+  const isAsked = Boolean(tied ?? asked.limits ?? colourOf(asked));
+  const isBack = Boolean(lit?.held) && isAsked && asked.lock === undefined && !asked.off;
+  const words = said.map(([, its]) => `${its}.`);
+  if (isBack) words.push('This keeps it from what the painting asks for.');
+  const more = said.length > 1 ? ` +${said.length - 1}` : '';
+  return html`<span class=${`badge ${isBack ? 'is-back' : ''}`} data-tip=${words.join(' ')}
+    >${isBack ? 'held back' : `${said[0][0]}${more}`}</span>`;
+}
+
+/** @param {import("./ui_state.js").UiStore} store @param {number} k */
+function unfold(store, k) {
+  store.set(({ unfolded }) => ({
+    unfolded: unfolded.includes(k) ? unfolded.filter((one) => one !== k) : [...unfolded, k],
+  }));
+}
+
+/** What colour it may have, if that is asked. @param {Asked} asked */
+const colourOf = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
+
+/** In a word, and in words. @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} about
+ * @returns {string[][]} */
+function notes({ light, lit, asked = {}, tied }) {
+  /** @type {[unknown, string, string][]} */
+  const all = [
+    [light.is_fixed, 'fixed', 'It stays as it is in the scene'],
+    [asked.off, 'off', 'You switched it off'],
+    [asked.lock !== undefined, 'locked', 'You locked it at this level'],
+    [asked.limits, 'limits', 'You limited its level'],
+    [colourOf(asked), 'colour', 'You limited its colour'],
+    [tied, 'tied', `It is tied to ${tied?.filter((name) => name !== light.name).join(', ')}`],
+    [lit?.unreached, 'unseen', 'None of its light reaches the picture'],
+  ];
+  return all.filter(([isSo]) => isSo).map(([, ...words]) => words);
+}
+
+/** @param {number} stops */
+const clamp = (stops) => Math.min(BRIGHTEST, Math.max(DARKEST, stops));
+
+/** The same colour, so many stops from the present; at the left end it is off.
+ * @param {RGB} rgb @param {Light} light @param {number} stops @returns {RGB} */
+function moved(rgb, light, stops) {
+  return atLevel(rgb, light, stops <= DARKEST ? 0 : nowOf(light) * 2 ** stops);
+}

@@ -1,0 +1,135 @@
+/** The outline of the object that a click would fill, or a drag asks about. */
+
+import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
+
+/** @typedef {import("./engine_interface.js").Engine} Engine */
+/** @typedef {import("./engine_interface.js").Objects} Objects */
+/** @typedef {import("./engine_interface.js").Pane} Pane */
+/** @typedef {import("./ui_state.js").Ui} Ui */
+
+/** White within the object, and dark around it, so that it is seen on whatever it lies. */
+const [WITHIN, AROUND] = [
+  [255, 255, 255, 255],
+  [0, 0, 0, 180],
+];
+
+/** Number of the object that a press would be about, or is; null for none. @param {Ui} ui */
+function objectOf({ tool, about, pointed }) {
+  if (!pointed) return null;
+  if (tool === 'fill') return pointed.index;
+  return tool === 'ask' && about === 'object' && pointed.index >= 0 ? pointed.index : null;
+}
+
+/** Drawn anew when it is another object, or lies elsewhere, and at no other time.
+ * @param {{ui: Ui, engine: Engine, panes: Pane[]}} props */
+export function Outline({ ui, engine, panes }) {
+  const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  const object = objectOf(ui);
+  const places = panes.map(({ x, y, width, height, left, top, scale }) =>
+    [x, y, width, height, left, top, scale].join(' '),
+  );
+  useLayoutEffect(() => {
+    if (ref.current && object !== null) draw(ref.current, engine.objects(), object, panes);
+  }, [object, ui.view, places.join()]);
+  // Fainter while a drag asks, so that what comes of it is seen.
+  return html`<canvas class=${ui.asking ? 'outline is-asking' : 'outline'} ref=${ref} hidden=${object === null}
+    aria-hidden="true"></canvas>`;
+}
+
+/** Nothing where no objects are known.
+ * @param {HTMLCanvasElement} canvas @param {Objects | null} objects @param {number} object
+ * @param {Pane[]} panes */
+function draw(canvas, objects, object, panes) {
+  const ratio = Math.max(1, window.devicePixelRatio || 1);
+  canvas.width = Math.round(canvas.clientWidth * ratio);
+  canvas.height = Math.round(canvas.clientHeight * ratio);
+  const context = canvas.getContext('2d');
+  const box = objects && boxOf(objects, object);
+  if (!context || !box) return;
+  for (const pane of panes) {
+    const made = outlined(objects, object, box, scaled(pane, ratio), Math.round(ratio));
+    if (made) context.putImageData(made.image, made.x, made.y);
+  }
+}
+
+/** In device pixels. @param {Pane} pane @param {number} ratio @returns {Pane} */
+function scaled(pane, ratio) {
+  const lengths = ['x', 'y', 'width', 'height', 'left', 'top', 'scale'];
+  const made = lengths.map((key) => [key, /** @type {any} */ (pane)[key] * ratio]);
+  return { ...pane, ...Object.fromEntries(made) };
+}
+
+/** @typedef {[left: number, top: number, right: number, bottom: number]} Box */
+
+/** Where each object is seen, of the pictures that were asked about.
+ * @type {WeakMap<object, Map<number, Box>>} */
+const boxes = new WeakMap();
+
+/** @param {Objects} objects @param {number} object @returns {Box | undefined} in picture pixels */
+function boxOf({ data, width, height }, object) {
+  let known = boxes.get(data);
+  if (!known) {
+    known = new Map();
+    // By runs of pixels, of which there are few: pictures have millions of pixels.
+    for (let y = 0, row = 0; y < height; y += 1, row += width)
+      for (let x = 0, end = 0; x < width; x = end) {
+        const its = data[row + x];
+        while (end < width && data[row + end] === its) end += 1;
+        const box = known.get(its);
+        if (!box) known.set(its, [x, y, end, y + 1]);
+        else {
+          box[0] = Math.min(box[0], x);
+          box[2] = Math.max(box[2], end);
+          box[3] = y + 1;
+        }
+      }
+    boxes.set(data, known);
+  }
+  return known.get(object);
+}
+
+/** A pane's part of the outline, a line of so many device pixels on both sides of the edge.
+ * @param {Objects} objects @param {number} object @param {Box} box @param {Pane} pane
+ * @param {number} line @returns {{image: ImageData, x: number, y: number} | null} */
+function outlined({ data, width, height }, object, box, pane, line) {
+  const { left, top, scale } = pane;
+  const x0 = Math.max(Math.round(pane.x), Math.floor(left + box[0] * scale) - line);
+  const y0 = Math.max(Math.round(pane.y), Math.floor(top + box[1] * scale) - line);
+  const x1 = Math.min(Math.round(pane.x + pane.width), Math.ceil(left + box[2] * scale) + line);
+  const y1 = Math.min(Math.round(pane.y + pane.height), Math.ceil(top + box[3] * scale) + line);
+  if (x1 <= x0 || y1 <= y0) return null;
+  const inside = insideOf();
+  const image = new ImageData(x1 - x0, y1 - y0);
+  const across = x1 - x0 + 2 * line;
+  for (let y = 0, to = 0; y < y1 - y0; y += 1) {
+    for (let x = 0; x < x1 - x0; x += 1, to += 4) {
+      const at = (y + line) * across + x + line;
+      const own = inside[at];
+      const isEdge =
+        inside[at - line] !== own ||
+        inside[at + line] !== own ||
+        inside[at - line * across] !== own ||
+        inside[at + line * across] !== own;
+      if (isEdge) image.data.set(own ? WITHIN : AROUND, to);
+    }
+  }
+  return { image, x: x0, y: y0 };
+
+  /** Whether a device pixel shows the object, also a line's width around what is drawn. */
+  function insideOf() {
+    const columns = Int32Array.from({ length: x1 - x0 + 2 * line }, (_, i) =>
+      Math.floor((x0 - line + i + 0.5 - left) / scale),
+    );
+    const found = new Uint8Array(columns.length * (y1 - y0 + 2 * line));
+    for (let j = 0, at = 0; at < found.length; j += 1) {
+      const row = Math.floor((y0 - line + j + 0.5 - top) / scale);
+      const isRow = row >= 0 && row < height;
+      for (let i = 0; i < columns.length; i += 1, at += 1) {
+        const column = columns[i];
+        if (isRow && column >= 0 && column < width)
+          found[at] = Number(data[row * width + column] === object);
+      }
+    }
+    return found;
+  }
+}

@@ -1,0 +1,58 @@
+/** What is said beside the pointer: what a drag asks for, which light the picker would take. */
+
+import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
+import { toHex } from './paint_colour.js';
+import { paintText } from './format.js';
+import { exposureOf } from './ui_state.js';
+import { paneAt } from './pointer_input.js';
+
+/** @typedef {import("./engine_interface.js").Engine} Engine */
+/** @typedef {import("./ui_state.js").Ui} Ui */
+
+/** @param {{ui: Ui, engine: Engine, rings: {current: HTMLElement | null}}} props */
+export function Near({ ui, engine, rings }) {
+  const ref = useRef(/** @type {HTMLElement | null} */ (null));
+  useLayoutEffect(() => {
+    if (ref.current && rings.current) place(ref.current, rings.current, engine, ui);
+  });
+  const { asking, pointed, tool } = ui;
+  if (asking) return html`<div class="near asking" ref=${ref} role="status">${asked(asking)}</div>`;
+  if (tool !== 'pick' || !pointed) return null;
+  const exposed = pointed.paint.map((x) => Math.max(0, x) * 2 ** exposureOf(ui.state));
+  return html`<div class="near picking" ref=${ref} aria-hidden="true">
+    <i style=${{ background: toHex(exposed) }}></i>${paintText(exposed) || 'no light'}</div>`;
+}
+
+/** Above the brush, where no hand lies; where there is no room, beside it. It stays within the
+ * picture. @param {HTMLElement} element @param {HTMLElement} rings @param {Engine} engine
+ * @param {Ui} ui */
+function place(element, rings, engine, ui) {
+  const { offsetWidth: width, offsetHeight: height } = element;
+  const [x, y] = [Number(rings.dataset.x), Number(rings.dataset.y)];
+  const pane = paneAt(engine, x, y) ?? engine.panes()[0];
+  if (!pane || !Number.isFinite(x)) return;
+  const gap = window.matchMedia('(pointer: coarse)').matches ? 56 : 22;
+  const [rows, columns] = ui.state.size;
+  const [left, top] = [Math.max(pane.x, pane.left), Math.max(pane.y, pane.top)];
+  const right = Math.min(pane.x + pane.width, pane.left + columns * pane.scale) - width;
+  const bottom = Math.min(pane.y + pane.height, pane.top + rows * pane.scale) - height;
+  const isAbove = y - gap - height >= top;
+  const beside = x - gap - width >= left ? x - gap - width : x + gap;
+  const across = within(isAbove ? x - width / 2 : beside, left, right);
+  const down = within(isAbove ? y - gap - height : y - height / 2, top, bottom);
+  element.style.transform = `translate(${Math.round(across)}px, ${Math.round(down)}px)`;
+}
+
+/** @param {number} x @param {number} least @param {number} most */
+const within = (x, least, most) => Math.max(least, Math.min(most, x));
+
+/** @param {{stops: number, mired: number}} asking */
+function asked({ stops, mired }) {
+  const bright =
+    Math.abs(stops) >= 0.05 &&
+    `${Math.abs(stops).toFixed(1)} stops ${stops > 0 ? 'brighter' : 'darker'}`;
+  const warm =
+    Math.abs(mired) >= 3 &&
+    `${Math.abs(Math.round(mired))} mired ${mired > 0 ? 'warmer' : 'cooler'}`;
+  return [bright, warm].filter(Boolean).join(', ') || 'no change';
+}

@@ -1,0 +1,162 @@
+/** How a painting is answered: a panel over those at the side, so that the pictures show what each
+ * setting does. */
+
+import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
+import { Button, Choice, Number_, useId } from './controls.js';
+import { number } from './format.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").Hands} Hands */
+
+const AUTO = 'The best choice for a painting made here';
+
+const SPACES = [
+  { value: null, label: 'Automatic', tip: AUTO },
+  { value: 'display', label: 'Display', tip: 'Differences as the eye sees them on a display' },
+  { value: 'linear', label: 'Linear', tip: 'Differences in linear light: bright areas count most' },
+];
+const COLOURS = [
+  { value: null, label: 'Automatic', tip: AUTO },
+  { value: 'free', label: 'Free', tip: 'Any colour' },
+  { value: 'gentle', label: 'Gentle', tip: 'Their own, unless the paint asks for another' },
+  { value: 'white', label: 'White', tip: 'Whites from 2200 to 9000 K' },
+];
+const HOLDS = [
+  { value: 'auto', label: 'Automatic', tip: AUTO },
+  { value: 'hold', label: 'Hold', tip: 'They stay near their present look' },
+  { value: 'go', label: 'Ignore', tip: 'They may change freely: only the paint counts' },
+];
+const MEANT = [
+  { value: false, label: 'Sketch', tip: 'Strokes show what should change' },
+  { value: true, label: 'Literal', tip: 'Each stroke is the exact light you want' },
+];
+const UNSURE = [
+  { value: false, label: 'May change', tip: 'Every change that brings the answer closer' },
+  { value: true, label: 'Stay', tip: 'As they are now, unless a change helps much' },
+];
+
+/** What a choice means, in a few words. @type {Record<string, Record<string, string>>} */
+const MEANS = {
+  space: {
+    display: 'differences as the eye sees them on a display',
+    linear: 'differences in linear light, where bright areas count most',
+  },
+  colors: {
+    free: 'any colour',
+    gentle: 'their own, unless the paint asks for another',
+    white: 'whites from 2200 to 9000 K',
+  },
+};
+
+/** Strengths to begin with; the first is what is automatic, where something is held. */
+const HOLD = 3;
+const PREFER_CURRENT = 0.01;
+
+/** @param {{ui: Ui, hands: Hands}} props */
+export function SettingsPanel({ ui, hands }) {
+  const { settings, meant } = ui;
+  const id = useId();
+  const set = (/** @type {string} */ key) => (/** @type {any} */ value) =>
+    hands.session.setting(key, value);
+  const close = () => hands.store.set({ panel: null });
+  const hold = settings.hold ?? null;
+  const manner = hold === null ? 'auto' : hold === 0 ? 'go' : 'hold';
+  const stays = settings.prefer_current || null;
+  return html`<${Panel} labelledby=${id} close=${close}>
+    <div class="panel-head">
+      <h2 id=${id}>Solve settings</h2>
+      <${Button} icon="close" tip="Close" keys="Escape" act=${close} />
+    </div>
+    <${Row} title="Unpainted parts" says=${said(hold === null, ofUnpainted(meant.hold))}>
+      <${Choice} label="Unpainted parts" value=${manner} choices=${HOLDS}
+        change=${(/** @type {string} */ to) => set('hold')({ auto: null, hold: hold || HOLD, go: 0 }[to])} />
+      ${
+        manner === 'hold' &&
+        html`<${Number_} label="Strength" value=${hold} least=${0.01} most=${100} step=${0.1}
+        unit="×" tip="1: they count as much as all paint together. 3 is the usual value."
+        change=${set('hold')} />`
+      }
+    </${Row}>
+    <${Row} title="Colour space of the match" says=${said(!settings.space, MEANS.space[meant.space])}>
+      <${Choice} label="Colour space of the match" value=${settings.space ?? null} choices=${SPACES}
+        change=${set('space')} /></${Row}>
+    <${Row} title="Light colours"
+      says=${said(!settings.colors, MEANS.colors[meant.colors])}>
+      <${Choice} label="Light colours" value=${settings.colors ?? null}
+        choices=${COLOURS} change=${set('colors')} /></${Row}>
+    <${Row} title="Read the paint as" says=${
+      settings.literal
+        ? 'Every stroke is exact: linear light, nothing held, any colour, unless set otherwise above'
+        : 'Strokes show what should change; the rest of the picture counts, too'
+    }>
+      <${Choice} label="Read the paint as" value=${Boolean(settings.literal)} choices=${MEANT}
+        change=${set('literal')} /></${Row}>
+    <${Row} title="Lights that make little difference" says=${
+      stays ? 'They stay as they are now' : 'They may change, too'
+    }>
+      <${Choice} label="Lights that make little difference" value=${stays !== null} choices=${UNSURE}
+        change=${(/** @type {boolean} */ stay) =>
+          set('prefer_current')(stay ? (stays ?? PREFER_CURRENT) : null)} />
+      ${
+        stays !== null &&
+        html`<${Number_} label="Strength" value=${stays} least=${0.001} most=${10} step=${0.01}
+        digits=${3} tip="0.01: only where the paint leaves it open. 1: unless a change helps very much."
+        change=${set('prefer_current')} />`
+      }
+    </${Row}>
+    <${Row} title="Number of lights" says=${
+      settings.sparse
+        ? 'The most useful ones, besides locked lights; the others are off'
+        : 'No limit'
+    }>
+      <${Number_} label="At most" value=${settings.sparse ?? null} least=${1} digits=${0}
+        most=${ui.lights.length || 1} empty="all" unit="lights"
+        tip="Empty: no limit" change=${set('sparse')} /></${Row}>
+  </${Panel}>`;
+}
+
+/**
+ * Over the panels at the side. It takes the focus, which goes back to where it was; Escape closes it.
+ * @param {{labelledby: string, close: () => void, children?: any}} props
+ */
+function Panel({ labelledby, close, children }) {
+  const ref = useRef(/** @type {HTMLElement | null} */ (null));
+  useLayoutEffect(() => {
+    const element = ref.current;
+    if (!element) return undefined;
+    const root = /** @type {Document | ShadowRoot} */ (element.getRootNode());
+    const before = /** @type {HTMLElement | null} */ (root.activeElement);
+    element.focus({ preventScroll: true });
+    return () => {
+      if (element.contains(root.activeElement)) before?.focus?.();
+    };
+  }, []);
+  const press = (/** @type {KeyboardEvent} */ event) => {
+    if (event.key !== 'Escape') return;
+    event.preventDefault();
+    event.stopPropagation();
+    close();
+  };
+  return html`<aside class="side settings" ref=${ref} tabindex="-1" aria-labelledby=${labelledby}
+    onKeyDown=${press}>${children}</aside>`;
+}
+
+/** @param {{title: string, says: string, children?: any}} props */
+function Row({ title, says, children }) {
+  return html`<section class="setting"><h3>${title}</h3>
+    <div class="row">${children}</div><p class="faint">${says}</p></section>`;
+}
+
+/** What is so, and whether that follows from the painting. @param {boolean} isAuto
+ * @param {string | undefined} text */
+function said(isAuto, text = '') {
+  return isAuto && text ? `Now: ${text}` : text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+/** What becomes of what is not painted. @param {number | null | undefined} hold */
+function ofUnpainted(hold) {
+  if (hold === undefined || hold === null) return '';
+  if (!hold) return 'free to change';
+  const weight = hold === 1 ? 'the same weight as' : `${number(hold)} times the weight of`;
+  return `held near their present look, with ${weight} the paint`;
+}

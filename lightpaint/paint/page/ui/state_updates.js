@@ -1,0 +1,239 @@
+/** What messages of the session say, as state of the interface. */
+
+/** @typedef {import('./engine_interface.js').Message} Message */
+/** @typedef {import('./engine_interface.js').RGB} RGB */
+/** @typedef {import('./ui_state.js').Ui} Ui */
+/** @typedef {import('../engine/messages.js').Events} Events */
+
+import { stateOfView } from '../engine/message_frames.js';
+import { mixOf, unmixed } from './ui_state.js';
+
+/** What is shown while something that was asked for is under way, as it is when nothing is.
+ * @type {Record<string, Partial<Ui>>} */
+export const ENDED = {
+  export: { isWriting: false, writing: null },
+  verify: { verifying: null },
+  explain: { explaining: false },
+  preview: { preview: null },
+};
+
+/** When nothing is known to be under way. */
+export const IDLE = { ...ENDED.export, ...ENDED.verify, ...ENDED.explain, ...ENDED.preview };
+
+/** @param {Events["state"]} message @returns {Partial<Ui>} */
+export function stateOf(message, /** @type {import('./ui_state.js').Ui} */ before) {
+  const isBack = before.connection !== 'open' || before.closed !== null;
+  const views = message.views ?? [];
+  const view = before.view < views.length ? before.view : 0;
+  const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message;
+  return {
+    ready: true,
+    state: stateOfView(message, view),
+    version: -1,
+    view,
+    views,
+    lights,
+    asked: asked ?? {},
+    ties: ties ?? [],
+    settings: settings ?? {},
+    meant: meant ?? {},
+    history,
+    looks: looks ?? [],
+    resources: resources ?? {},
+    hint: Boolean(message.first),
+    connection: 'open',
+    closed: null,
+    // What came of it meanwhile was not heard; of what still goes on more is said.
+    ...(isBack ? { ...IDLE, explained: [] } : {}),
+    basis:
+      basis && !basis.done
+        ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }
+        : null,
+    ...(isApart(looks ?? [], before) ? unmixed(before) : {}),
+    ...(message.verified ? rendersOf(message.verified, view) : {}),
+    // A scene is first shown as it is painted.
+    ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
+    ...answerFields(message.answer ?? {}, { ...before, view, views, lit: [] }),
+    ...weightsOf(message),
+  };
+}
+
+/** @param {any} told @returns {NonNullable<Ui['verified']>} */
+const render = ({ is_old: isOld = false, ...about }) => ({ ...about, isOld });
+
+/** Renders that were made before the page began. @param {any[]} verified @param {number} view
+ * @returns {Partial<Ui>} */
+function rendersOf(verified, view) {
+  const verifiedOf = Object.fromEntries(verified.map((one) => [one.view, render(one)]));
+  return { verifiedOf, verified: verifiedOf[view] ?? null };
+}
+
+/** Which looks there are. @param {Events["looks"]} message @param {Ui} ui @returns {Partial<Ui>} */
+export function looksOf({ looks, resources }, ui) {
+  return {
+    looks,
+    resources: { ...ui.resources, ...resources },
+    ...(isApart(looks, ui) ? unmixed(ui) : {}),
+  };
+}
+
+/** Whether one of the looks that are compared is there no more.
+ * @param {import('./ui_state.js').Look[]} looks @param {Ui} ui */
+function isApart(looks, ui) {
+  return ui.mix !== null && !mixOf({ ...ui, looks }, ui.mix);
+}
+
+/** @param {{name: string, stops: number} | undefined} transform */
+function shownAs(transform) {
+  return transform ? { transform: transform.name, stops: transform.stops } : {};
+}
+
+/**
+ * What an exact answer says. The sentences come after the lights, when they have been found; until
+ * then those of the last answer stay.
+ * @param {any} answer @param {Ui} before @returns {Partial<Ui>}
+ */
+function answerFields(answer, before) {
+  const { headline, lights, shares = null, of_views: ofViews = null } = answer;
+  /** @type {Partial<Ui>} */
+  const made = { isLive: false, isJudged: headline !== undefined };
+  if (headline !== undefined)
+    Object.assign(made, { ofViews }, seenOf({ ...answer, ofViews }, before));
+  // Without paint there is nothing to be sure of, or to be held back from.
+  const known = made.deltaE === null && !ofViews ? UNKNOWN : {};
+  if (lights) {
+    made.shares = shares;
+    made.lit = lights.map((/** @type {any} */ one, /** @type {number} */ k) => ({
+      ...before.lit[k],
+      ...known,
+      ...one,
+      share: shares?.[before.view]?.[k] ?? one.share,
+    }));
+  }
+  return made;
+}
+
+/** How close the view is that is shown. @param {any} answer @param {Ui} ui @returns {Partial<Ui>} */
+function seenOf(answer, { view, views }) {
+  const isOne = views.length < 2;
+  const its = isOne || !answer.ofViews ? answer : answer.ofViews[view];
+  if (!its)
+    return { headline: UNPAINTED, help: null, deltaE: null, deltaAsked: null, sentences: [] };
+  return {
+    headline: its.headline,
+    help: its.help ?? null,
+    deltaE: its.delta_e ?? null,
+    deltaAsked: its.delta_e_asked ?? null,
+    sentences: its.sentences ?? [],
+  };
+}
+
+const UNPAINTED = 'Nothing is painted in this view. It follows the others.';
+
+const UNKNOWN = { error: null, held: false, unreached: false };
+
+/** What changes with the view that is shown. @param {Ui} ui @param {number} view
+ * @returns {Partial<Ui>} */
+export function viewOf(ui, view) {
+  const verified = ui.verifiedOf[view] ?? null;
+  const isRender = ui.show.right === 'verified' && !verified;
+  const isAsLarge = String(ui.views[view].size) === String(ui.views[ui.view].size);
+  /** @type {Ui['show']} */
+  const show = {
+    ...ui.show,
+    ...(isRender ? { left: 'painting', right: 'solution' } : {}),
+    ...(isAsLarge ? {} : { zoom: 1, pan: [0, 0] }),
+  };
+  const { ofViews, shares } = ui;
+  return {
+    view,
+    state: stateOfView(ui.state, view),
+    verified,
+    explained: [],
+    pointed: null,
+    show,
+    ...(ofViews ? seenOf({ ofViews }, { ...ui, view }) : {}),
+    lit: ui.lit.map((one, k) => ({ ...one, share: shares?.[view]?.[k] ?? one.share })),
+  };
+}
+
+/** A render of a view has come. @param {Events["verified"]} message @param {Ui} ui @returns {Partial<Ui>} */
+export function verifiedOf(message, ui) {
+  const { view = 0 } = message;
+  const verified = render(message);
+  const made = { verifiedOf: { ...ui.verifiedOf, [view]: verified }, verifying: null };
+  return view === ui.view ? { ...made, verified } : made;
+}
+
+/** Why it is not closer, unless somebody has painted on. @param {any} message @param {Ui} ui
+ * @returns {Partial<Ui>} */
+export function explainedOf({ view = 0, sentences, is_old: isOld = false }, ui) {
+  const isIts = view === ui.view && !isOld && !ui.isLive;
+  return { explaining: false, explained: isIts ? sentences : [] };
+}
+
+/** What a change would do, unless another one is looked at by now. @param {any} message
+ * @param {Ui} ui @returns {Partial<Ui>} */
+export function previewedOf({ number, text, is_at_cost: isAtCost, arrays }, { preview }) {
+  if (!preview || preview.number !== number) return {};
+  return { preview: { ...preview, text, isAtCost, before: arrays.before, after: arrays.after } };
+}
+
+/** @param {Message} message @returns {Partial<Ui>} */
+function weightsOf(message) {
+  const flat = message.arrays?.weights?.data;
+  if (!flat) return {};
+  /** @type {RGB[]} */
+  const weights = [];
+  for (let at = 0; at < flat.length; at += 3) weights.push([flat[at], flat[at + 1], flat[at + 2]]);
+  return { weights };
+}
+
+/** Of an answer, and of a patch, unless it is of before what was said already: an exact answer that
+ * was found as somebody undid. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+export function answerOf(message, ui) {
+  if (message.version < ui.version) return {};
+  const made = /** @type {Partial<Ui>} */ (weightsOf(message));
+  made.version = message.version ?? ui.version;
+  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'meant'])) {
+    if (message[key]) made[key] = message[key];
+  }
+  if (message.lights) Object.assign(made, answerFields(message, ui));
+  else if (!message.exact) {
+    made.isLive = true;
+    made.isJudged = false;
+    // What was said before anything was painted is so no more.
+    if (ui.deltaE === null) made.headline = '';
+  }
+  if (made.weights) {
+    const old = Object.entries(ui.verifiedOf).map(([view, one]) => [view, { ...one, isOld: true }]);
+    made.verifiedOf = Object.fromEntries(old);
+    if (ui.verified) made.verified = { ...ui.verified, isOld: true };
+  }
+  // The reasons were those of the answer before.
+  if (made.isLive && ui.explained.length) made.explained = [];
+  return made;
+}
+
+/** @param {Events["progress"]} message @param {Ui} ui @returns {Partial<Ui>} */
+export function progressOf({ what, done, total, unit }, ui) {
+  const made = { what, done, total, unit };
+  if (what === 'export') return { writing: timed(made, ui.writing), isWriting: true };
+  if (/verif/i.test(what)) return { verifying: timed(made, ui.verifying) };
+  return { basis: total && done >= total ? null : timed(made, ui.basis) };
+}
+
+/** Seconds of work after which is said how many more there will be. */
+const KNOWN_S = 2;
+
+/** What is left goes on as fast as what was heard of. @param {import('./ui_state.js').Progress} now
+ * @param {import('./ui_state.js').Progress | null} before @returns {import('./ui_state.js').Progress} */
+function timed(now, before) {
+  const ms = performance.now();
+  const isSame = before?.since && before.total === now.total && before.done <= now.done;
+  const since = (isSame && before.since) || { ms, done: now.done };
+  const [seconds, done] = [(ms - since.ms) / 1000, now.done - since.done];
+  const left_s =
+    seconds > KNOWN_S && done > 0 ? (seconds / done) * (now.total - now.done) : undefined;
+  return { ...now, since, left_s };
+}

@@ -1,0 +1,64 @@
+/** A small picture of the session on a canvas of its own. */
+
+import { html, useEffect, useRef } from '../vendor/preact.js';
+
+/** @typedef {import("./shortcuts.js").Hands} Hands */
+
+/**
+ * @param {{name: string, generation?: number, hands: Hands}} props generation:
+ *   undefined while there is no such picture
+ */
+export function Thumb({ name, generation, hands }) {
+  const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  const drawn = useRef(/** @type {string | null} */ (null));
+  useEffect(() => {
+    if (generation === undefined) return undefined;
+    const { session, store } = hands;
+    let isGone = false;
+    let isThere = false;
+    // A picture of something else is not shown for it.
+    if (ref.current && drawn.current !== null && drawn.current !== name) clear(ref.current);
+    drawn.current = null;
+    const fetch = () =>
+      session.host.fetch(name).then(
+        (picture) => {
+          isThere = true;
+          if (isGone || !ref.current) return;
+          put(ref.current, picture);
+          drawn.current = name;
+        },
+        () => undefined, // A thumbnail is not worth an error.
+      );
+    void fetch();
+    // A place that has just lost the painter is given no picture, until it has it again.
+    let wasClosed = store.value.closed !== null;
+    const end = store.listen(() => {
+      const isClosed = store.value.closed !== null;
+      if (wasClosed && !isClosed && !isThere) void fetch();
+      wasClosed = isClosed;
+    });
+    return () => {
+      isGone = true;
+      end();
+    };
+  }, [name, generation]);
+  return html`<canvas class="thumb" ref=${ref} width="1" height="1"
+    aria-hidden="true"></canvas>`;
+}
+
+/** @param {HTMLCanvasElement} canvas */
+function clear(canvas) {
+  canvas.getContext('2d')?.clearRect(0, 0, canvas.width, canvas.height);
+}
+
+/** @param {HTMLCanvasElement} canvas @param {import("./engine_interface.js").Picture} picture (h, w, 3) */
+export function put(canvas, { data, shape: [height, width] }) {
+  canvas.width = width;
+  canvas.height = height;
+  const pixels = new ImageData(width, height);
+  for (let at = 0; at < width * height; at += 1) {
+    for (let c = 0; c < 3; c += 1) pixels.data[4 * at + c] = data[3 * at + c];
+    pixels.data[4 * at + 3] = 255;
+  }
+  canvas.getContext('2d')?.putImageData(pixels, 0, 0);
+}

@@ -1,0 +1,283 @@
+/** What the interface knows: of the session, and of itself. */
+
+import { ofKelvin } from './paint_colour.js';
+
+/** @typedef {import("./engine_interface.js").RGB} RGB */
+/** @typedef {import("./engine_interface.js").Show} Show */
+/** @typedef {import("./engine_interface.js").Tool} Tool */
+
+/** @typedef {import("../engine/messages.js").LightInfo} Light */
+/** @typedef {import("../engine/messages.js").LightAnswer} Lit */
+/** @typedef {import("../engine/messages.js").LookInfo} Look */
+/** @typedef {Record<string, any>} Asked */
+/** @typedef {import("../engine/messages.js").Advice} Help */
+/** A message that changes what is asked.
+ * @typedef {{[K in "set" | "ask_all" | "tie"]:
+ *   {kind: K, fields: import("../engine/messages.js").Requests[K]}}["set" | "ask_all" | "tie"]}
+ *   Change */
+/** What a change would do: what it is called, and what is known of it.
+ * @typedef {{number: number, label: string, change: Change, text: string, isAtCost: boolean,
+ *   before: import("./engine_interface.js").Picture | null, after: import("./engine_interface.js").Picture | null}}
+ *   Preview */
+/** @typedef {import("../engine/messages.js").Closeness} Seen */
+/** since: when it was first heard of, in ms, and how much was done then; left_s: about how many
+ * seconds are left, once that can be told.
+ * @typedef {{what: string, done: number, total: number, unit: string,
+ *   since?: {ms: number, done: number}, left_s?: number}} Progress */
+/** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
+
+/**
+ * @typedef {object} Ui
+ * @property {boolean} ready whether the session has said what there is
+ * @property {string} waiting why there is nothing yet, if something went wrong
+ * @property {boolean} isWriting files
+ * @property {Progress | null} writing how far that is, where it takes long
+ * @property {any} state as the session said it last, of the view that is shown
+ * @property {number} version how often the session had changed, as its last message says
+ * @property {number} view that is shown
+ * @property {{name: string, size: [number, number]}[]} views of the session
+ * @property {(Seen | null)[] | null} ofViews how close each view is; null where nothing is painted
+ * @property {number[][] | null} shares of each light, in each view
+ * @property {Record<number, any>} verifiedOf renders, by view
+ * @property {Light[]} lights
+ * @property {Lit[]} lit the last exact answer
+ * @property {RGB[]} weights the last answer
+ * @property {string} headline
+ * @property {Help | null} help what the headline advises
+ * @property {Preview | null} preview of a change that is looked at before it is made
+ * @property {number | null} deltaE
+ * @property {number | null} deltaAsked the same of the present lighting: how much was asked for
+ * @property {string[]} sentences
+ * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
+ * @property {boolean} isJudged whether what is said of the answer is of the last one
+ * @property {Record<string, Asked>} asked
+ * @property {string[][]} ties
+ * @property {Record<string, any>} settings
+ * @property {Record<string, any>} meant
+ * @property {{undo: string[], redo: string[], count?: number}} history labels of the last steps,
+ *   and how many there are
+ * @property {Look[]} looks
+ * @property {{look: number, version: number, steps: number} | null} lastLook that was kept or
+ *   gone on from last, with the version and the number of steps then
+ * @property {Progress | null} basis
+ * @property {Progress | null} verifying
+ * @property {{done: number, total: number, isFirst?: boolean} | null} loading pictures of the lights;
+ *   isFirst: some of the lights have none yet
+ * @property {string | null} comingTo name of the look that is gone on from, until it is there
+ * @property {{agrees: boolean, text: string, isOld?: boolean} | null} verified
+ * @property {string[]} explained
+ * @property {boolean} explaining
+ * @property {{files: string[], command: string, is_unpainted?: boolean,
+ *   is_stopped?: boolean} | null} exported
+ * @property {"wait" | "open" | "lost" | "stale"} connection
+ * @property {boolean} isSilent whether an answer is long in coming
+ * @property {{reason: string, text: string} | null} closed
+ * @property {number} unheard strokes that were lost since no session is there to hear them
+ * @property {Toast[]} toasts
+ * @property {Record<string, number>} resources
+ * @property {boolean} hint whether somebody still has to be told what to do
+ * @property {Tool} tool
+ * @property {number} size
+ * @property {number} hardness
+ * @property {number} flow
+ * @property {number} fillFlow that of Fill
+ * @property {number} importance
+ * @property {"light" | "look"} as
+ * @property {"spot" | "object"} about what a drag asks about
+ * @property {RGB} colour linear, its largest channel at most 1
+ * @property {number} stops brightness of the paint over `colour`
+ * @property {import("./tools.js").Paint} second
+ * @property {import("./tools.js").Paint[]} recent
+ * @property {"white" | "hsv" | "rgb"} mixer
+ * @property {{stops: number, mired: number} | null} asking by a drag
+ * @property {{stops: number, mired: number, object: string | null}} inNumbers what is asked for in
+ *   numbers, of an object or, for null, of the whole picture
+ * @property {Show} show
+ * @property {number[]} solo lights
+ * @property {number[]} mute
+ * @property {number | null} hovered light whose own picture is shown
+ * @property {import("./engine_interface.js").Pointed | null} pointed
+ * @property {number | null} fit CSS pixels for each of the picture where all of it is seen
+ * @property {{a: number, b: number, share: number} | null} mix of two looks, by their ids
+ * @property {Record<string, boolean>} open what is unfolded
+ * @property {boolean} side whether the panels are there
+ * @property {null | "settings"} panel what lies over the panels
+ * @property {null | "keys" | "export"} dialog
+ * @property {string} search
+ * @property {"scene" | "name" | "share" | "change"} sort
+ * @property {number[]} unfolded lights whose controls are open
+ */
+
+/** @typedef {import("./ui_store.js").Store<Ui>} UiStore */
+
+/** @type {Show} */
+const SHOW = {
+  left: 'painting',
+  right: 'solution',
+  layout: 'side',
+  wipe: 0.5,
+  blink: 'left',
+  zoom: 1,
+  pan: [0, 0],
+  stops: 0,
+  transform: 'srgb',
+  clean: true,
+  overlay: null,
+  gains: null,
+  instead: null,
+  other: null,
+};
+
+/** @returns {Ui} */
+export function first() {
+  return {
+    ready: false,
+    waiting: '',
+    isWriting: false,
+    writing: null,
+    state: null,
+    version: -1,
+    view: 0,
+    views: [],
+    ofViews: null,
+    shares: null,
+    verifiedOf: {},
+    lights: [],
+    lit: [],
+    weights: [],
+    headline: '',
+    help: null,
+    preview: null,
+    deltaE: null,
+    deltaAsked: null,
+    sentences: [],
+    isLive: false,
+    isJudged: true,
+    asked: {},
+    ties: [],
+    settings: {},
+    meant: {},
+    history: { undo: [], redo: [] },
+    looks: [],
+    lastLook: null,
+    basis: null,
+    verifying: null,
+    loading: null,
+    comingTo: null,
+    verified: null,
+    explained: [],
+    explaining: false,
+    exported: null,
+    connection: 'wait',
+    isSilent: false,
+    closed: null,
+    unheard: 0,
+    toasts: [],
+    resources: {},
+    hint: false,
+    tool: 'brush',
+    size: 60,
+    hardness: 0.2,
+    flow: 0.5,
+    fillFlow: 1,
+    importance: 4,
+    as: 'light',
+    about: 'spot',
+    colour: ofKelvin(3200),
+    stops: 0,
+    second: { colour: ofKelvin(12000), stops: 0 },
+    recent: [],
+    mixer: 'white',
+    asking: null,
+    inNumbers: { stops: 0.5, mired: 0, object: null },
+    show: SHOW,
+    solo: [],
+    mute: [],
+    hovered: null,
+    pointed: null,
+    fit: null,
+    mix: null,
+    open: { colour: true, lights: true, truth: false },
+    side: true,
+    panel: null,
+    dialog: null,
+    search: '',
+    sort: 'scene',
+    unfolded: [],
+  };
+}
+
+/**
+ * What is drawn: what was chosen, with what is only looked at for a moment.
+ * @param {Ui} ui @returns {Show}
+ */
+export function shown(ui) {
+  const show = { ...ui.show, overlay: overlayOf(ui) };
+  const isAlone = ui.solo.length > 0;
+  if (isAlone || ui.mute.length) {
+    show.gains = ui.lights.map((_, k) => (isAlone ? ui.solo.includes(k) : !ui.mute.includes(k)));
+  }
+  const mixed = ui.mix && mixOf(ui, ui.mix);
+  if (mixed) show.other = mixed;
+  if (ui.hovered !== null) {
+    const k = ui.hovered;
+    const gain = gainOf(ui, k);
+    const rgb = alone(ui.weights[k], ui.lights[k]).map((x) => x * gain);
+    show.other = ui.weights.map((_, i) => (i === k ? /** @type {RGB} */ (rgb) : [0, 0, 0]));
+    show.right = 'other';
+    show.gains = null;
+  }
+  return show;
+}
+
+/** What lies over the pictures. Whoever paints importance sees it. @param {Ui} ui */
+export function overlayOf({ show, tool }) {
+  return show.overlay ?? (tool === 'weight' ? 'importance' : null);
+}
+
+/** By how much a light alone is shown brighter, so that one of many can be seen: whole stops.
+ * @param {Ui} ui @param {number} k @returns {number} */
+export function gainOf(ui, k) {
+  const share = ui.lit[k]?.share ?? 1;
+  return share > 0 ? 2 ** Math.min(10, Math.max(0, Math.round(Math.log2(0.5 / share)))) : 1;
+}
+
+/** A light that is off is shown as it is now, or else at one unit. @param {RGB} rgb
+ * @param {Light} light @returns {RGB} */
+function alone(rgb, light) {
+  if (Math.max(...rgb) > 0) return rgb;
+  return Math.max(...light.present) > 0 ? light.present : [1, 1, 1];
+}
+
+/** Two looks are compared no more. @param {Ui} ui @returns {Partial<Ui>} */
+export function unmixed({ show }) {
+  const pair = /** @type {const} */ ({ left: 'painting', right: 'solution' });
+  return { mix: null, show: { ...show, ...pair, instead: null, other: null } };
+}
+
+/** @param {Ui} ui @param {{a: number, b: number, share: number}} mix @returns {RGB[] | null} */
+export function mixOf(ui, { a, b, share }) {
+  const [from, to] = [a, b].map((id) => ui.looks.find((look) => look.id === id)?.weights);
+  if (!from || !to) return null;
+  return from
+    .map((rgb, k) => [0, 1, 2].map((c) => (1 - share) * rgb[c] + share * to[k][c]))
+    .map((rgb) => /** @type {RGB} */ (rgb));
+}
+
+/** What lies between two looks is called so. @param {Look[]} looks
+ * @param {{a: number, b: number, share: number}} mix @returns {string} */
+export function betweenOf(looks, { a, b, share }) {
+  const [from, to] = [a, b].map((id) => looks.find((look) => look.id === id)?.name ?? '');
+  return `${from} → ${to}, ${Math.round(100 * share)} %`;
+}
+
+/** Linear light of the paint in the hand: at 0 stops it is as bright as what the scene's own
+ * exposure shows as white. @param {Ui} ui @returns {RGB} */
+export function paintOf({ colour, stops, state }) {
+  return /** @type {RGB} */ (colour.map((x) => x * 2 ** (stops - exposureOf(state))));
+}
+
+/** Stops at which the scene is painted. @param {any} state @returns {number} */
+export function exposureOf(state) {
+  return state?.transform?.stops ?? 0;
+}
