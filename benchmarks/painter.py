@@ -86,7 +86,7 @@ WATCH = """() => {
 
 #: Whether all planes have been made anew without grain, and are there.
 CLEAN = """() => {
-  const { loader } = document.getElementById('lightpaint').painter.engine.work;
+  const { loader } = document.getElementById('lightpaint').painter.engine.mirror;
   const clean = Object.entries(loader.resources).filter(([name]) => name.startsWith('clean/'));
   return clean.length && clean.every(([, count]) => count > 1) && !loader.missing().length;
 }"""
@@ -247,7 +247,7 @@ class Opened:
         self.page: Page = self.browser.new_page(viewport={"width": 1600, "height": 900})
         self.page.goto(self.url.replace("#", f"?view={self.view}#" if self.view else "#"))
         self.page.wait_for_function(
-            "() => document.getElementById('lightpaint').painter?.engine.work.isReady",
+            "() => document.getElementById('lightpaint').painter?.engine.mirror.isReady",
             timeout=120_000,
         )
         # Clean planes of 64 lights take a minute, and both processors.
@@ -320,9 +320,9 @@ class Opened:
 PAINTER = "document.getElementById('lightpaint')?.painter"
 STAGES = {
     "page": f"() => {PAINTER}",
-    "picture": f"() => {PAINTER}?.engine.work.isReady && document.querySelector('.lightpaint .tag')"
+    "picture": f"() => {PAINTER}?.engine.mirror.isReady && document.querySelector('.lightpaint .tag')"
     " && document.querySelector('.is-lights input')",
-    "planes": f"() => {{ const {{ loader }} = {PAINTER}.engine.work;"
+    "planes": f"() => {{ const {{ loader }} = {PAINTER}.engine.mirror;"
     " return !loader.missing().length && !loader.onTheWay.size; }",
 }
 
@@ -422,7 +422,7 @@ def started(
         " return [box.x + pane.x + pane.width / 2, box.y + pane.y + pane.height / 2]; }"
     )
     page.mouse.click(*box)
-    page.wait_for_function(f"() => {PAINTER}.engine.work.strokes.count && {PAINTER}.engine.work"
+    page.wait_for_function(f"() => {PAINTER}.engine.mirror.strokes.count && {PAINTER}.engine.mirror"
                            ".strokes.isPending === false", timeout=60_000)  # fmt: skip
     times.append(time.perf_counter() - begin)
     used = Path(f"/proc/{painter.pid}/stat").read_text().rpartition(")")[2].split()[11:13]

@@ -154,10 +154,10 @@ def load(page: Page) -> None:
     """Until all is rendered, and clean: nothing that is published has grain."""
     page.wait_for_function(
         """() => {
-          const { work } = document.getElementById('lightpaint').painter.engine;
-          const there = [...work.loader.there.values()].filter((one) => one.includes(' clean/'));
+          const { mirror } = document.getElementById('lightpaint').painter.engine;
+          const there = [...mirror.loader.there.values()].filter((one) => one.includes(' clean/'));
           const isDone = !document.querySelector('.working');
-          return isDone && work.isReady && there.length === work.state.lights.length;
+          return isDone && mirror.isReady && there.length === mirror.state.lights.length;
         }""",
         timeout=600_000,
     )

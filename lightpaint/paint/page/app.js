@@ -6,26 +6,27 @@ import { Fold } from './ui/controls.js';
 import { Dialogs } from './ui/dialogs.js';
 import { PreviewDialog } from './ui/advice.js';
 import { counted } from './ui/format.js';
-import { hearWithin, press } from './ui/shortcuts.js';
-import { LightsPanel, OfAll } from './ui/light_list.js';
-import { Looks } from './ui/look_strip.js';
-import { handBefore, keep, openBefore, sizeBefore } from './ui/browser_storage.js';
-import { first } from './ui/ui_state.js';
-import { Banner, Tips, Toasts, Working } from './ui/notices.js';
-import { Session } from './ui/session_controller.js';
+import { handleKey, listenWithin } from './ui/keyboard.js';
+import { LightList, LightListActions } from './ui/light_list.js';
+import { LookStrip } from './ui/look_strip.js';
+import { storedTool, storeChanges, storedFolds, storedBrushSize } from './ui/browser_storage.js';
+import { initialState } from './ui/ui_state.js';
+import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
+import { SessionController } from './ui/session_controller.js';
 import { SettingsPanel } from './ui/settings_panel.js';
-import { Skips } from './ui/skip_links.js';
+import { SkipLinks } from './ui/skip_links.js';
 import { Stage } from './ui/stage.js';
 import { Store } from './ui/ui_store.js';
 import { Ask, ToolBar, ToolOptions } from './ui/toolbar.js';
 import { TopBar } from './ui/topbar.js';
-import { AnswerLine, Here, TruthPanel } from './ui/analysis_panel.js';
-import { Views, see } from './ui/view_tabs.js';
+import { AnalysisPanel } from './ui/analysis_panel.js';
+import { AnswerLine, PointerStatus } from './ui/answer_line.js';
+import { ViewTabs, showView } from './ui/view_tabs.js';
 
 /** @typedef {import("./ui/engine_interface.js").Host} Host */
 /** @typedef {import("./ui/engine_interface.js").Engine} Engine */
 /** @typedef {import("./ui/ui_state.js").Ui} Ui */
-/** @typedef {import("./ui/shortcuts.js").Hands} Hands */
+/** @typedef {import("./ui/shortcuts.js").App} App */
 
 /**
  * Show the painter in an element.
@@ -34,25 +35,25 @@ import { Views, see } from './ui/view_tabs.js';
  * engine over that host.
  * @param {HTMLElement} element @param {Host} host
  * @param {{global?: boolean, engine: Engine}} options
- * @returns {Promise<{store: Store<Ui>, session: Session, close: () => void}>}
+ * @returns {Promise<{store: Store<Ui>, session: SessionController, close: () => void}>}
  */
 export async function mount(element, host, { global = false, engine }) {
-  const open = { ...first().open, ...openBefore() };
-  const store = new Store({ ...first(), ...handBefore(), open });
+  const open = { ...initialState().open, ...storedFolds() };
+  const store = new Store({ ...initialState(), ...storedTool(), open });
   const root = document.createElement('div');
   root.className = 'lightpaint';
   root.dataset.lmSuppressShortcuts = 'true'; // of JupyterLab, which hears keys before the painter
   element.append(root);
-  const session = new Session(host, store);
-  const hands = { store, session, engine };
-  listen(hands);
+  const session = new SessionController(host, store);
+  const app = { store, session, engine };
+  listen(app);
   const ends = new AbortController();
   const { signal } = ends;
-  if (global) window.addEventListener('keydown', (event) => press(event, hands), { signal });
-  else hearWithin(root, hands, signal);
-  render(html`<${Painter} hands=${hands} root=${() => root} />`, root);
+  if (global) window.addEventListener('keydown', (event) => handleKey(event, app), { signal });
+  else listenWithin(root, app, signal);
+  render(html`<${Painter} app=${app} root=${() => root} />`, root);
   const folding = foldByItself(root, store);
-  const forget = keep(store);
+  const forget = storeChanges(store);
   const close = () => {
     ends.abort();
     folding.disconnect();
@@ -65,13 +66,13 @@ export async function mount(element, host, { global = false, engine }) {
   return { store, session, close };
 }
 
-/** @param {Hands} hands */
-function listen(hands) {
-  const { engine, session, store } = hands;
+/** @param {App} app */
+function listen(app) {
+  const { engine, session, store } = app;
   engine.on('message', (message) => session.receive(message));
   engine.on('loading', (loading) => store.set({ loading }));
   engine.on('asking', (asking) => store.set({ asking }));
-  engine.on('view', ({ view }) => see(hands, view));
+  engine.on('view', ({ view }) => showView(app, view));
   engine.on('lost', ({ count, isStale }) => {
     if (isStale) store.set({ unheard: count });
     else session.toast(given(count), 'warn');
@@ -83,7 +84,7 @@ function listen(hands) {
     if (!state || isSized) return;
     isSized = true;
     store.set({
-      size: sizeBefore(state.size[0]),
+      size: storedBrushSize(state.size[0]),
       show: {
         ...show,
         transform: state.transform?.name ?? show.transform,
@@ -121,41 +122,41 @@ function given(count) {
     not to cover what was painted there.`.replace(/\s+/g, ' ');
 }
 
-/** @param {{hands: Hands, root: () => HTMLElement}} props */
-function Painter({ hands, root }) {
-  const { store } = hands;
+/** @param {{app: App, root: () => HTMLElement}} props */
+function Painter({ app, root }) {
+  const { store } = app;
   const [ui, setUi] = useState(store.value);
   useEffect(() => {
     setUi(store.value);
     return store.listen(() => setUi(store.value));
   }, []);
   return html`
-    <${Skips} hands=${hands} />
-    <${TopBar} ui=${ui} hands=${hands} />
-    <${ToolBar} ui=${ui} hands=${hands} />
+    <${SkipLinks} app=${app} />
+    <${TopBar} ui=${ui} app=${app} />
+    <${ToolBar} ui=${ui} app=${app} />
     <main class=${`middle ${ui.side || ui.panel ? '' : 'is-wide'}`} aria-label="Painter">
-      <${ToolOptions} ui=${ui} hands=${hands} />
-      <${Views} ui=${ui} hands=${hands} />
-      <div class="view"><${Stage} ui=${ui} hands=${hands} />
-        <${Banner} ui=${ui} hands=${hands} />
-        <${Toasts} ui=${ui} hands=${hands} /></div>
-      <div class="status"><${Here} ui=${ui} /><${Working} ui=${ui} hands=${hands} /></div>
-      <${AnswerLine} ui=${ui} hands=${hands} />
-      <${Looks} ui=${ui} hands=${hands} />
+      <${ToolOptions} ui=${ui} app=${app} />
+      <${ViewTabs} ui=${ui} app=${app} />
+      <div class="view"><${Stage} ui=${ui} app=${app} />
+        <${Banner} ui=${ui} app=${app} />
+        <${Toasts} ui=${ui} app=${app} /></div>
+      <div class="status"><${PointerStatus} ui=${ui} /><${RunningTasks} ui=${ui} app=${app} /></div>
+      <${AnswerLine} ui=${ui} app=${app} />
+      <${LookStrip} ui=${ui} app=${app} />
     </main>
     ${
       ui.panel
-        ? html`<${SettingsPanel} ui=${ui} hands=${hands} />`
-        : ui.side && html`<${Side} ui=${ui} hands=${hands} />`
+        ? html`<${SettingsPanel} ui=${ui} app=${app} />`
+        : ui.side && html`<${Side} ui=${ui} app=${app} />`
     }
-    <${Dialogs} ui=${ui} hands=${hands} />
-    <${PreviewDialog} ui=${ui} hands=${hands} />
+    <${Dialogs} ui=${ui} app=${app} />
+    <${PreviewDialog} ui=${ui} app=${app} />
     <${Tips} root=${root} />`;
 }
 
-/** @param {{ui: Ui, hands: Hands}} props */
-function Side({ ui, hands }) {
-  const { store } = hands;
+/** @param {{ui: Ui, app: App}} props */
+function Side({ ui, app }) {
+  const { store } = app;
   const fold = (
     /** @type {string} */ name,
     /** @type {string} */ title,
@@ -165,14 +166,14 @@ function Side({ ui, hands }) {
     html`<${Fold} title=${title} class=${`is-${name}`} open=${Boolean(ui.open[name])} extra=${extra}
       toggle=${() => store.set({ open: { ...ui.open, [name]: !ui.open[name] } })}>${made}</${Fold}>`;
   return html`<aside class="side" aria-label="Panels">
-    ${fold('colour', 'Colour', html`<${ColourPanel} ui=${ui} hands=${hands} />`)}
-    ${fold('ask', 'Adjust by numbers', html`<${Ask} ui=${ui} hands=${hands} />`)}
+    ${fold('colour', 'Colour', html`<${ColourPanel} ui=${ui} app=${app} />`)}
+    ${fold('ask', 'Adjust by numbers', html`<${Ask} ui=${ui} app=${app} />`)}
     ${fold(
       'lights',
       'Lights',
-      html`<${LightsPanel} ui=${ui} hands=${hands} />`,
-      html`<${OfAll} ui=${ui} hands=${hands} />`,
+      html`<${LightList} ui=${ui} app=${app} />`,
+      html`<${LightListActions} ui=${ui} app=${app} />`,
     )}
-    ${fold('truth', 'Analysis', html`<${TruthPanel} ui=${ui} hands=${hands} />`)}
+    ${fold('truth', 'Analysis', html`<${AnalysisPanel} ui=${ui} app=${app} />`)}
   </aside>`;
 }

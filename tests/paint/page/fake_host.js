@@ -1,8 +1,8 @@
 /** Sessions that are none, for tests of what is sent. */
-import { Hearers } from "/engine/socket_host.js";
+import { Emitter } from "/engine/socket_host.js";
 
 /** Keeps what is said until a test answers it. */
-export class SlowHost extends Hearers {
+export class SlowHost extends Emitter {
   said = [];
   isOpen = true;
 

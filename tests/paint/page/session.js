@@ -1,8 +1,8 @@
 /** A session that is none: it answers at once, from the pictures of the site. */
-import { Hearers } from "/engine/socket_host.js";
+import { Emitter } from "/engine/socket_host.js";
 import { array } from "/bench.js";
 
-export class SiteHost extends Hearers {
+export class SiteHost extends Emitter {
   said = [];
   fetched = [];
 

@@ -70,7 +70,7 @@ def test_overlays_by_their_key_say_what_their_colours_mean(painter: Painter) -> 
     press("o")
     assert "grey" in legend.inner_text()
     press("o")
-    assert "counts" in legend.inner_text()
+    assert "painted" in legend.inner_text()
     press("o")
     assert legend.count() == 0
 
@@ -89,7 +89,7 @@ def test_a_legend_lies_on_no_picture_where_there_is_room(
     painter.page.evaluate("() => { engine.importance = 10; }")
     painter.page.keyboard.press("w")
     legend = painter.page.locator(".legend")
-    assert legend.get_by_text("counts 10 ×").is_visible()
+    assert legend.get_by_text("weight 10 ×").is_visible()
     box, stage = legend.bounding_box(), painter.page.locator(".stage").bounding_box()
     left, top, width, height = painter.page.evaluate(
         "() => { const pane = engine.panes().find(({ kind }) => kind === 'painting');"
@@ -393,7 +393,7 @@ def test_files_are_written_and_their_command_shown(painter: Painter) -> None:
     assert not painter.page.get_by_text("Nothing is painted yet").count()
     painter.page.evaluate("() => { host.unpainted = true; }")
     painter.page.get_by_role("dialog").get_by_role("button", name="Export", exact=True).click()
-    painter.page.get_by_text("Nothing is painted yet: no painting was written").wait_for()
+    painter.page.get_by_text("Nothing is painted yet, so no painting").wait_for()
     assert not painter.page.get_by_text("lightpaint solve gallery.xml").count()
 
 
@@ -408,7 +408,7 @@ def test_settings(painter: Painter) -> None:
     painter.button("Literal").click()
     painter.type("At most", "3")
     painter.button("Stay", exact=True).click()
-    painter.type("Strength", "0.02")
+    painter.type("Pull", "0.02")
     asked: dict[str, Any] = {}
     for said in painter.said("set"):
         asked |= said["values"]
@@ -578,7 +578,7 @@ def test_what_another_page_has_done_is_no_look_of_this_one(painter: Painter) -> 
 
 def test_looks_that_are_kept_at_once_have_names_of_their_own(painter: Painter) -> None:
     """And what was typed before is in them."""
-    painter.page.evaluate("() => { void painter.session.hold(1, [1, 1, 1], true); }")
+    painter.page.evaluate("() => { void painter.session.lockLight(1, [1, 1, 1], true); }")
     for _ in range(2):
         painter.page.evaluate(
             "() => window.dispatchEvent("

@@ -63,7 +63,7 @@ def test_stamps_flow_together(page: Any):
             + f"""
             canvas.begin();
             brush.stamp(canvas, {spot}, use); brush.stamp(canvas, {spot}, use);
-            canvas.apply(canvas.whole, {{ kind: "paint", rgb: [1, 1, 1], as: "look" }});
+            canvas.apply(canvas.whole, {{ kind: "paint", rgb: [1, 1, 1], as: "colour" }});
         """
         )
         return float(painted(page, script)[0][32, 40, 0])
@@ -202,19 +202,21 @@ def test_how_much_something_counts_has_an_end(page: Any):
 def test_a_drag_asks_for_stops_and_keeps_luminance(page: Any):
     # Up by 80 pixels is a stop. In the middle of a soft spot all of it.
     image, importance = painted(
-        page, stroke('tool: "ask"', place(40.5, 40.5), place(40.5, -39.5)), light=0.25
+        page, stroke('tool: "adjust"', place(40.5, 40.5), place(40.5, -39.5)), light=0.25
     )
     np.testing.assert_allclose(image[40, 40], 0.5, rtol=1e-6)
     np.testing.assert_allclose(image[..., 1], 0.25 * (1 + importance), rtol=1e-6)
     # To the right is warmer, as bright as before.
     image, importance = painted(
-        page, stroke('tool: "ask"', place(40.5, 40.5), place(140.5, 40.5)), light=0.25
+        page, stroke('tool: "adjust"', place(40.5, 40.5), place(140.5, 40.5)), light=0.25
     )
     r, g, b = image[40, 40]
     assert r > g > b
     luminance = image @ [0.2126, 0.7152, 0.0722]
     np.testing.assert_allclose(luminance, 0.25, rtol=1e-5)
-    left, _ = painted(page, stroke('tool: "ask"', place(40.5, 40.5), place(-20, 40.5)), light=0.25)
+    left, _ = painted(
+        page, stroke('tool: "adjust"', place(40.5, 40.5), place(-20, 40.5)), light=0.25
+    )
     assert left[40, 40, 0] < left[40, 40, 2]
 
 
@@ -267,7 +269,7 @@ def test_strokes_before_all_is_asked_stay_accents(page: Any):
     np.testing.assert_array_equal(again, importance)
 
 
-@pytest.mark.parametrize("tool", ["brush", "eraser", "weight", "fill", "line", "ask"])
+@pytest.mark.parametrize("tool", ["brush", "eraser", "weight", "fill", "line", "adjust"])
 def test_a_dropped_stroke_has_never_been(page: Any, tool: str):
     first = "{" + stroke("rgb: [1, 2, 3], hardness: 0", place(30, 30), place(60, 50)) + "}"
     before = painted(page, first, light=0.5)

@@ -165,7 +165,7 @@ def test_what_is_painted_is_answered_and_shown(fox: Fox, make_basis: Any, tmp_pa
     with served(basis, tmp_path / "room") as (studio, url):
         fox.open(url)
         until(
-            lambda: fox.look("return work.isReady && screen.width > 0 && !work.loader.total"),
+            lambda: fox.look("return mirror.isReady && screen.width > 0 && !mirror.loader.total"),
             "the page is not ready",
         )
         fox.press("0", *"]" * 4)
@@ -177,7 +177,7 @@ def test_what_is_painted_is_answered_and_shown(fox: Fox, make_basis: Any, tmp_pa
             return bool(studio.session.store.steps)
 
         until(painted, "no stroke is heard")
-        light = np.array(fox.look("return engine.hand.rgb"), float).reshape(1, 3)
+        light = np.array(fox.look("return engine.tool.rgb"), float).reshape(1, 3)
         code = to_8_bit(studio.session.transform.encode(light))[0].astype(int)
 
         def is_answered() -> bool:
@@ -200,10 +200,13 @@ def test_what_is_painted_is_answered_and_shown(fox: Fox, make_basis: Any, tmp_pa
             assert url.partition("=")[2] not in str(neighbour.collected)
             assert neighbour.replay(painter) == []
         fox.open(painter)
-        until(lambda: fox.look("return work.isReady && screen.width > 0"), "it does not go on")
+        until(lambda: fox.look("return mirror.isReady && screen.width > 0"), "it does not go on")
         until(lambda: np.allclose(fox.seen(30, 20), code, atol=8), "the stroke is not there")
         # The address alone opens nothing; with its token it opens a second tab.
         fox.new_tab()
-        for address, said in ((painter, "does not know this page"), (url, "open in another tab")):
+        for address, said in (
+            (painter, "belongs to a painter that has ended"),
+            (url, "open in another tab"),
+        ):
             fox.open(address)
             until(partial(fox.reads, said), f"it does not say: {said}")

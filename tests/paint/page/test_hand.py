@@ -21,7 +21,7 @@ def test_a_stroke_goes_to_the_engine_and_the_hint_goes_away(opened: Any) -> None
 
 def test_keys_of_paint_programs(painter: Painter) -> None:
     press = painter.page.keyboard.press
-    tools = {"e": "eraser", "w": "weight", "i": "pick", "g": "fill", "l": "line", "a": "ask"}
+    tools = {"e": "eraser", "w": "weight", "i": "pick", "g": "fill", "l": "line", "a": "adjust"}
     for key, tool in {**tools, "b": "brush"}.items():
         press(key)
         assert painter.ui("tool") == tool
@@ -130,7 +130,7 @@ def test_hints_are_of_the_tool_and_of_fingers(opened: Any) -> None:
     assert "Shift-click" in status.text_content()
     for key, first in (
         ("a", "up brighter"),
-        ("g", "an object of this picture"),
+        ("g", "an object in this picture"),
         ("l", "drag over this picture"),
         ("w", "where it has to fit"),
         ("i", "Take light"),
@@ -193,7 +193,7 @@ def test_the_colour_panel(painter: Painter) -> None:
     assert lately.get_by_role("button").count() == 1
     assert painter.page.locator(".is-ask").bounding_box() == below  # its room was there
     painter.button("Colour", exact=True).click()
-    assert painter.ui("as") == "look"
+    assert painter.ui("as") == "colour"
 
 
 def test_how_bright_a_colour_is_is_seen_and_said(painter: Painter) -> None:
@@ -335,9 +335,9 @@ def test_asking_in_numbers(painter: Painter) -> None:
     painter.type("Brighter", "-1.5")
     painter.type("Warmer", "40")
     painter.button("Apply").click()
-    assert painter.calls("ask")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
+    assert painter.calls("adjust")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
     painter.stroke()
-    assert painter.calls("begin")[-1][1] == "ask"
+    assert painter.calls("begin")[-1][1] == "adjust"
 
 
 def test_importance_is_seen_while_it_is_painted(painter: Painter) -> None:
@@ -345,7 +345,7 @@ def test_importance_is_seen_while_it_is_painted(painter: Painter) -> None:
     painter.still()
     assert painter.page.evaluate("() => window.engine.shown.overlay") == "importance"
     assert painter.page.locator(".legend").get_by_text("Importance").is_visible()
-    assert painter.page.evaluate("() => window.engine.hand.importance") == 4
+    assert painter.page.evaluate("() => window.engine.tool.importance") == 4
     painter.slide("Weight", "Home")
     assert painter.ui("importance") == 0.1
     painter.page.keyboard.press("o")  # another overlay is what was asked for
@@ -439,11 +439,11 @@ def test_a_pointer_that_has_left_is_over_nothing(painter: Painter) -> None:
     assert painter.ui("pointed") is None
 
 
-@pytest.mark.parametrize("tool", ["ask", "pick"])
+@pytest.mark.parametrize("tool", ["adjust", "pick"])
 def test_what_is_said_beside_the_brush_lies_in_the_picture(painter: Painter, tool: str) -> None:
     """Above it, or beside it where there is no room; never under the hand."""
     page = painter.page
-    page.keyboard.press(tool[0] if tool == "ask" else "i")
+    page.keyboard.press(tool[0] if tool == "adjust" else "i")
     stage = page.locator(".stage").bounding_box()
     for k in (0, 1):
         pane = page.evaluate("(k) => engine.panes()[k]", k)
@@ -452,7 +452,7 @@ def test_what_is_said_beside_the_brush_lies_in_the_picture(painter: Painter, too
         for a, b in ((0.5, 0.5), (0.02, 0.02), (0.98, 0.02), (0.02, 0.98), (0.98, 0.98)):
             x, y = left + a * wide, top + b * high
             page.mouse.move(x, y)
-            if tool == "ask":
+            if tool == "adjust":
                 page.mouse.down()
                 page.mouse.move(x + 20, y + 30)
             painter.still()
@@ -514,13 +514,13 @@ def test_numbers_that_were_typed_stay_while_other_panels_are_open(painter: Paint
     page.keyboard.press("p")
     ask = painter.button("Apply")
     ask.click()
-    assert painter.calls("ask")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
+    assert painter.calls("adjust")[-1][1] == {"stops": -1.5, "mired": 40, "object": 3}
     page.evaluate(
         """() => window.painter.store.set(({ state, views }) => ({
           state: { ...state, objects: ['red ball', 'floor'] } }))"""
     )
     ask.click()
-    assert painter.calls("ask")[-1][1]["object"] == 0
+    assert painter.calls("adjust")[-1][1]["object"] == 0
     page.evaluate(
         """() => window.painter.store.set(({ state }) => ({
           state: { ...state, objects: ['floor'] } }))"""
@@ -539,7 +539,7 @@ def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
     for where in (page.get_by_role("combobox", name="Area"), ask):
         where.focus()
         page.keyboard.press("e")
-        assert painter.ui("tool") == "ask"
+        assert painter.ui("tool") == "adjust"
     ask.press("Enter")
     assert ask.evaluate("(one) => one === document.activeElement")
     ask.click()  # who clicks goes back to the pictures
@@ -641,7 +641,7 @@ def test_the_object_that_would_be_filled_has_an_outline(opened: Any, engine: str
 
 def test_fill_has_a_flow_of_its_own(painter: Painter) -> None:
     def flows() -> tuple[float, float]:
-        return painter.page.evaluate("() => engine.hand.flow"), painter.ui("flow")
+        return painter.page.evaluate("() => engine.tool.flow"), painter.ui("flow")
 
     painter.page.keyboard.press("3")
     assert flows() == (0.3, 0.3)

@@ -17,7 +17,9 @@ from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 
-NO_KEY_TEXT = "does not know this page: open the address that its terminal shows"
+NO_KEY_TEXT = (
+    "This page belongs to a painter that has ended. Open the address that the terminal shows"
+)
 
 
 @pytest.fixture
@@ -56,7 +58,7 @@ def has_painter(page: Any) -> None:
     """Wait until the painter is there, with a picture that was fetched."""
     page.wait_for_selector(".lightpaint .tag")
     page.wait_for_function(
-        "() => document.getElementById('lightpaint').painter.engine.work.isReady"
+        "() => document.getElementById('lightpaint').painter.engine.mirror.isReady"
     )
 
 

@@ -356,7 +356,7 @@ def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
         painter.button("Compare looks").click()
         painter.choose("First look", "2")
         painter.stroke()
-        painter.page.evaluate("() => painter.session.hold(0, [9, 9, 9], true)")
+        painter.page.evaluate("() => painter.session.lockLight(0, [9, 9, 9], true)")
         painter.page.locator(".is-unseen").wait_for()
         painter.page.get_by_role("button", name="key", exact=True).click()
         painter.button("Solo: show pendant").click()

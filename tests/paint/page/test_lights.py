@@ -46,7 +46,7 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
         painter.page.get_by_role("textbox", name="key, level").blur()
         words = "is not a level. Type stops from now (+1.5), percent (80 %), as now, or off."
         if text[-1].isdigit():
-            words = "may be stops or percent: type the unit, too (12 st, 80 %)."
+            words = "could be stops or percent: add the unit (12 st, 80 %)."
         assert painter.ui("toasts")[-1]["text"] == f"{text} {words}"
     said = len(painter.ui("toasts"))
     painter.type("key, level", " ")
@@ -67,7 +67,7 @@ def test_a_level_is_typed_in_stops_or_percent(painter: Painter) -> None:
 
 def test_a_light_is_held_at_what_is_typed_in_any_unit(painter: Painter) -> None:
     painter.page.get_by_role("button", name="key", exact=True).click()
-    panel = painter.page.get_by_role("group", name="What the solve may do with key")
+    panel = painter.page.get_by_role("group", name="Constraints on key")
     panel.get_by_role("button", name="Locked", exact=True).click()
     present = painter.page.evaluate("() => window.painter.store.value.lights[0].present")
     level = sum(a * b for a, b in zip((0.2126, 0.7152, 0.0722), present, strict=True))
@@ -116,7 +116,7 @@ def test_what_is_asked_of_a_level_stands_in_one_row(opened: Any, size: tuple[int
     painter = opened(viewport={"width": size[0], "height": size[1]})
     painter.page.evaluate("() => painter.store.set({ side: true, open: { lights: true } })")
     painter.page.get_by_role("button", name="key", exact=True).click()
-    panel = painter.page.get_by_role("group", name="What the solve may do with key")
+    panel = painter.page.get_by_role("group", name="Constraints on key")
     room = panel.bounding_box()
 
     def in_a_row(*labels: str) -> None:
@@ -151,7 +151,7 @@ def test_a_long_name_of_a_dimmer_has_one_line(painter: Painter) -> None:
           });
         }"""
     )
-    name = "spotlight_figure_left and spotlight_knot_right, on one dimmer"
+    name = "spotlight_figure_left and spotlight_knot_right, tied"
     head = painter.page.locator(".group-name")
     assert head.get_attribute("data-tip") == name
     assert head.bounding_box()["height"] == 28
@@ -167,15 +167,15 @@ def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, w
     painter.page.evaluate(
         """async ([limits, way]) => {
           const { session } = painter;
-          await session.ask(0, limits);
-          const asked = way === 'off' ? session.turn(0, true) : session.hold(0, [1, 1, 1], true);
+          await session.constrainLight(0, limits);
+          const asked = way === 'off' ? session.turn(0, true) : session.lockLight(0, [1, 1, 1], true);
           host.tell({ kind: 'answer', exact: true, asked: { key: limits }, arrays: {} });
           await asked;
         }""",
         [limits, way],
     )
     painter.still()
-    painter.page.evaluate("() => painter.session.release(0)")
+    painter.page.evaluate("() => painter.session.unlockLight(0)")
     assert painter.said("ask")[-1]["asked"] == limits
 
 
@@ -190,7 +190,7 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     painter.type("From", "3000")
     asked = painter.said("ask")[-1]["asked"]
     assert asked == {"limits": {"min": "20%", "max": "150%"}, "kelvin": [3000, 6500]}
-    panel = page.get_by_role("group", name="What the solve may do with key")
+    panel = page.get_by_role("group", name="Constraints on key")
     panel.get_by_role("button", name="Off", exact=True).click()
     assert painter.said("ask")[-1]["asked"] == {"off": True}
     panel.get_by_role("button", name="Free", exact=True).click()
@@ -204,16 +204,16 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     assert painter.said("ask")[-1]["asked"] == {"lock": True}
     painter.choose("Tie to", "cove")
     assert painter.said("tie")[-1]["ties"] == [["key", "cove"]]
-    group = painter.page.get_by_role("group", name="key and cove, on one dimmer")
-    painter.page.evaluate("() => painter.session.ask(0, { color: '3200K' })")
+    group = painter.page.get_by_role("group", name="key and cove, tied")
+    painter.page.evaluate("() => painter.session.constrainLight(0, { color: '3200K' })")
     colour = painter.page.get_by_role("combobox", name="Colour", exact=True)
     colour.select_option("any")
     panel.get_by_text("lights keep the colours").wait_for()
     assert colour.count() == 0
     assert group.locator(".light").count() == 2
-    group.get_by_role("button", name="key and cove, on one dimmer").first.click()  # it folds
+    group.get_by_role("button", name="key and cove, tied").first.click()  # it folds
     assert group.locator(".light").count() == 0
-    group.get_by_role("button", name="key and cove, on one dimmer").first.click()
+    group.get_by_role("button", name="key and cove, tied").first.click()
     painter.button("Untie").click()
     assert painter.said("tie")[-1]["ties"] == []
 
@@ -242,7 +242,7 @@ def test_a_light_is_said_to_be_held_back_by_what_is_asked_of_it_alone(painter: P
     assert badge.count() == 0
     painter.page.evaluate(held, {"key": {"limits": {"max": "150%"}, "kelvin": [2700, 3000]}})
     assert badge.all_inner_texts() == ["held back"]
-    assert "That holds it back: the painting asks" in badge.get_attribute("data-tip")
+    assert "This keeps it from what the painting asks" in badge.get_attribute("data-tip")
     within = "(one) => one.scrollWidth <= one.clientWidth"
     assert badge.evaluate(within)
     painter.page.evaluate(held, {"key": {"lock": [1, 1, 1]}})
@@ -385,7 +385,7 @@ def test_64_lights_are_found_sorted_and_folded(opened: Any) -> None:
     painter.button("Row B", exact=False).click()
     assert rows.count() == 0
     painter.page.get_by_label("Search lights").fill("nothing such")
-    assert painter.page.get_by_text("No light is called so").is_visible()
+    assert painter.page.get_by_text("No light has this name").is_visible()
     painter.page.get_by_label("Search lights").fill("")
     painter.choose("Sort by", "share")
     names = [row.get_attribute("data-light") for row in rows.all()]
@@ -450,7 +450,7 @@ def test_a_finger_scrolls_lights_and_moves_none(opened: Any) -> None:
 def panel_of_key(painter: Painter) -> Any:
     """What may be asked of the key light."""
     painter.page.get_by_role("button", name="key", exact=True).click()
-    return painter.page.get_by_role("group", name="What the solve may do with key")
+    return painter.page.get_by_role("group", name="Constraints on key")
 
 
 def test_what_is_off_is_not_turned_up_by_turning_it_down(painter: Painter) -> None:
@@ -486,7 +486,7 @@ def test_levels_far_below_one_are_not_off(painter: Painter) -> None:
 def test_limits_of_a_lights_file_are_shown_in_one_unit(
     painter: Painter, limits: Any, shown: Any, turned: Any
 ) -> None:
-    painter.page.evaluate("(limits) => painter.session.ask(0, { limits })", limits)
+    painter.page.evaluate("(limits) => painter.session.constrainLight(0, { limits })", limits)
     painter.still()
     panel = panel_of_key(painter)
     red, green, blue = painter.ui("lights")[0]["present"]
@@ -513,7 +513,7 @@ def test_limits_of_a_lights_file_are_shown_in_one_unit(
 
 def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
     """Each has again what was asked of it before; as after a look that holds all of them."""
-    painter.page.evaluate("() => painter.session.ask(0, { limits: { max: '150%' } })")
+    painter.page.evaluate("() => painter.session.constrainLight(0, { limits: { max: '150%' } })")
     painter.still()
     free = painter.page.get_by_role("button", name="Unlock all")
     for name in ("key", "cove"):
@@ -531,7 +531,7 @@ def test_all_lights_are_let_go_of_in_one_step(painter: Painter) -> None:
 
 def test_a_white_that_is_green_or_pink_is_said_to_be(painter: Painter) -> None:
     def said(rgb: list[float]) -> str:
-        painter.page.evaluate("(rgb) => painter.session.hold(0, rgb, true)", rgb)
+        painter.page.evaluate("(rgb) => painter.session.lockLight(0, rgb, true)", rgb)
         painter.still()
         return str(painter.page.locator('[data-light="key"] .values').inner_text())
 

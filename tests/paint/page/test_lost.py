@@ -63,7 +63,7 @@ def test_a_place_that_has_lost_the_painter_gets_its_pictures_when_it_has_it_agai
     take_over.click()
     painter.page.wait_for_function(f"() => ({THUMBS})()[1] === 7")
     painter.page.wait_for_function(
-        "() => engine.work.isReady && !engine.work.loader.missing().length"
+        "() => engine.mirror.isReady && !engine.mirror.loader.missing().length"
     )
     painter.stroke()
     assert painter.said("paint")
@@ -95,8 +95,8 @@ def test_what_is_refused_is_shown_no_longer(painter: Painter) -> None:
     before["asked"] = painter.ui("asked")
     for act in (
         lambda: painter.choose("Tie to", "cove"),
-        lambda: painter.page.evaluate("() => void painter.session.setting('sparse', 99)"),
-        lambda: painter.page.evaluate("() => painter.session.hold(2, [9, 9, 9], true)"),
+        lambda: painter.page.evaluate("() => void painter.session.changeSetting('sparse', 99)"),
+        lambda: painter.page.evaluate("() => painter.session.lockLight(2, [9, 9, 9], true)"),
     ):
         refuse(painter)
         act()
@@ -109,8 +109,8 @@ def test_what_is_refused_leaves_what_is_on_its_way(painter: Painter) -> None:
         """() => {
           const { session } = painter;
           host.fails = 'That cannot be done.';
-          session.ask(0, { limits: { max: '1e308%' } });
-          session.ask(1, { off: true });
+          session.constrainLight(0, { limits: { max: '1e308%' } });
+          session.constrainLight(1, { off: true });
         }"""
     )
     painter.still()
@@ -160,7 +160,7 @@ def test_a_kernel_that_has_ended_is_said_to_have(opened: Any, model: str) -> Non
     assert painter.page.get_by_role("button", name="Take over").count() == (model != "model")
     painter.page.evaluate("() => model.trigger('comm_live_update')")
     painter.still()
-    assert "The kernel has ended: run the cell again" in alert(painter)
+    assert "The kernel has ended. Run the cell again" in alert(painter)
     assert painter.page.get_by_role("button", name="Take over").count() == 0
     painter.stroke()
     assert not painter.calls("begin")

@@ -57,11 +57,11 @@ def run(page: Any, site_of: Any) -> Any:
                 const engine = openEngine(host, {{ view }});
                 document.body.replaceChildren(engine.element);
                 const show = {SHOW};
-                const use = {{ tool: "brush", rgb: [1, 0.5, 0.25], as: "look", size: 8,
+                const use = {{ tool: "brush", rgb: [1, 0.5, 0.25], as: "colour", size: 8,
                     hardness: 1, flow: 1, importance: 1 }};
                 const loads = [];
                 engine.on("loading", ({{ done, total }}) => loads.push([done, total]));
-                engine.use(use);
+                engine.setTool(use);
                 engine.resize(2 * W + 4, H);
                 engine.show(show);
                 await host.begin();
@@ -73,7 +73,7 @@ def run(page: Any, site_of: Any) -> Any:
                         .slice(0, 3);
                 }};
                 const rest = async () => {{
-                    await until(() => !engine.work.strokes.isPending);
+                    await until(() => !engine.mirror.strokes.isPending);
                     return host.said.map(({{ kind, fields }}) => [kind, fields]);
                 }};
                 {script}
@@ -149,7 +149,7 @@ def test_asking_by_drag_says_how_much(run: Any):
         """
         const asked = [];
         engine.on("asking", (event) => asked.push(event));
-        engine.use({ ...use, tool: "ask" });
+        engine.setTool({ ...use, tool: "adjust" });
         engine.begin(at(20.5, 15.5)); engine.move([at(20.5, -64.5)]);
         const colour = engine.lightAt("painting", 20.2, 15.9);
         engine.end();
@@ -159,13 +159,13 @@ def test_asking_by_drag_says_how_much(run: Any):
     )
     assert asked == [{"stops": 1, "mired": 0}]
     np.testing.assert_allclose(colour, 0.5)
-    assert [fields.get("label") for _, fields in said if fields.get("done")] == ["ask"]
+    assert [fields.get("label") for _, fields in said if fields.get("done")] == ["adjust"]
 
 
 def test_asking_by_numbers_line_fill_and_undo(run: Any):
     wall, floor, back, line, said = run(
         """
-        engine.ask({ stops: -1, mired: 0, object: 1 });
+        engine.adjust({ stops: -1, mired: 0, object: 1 });
         const light = (x, y) => engine.lightAt("painting", x, y)[0];
         const [wall, floor] = [light(30, 3), light(3, 3)];
         await rest();
@@ -179,7 +179,7 @@ def test_asking_by_numbers_line_fill_and_undo(run: Any):
     )
     assert (wall, floor, back) == (0.125, 0.25, 0.125)
     assert line == [1, 1, 0.125]
-    assert [f["label"] for _, f in said if f.get("done")] == ["ask", "brush"]
+    assert [f["label"] for _, f in said if f.get("done")] == ["adjust", "brush"]
 
 
 def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):
@@ -188,7 +188,7 @@ def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):
         const fetch = host.fetch.bind(host);
         let go; const gate = new Promise((done) => { go = done; });
         host.fetch = async (name) => { const made = await fetch(name); await gate; return made; };
-        const synced = engine.work.sync();
+        const synced = engine.mirror.sync();
         await until(() => host.fetched.includes("importance"));
         const arrays = { image: { data: new Float32Array(3 * H * W).fill(0.125), shape: [H, W, 3] },
             importance: { data: new Float32Array(H * W), shape: [H, W] } };
@@ -214,14 +214,14 @@ def test_what_is_picked_paints_the_same(run: Any, view: str):
     """As light it is what falls there, and not what comes back of it."""
     picked, look, on_black = run(
         """
-        const { canvas } = engine.work;
+        const { canvas } = engine.mirror;
         canvas.albedo = new Uint16Array(W * H * 3).fill(0x3400);  // a quarter
         canvas.albedo.fill(0, 0, 3);
-        engine.use({ ...use, as: "light" });
+        engine.setTool({ ...use, as: "light" });
         engine.begin(at(10, 10)); engine.end();
         const picked = [engine.paintAt("painting", 10, 10), engine.lightAt("painting", 10, 10)];
         const black = engine.paintAt("painting", 0, 0);
-        engine.use(use);
+        engine.setTool(use);
         return [...picked, [black, engine.paintAt("painting", 0, 0)]];
         """,
         view,
@@ -287,7 +287,7 @@ def test_of_another_view_only_its_pictures_are_fetched(run: Any, site_of: Any):
         const { array } = await import("/bench.js");
         const before = host.fetched.length;
         host.fetch = (name) => { host.fetched.push(name); return array(name.replace("@1", "")); };
-        engine.see(1);
+        engine.showView(1);
         await until(() => loads.at(-1)[1] === 0 && engine.place);
         return host.fetched.slice(before);
         """
@@ -303,7 +303,7 @@ def test_old_answers_do_not_come_back(run: Any):
         const say = (version, value) => host.tell("answer", { kind: "answer", version,
             arrays: { weights: { data: new Float64Array(9).fill(value), shape: [3, 3] } } });
         say(7, 1); say(6, 2);
-        return Array.from(engine.work.weights);
+        return Array.from(engine.mirror.weights);
         """
     )
     assert weights == [1] * 9
@@ -315,7 +315,7 @@ def test_an_answer_to_what_was_undone_does_not_come_back(run: Any):
         const say = (kind, version, value) => host.tell(kind, { kind, version, region: [0, 0, 0, 0],
             arrays: { weights: { data: new Float64Array(9).fill(value), shape: [3, 3] } } });
         say("patch", 7, 1); say("answer", 6, 2); say("patch", 6, 3);
-        return Array.from(engine.work.weights);
+        return Array.from(engine.mirror.weights);
         """
     )
     assert weights == [1] * 9

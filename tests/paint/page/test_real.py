@@ -98,7 +98,7 @@ class Person:
         """Wait until all pictures are there, and what was done before."""
         self.page.wait_for_selector(".lightpaint .tag")
         there = (
-            "return work.isReady && !work.loader.missing().length && !work.loader.onTheWay.size"
+            "return mirror.isReady && !mirror.loader.missing().length && !mirror.loader.onTheWay.size"
             "&& screen.width > 0 && screen.width === engine.element.clientWidth"
         )
         until(lambda: self.look(there), "the page is not ready")
@@ -171,7 +171,7 @@ class Person:
     @property
     def paint(self) -> Any:
         """Linear light of what is in the hand."""
-        return np.array(self.look("return engine.hand.rgb"))
+        return np.array(self.look("return engine.tool.rgb"))
 
     def code(self, light: Any) -> Any:
         """What a display shows of light in this session."""
@@ -517,7 +517,7 @@ def test_a_stroke_that_was_taken_over_lies_over_nothing(served: Served, opened: 
     first.page.mouse.move(*first.at(60, 5), steps=3)
     first.page.mouse.up()
     first.button("Take over").click()
-    first.page.get_by_text("A stroke of this tab had not been heard").wait_for()
+    first.page.get_by_text("A stroke in this tab had not been sent").wait_for()
     first.ready()
     assert served.steps == ["stroke", "brush"]
     np.testing.assert_allclose(first.seen(15, 5), first.code(second.paint), atol=1)
@@ -542,7 +542,7 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
         me.stroke((10, 5), (20, 5))
         me.stroke((10, 15), (20, 15))
         again = Served(subject, port=served.server.port)
-        page.get_by_text("The painter that runs here does not know this page").wait_for()
+        page.get_by_text("This page belongs to a painter that has ended").wait_for()
         page.get_by_text("never heard, and lost: 2 strokes").wait_for()
         # Nobody would hear more of them.
         count = me.look("return work.strokes.count")
@@ -552,7 +552,7 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
         beside.goto(again.server.url)
         # The new tab has the new key, and the old one does not take the session by it.
         Person(beside, again).ready()
-        assert page.get_by_text("The painter that runs here does not know this page").is_visible()
+        assert page.get_by_text("This page belongs to a painter that has ended").is_visible()
     finally:
         context.close()
         if again:
@@ -580,7 +580,7 @@ def test_two_views_are_painted_and_have_one_answer(two: Served, opened: Any) -> 
     me.press(*FIRM).stroke((20, 10), (40, 10)).still("brush")
     before = me.answered(10, 30, 1)
     me.press("n").ready()
-    assert me.look("return [engine.work.view, ...screen.size]") == [1, 44, 48]
+    assert me.look("return [engine.mirror.view, ...screen.size]") == [1, 44, 48]
     assert me.button("side not painted").get_attribute("aria-pressed") == "true"
     np.testing.assert_allclose(me.seen(10, 30, 1), before, atol=1)
     me.page.get_by_text("Nothing is painted in this view").wait_for()
@@ -598,16 +598,16 @@ def test_two_views_are_painted_and_have_one_answer(two: Served, opened: Any) -> 
     np.testing.assert_allclose(me.seen(70, 40, 1), me.answered(70, 40), atol=1)
     # What is undone is seen.
     me.press("Control+z")
-    until(lambda: me.look("return engine.work.view") == 1, "the other view is shown")
+    until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
     me.ready().still("brush", "brush")
     np.testing.assert_allclose(me.seen(20, 30), me.code(paint), atol=1)
     me.press("Control+z").still("brush")
     me.press("Control+z")
-    until(lambda: me.look("return engine.work.view") == 0, "the first view is shown")
+    until(lambda: me.look("return engine.mirror.view") == 0, "the first view is shown")
     me.ready().still()
     np.testing.assert_allclose(me.seen(30, 10), me.code(views[0].present[10, 30]), atol=1)
     me.press("Control+Shift+Z", "Control+Shift+Z").still("brush", "brush")
-    until(lambda: me.look("return engine.work.view") == 1, "the other view is shown")
+    until(lambda: me.look("return engine.mirror.view") == 1, "the other view is shown")
     me.ready()
     me.button("Export").click()
     assert not me.page.get_by_label("Report").is_visible()  # of bases without their scene

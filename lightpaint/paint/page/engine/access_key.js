@@ -1,7 +1,7 @@
 /**
- * How a page comes by the key of the painter's server, and shows it.
+ * The key to the painter's server: how a page gets it and presents it.
  *
- * The address that a terminal shows has a token in its fragment, which browsers send to nobody. The
+ * The address that a terminal shows has a token in its fragment, which browsers never send. The
  * page takes it from there and exchanges it for the key. What a browser would attach by itself, a
  * cookie, goes to all servers of the machine; the key goes where the page sends it.
  */
@@ -21,7 +21,7 @@ export function shown(key) {
   return { credentials: 'omit', headers: { authorization: `Bearer ${key}` } };
 }
 
-export class Entry {
+export class AccessKey {
   /** Where the page came from. @param {string | URL} base */
   constructor(base) {
     this.url = new URL('key', new URL('.', base));

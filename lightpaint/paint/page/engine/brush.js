@@ -1,4 +1,6 @@
-/** What the brush leaves: round stamps along a path. Places and sizes in pixels of the picture. */
+/**
+ * Brush strokes as round stamps along a path. Positions and sizes are in pixels of the picture.
+ */
 
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */

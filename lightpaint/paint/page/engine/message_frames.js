@@ -1,5 +1,6 @@
 /**
- * What page and session say to each other, as bytes; the twin of paint/frames.py; `messages.d.ts` has the types.
+ * Messages between page and session as bytes; the twin of paint/frames.py. `messages.d.ts` has their
+ * types.
  *
  * A frame is: uint32 length of the JSON, little endian | JSON | padding to 8 bytes | buffers, each
  * padded. `buffers` in the JSON says what they are. Colours are linear Rec.709.

@@ -1,5 +1,5 @@
-/** The session behind a notebook's model: messages as they are, with their buffers beside them. */
-import { AT_ONCE, Hearers } from './socket_host.js';
+/** The session behind an anywidget model in a notebook. */
+import { UNQUEUED, Emitter } from './socket_host.js';
 import { VERSION, described, pictureOf } from './message_frames.js';
 
 /** @typedef {import("./socket_host.js").Host} Host */
@@ -20,10 +20,10 @@ const MESSAGES = 2 ** 32;
 /** Milliseconds without an answer after which that is said. */
 const SILENCE_MS = 10_000;
 
-const ENDED = 'The kernel has ended. Run the cell again to continue.';
+const ENDED_TEXT = 'The kernel has ended. Run the cell again to continue.';
 
 /** @implements {Host} */
-export class ModelHost extends Hearers {
+export class ModelHost extends Emitter {
   /** @param {Model} model */
   constructor(model) {
     super();
@@ -95,9 +95,9 @@ export class ModelHost extends Hearers {
 
   /** Nobody is there any more. */
   ended() {
-    this.leave(ENDED);
+    this.leave(ENDED_TEXT);
     this.hush(false);
-    this.tell('closed', { kind: 'closed', reason: 'ended', text: ENDED });
+    this.tell('closed', { kind: 'closed', reason: 'ended', text: ENDED_TEXT });
   }
 
   /** Nothing is asked or answered any more. @param {string} why */
@@ -112,9 +112,9 @@ export class ModelHost extends Hearers {
    * @param {import("./messages.js").Requests[K]} [fields] @param {Arrays} [arrays]
    * @returns {Promise<Message>} */
   async send(kind, fields, arrays = {}) {
-    if (!AT_ONCE.includes(kind)) await this.gate();
+    if (!UNQUEUED.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {
-      if (this.isOver) return reject(new Error(ENDED));
+      if (this.isOver) return reject(new Error(ENDED_TEXT));
       const seq = ++this.seq;
       this.asked.set(seq, { resolve, reject });
       if (this.timer === undefined) this.listen(seq - 1);

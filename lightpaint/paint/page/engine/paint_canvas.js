@@ -5,7 +5,7 @@
  * before and from how far it is covered. So a stroke can change as long as it lasts (a line, a
  * drag that asks), and be dropped. What was before is kept in tiles, where the stroke has been.
  */
-import { changing } from './stroke_effects.js';
+import { pixelChange } from './stroke_effects.js';
 import { VALUES, toFloats } from '../../../viewer/drawing/half.js';
 import { union } from '../../../viewer/drawing/layer.js';
 
@@ -20,19 +20,19 @@ import { union } from '../../../viewer/drawing/layer.js';
 const TILE = 64;
 
 /** Importance below which a pixel is not painted. */
-const DUST = 1e-3;
+const MIN_IMPORTANCE = 1e-3;
 
 /** Importance of the rest of a picture beside that of a stroke, and by how much at most a stroke
  * counts more than the rest: that makes up for a stroke over a thirtieth of the picture. */
-const REST = 3;
-const OVER = 10;
+const REST_SHARE = 3;
+const MAX_ACCENT = 10;
 
 /** By how much what covers that part of a picture counts more than the rest of it, where all is
  * painted. @param {number} part */
-const accent = (part) => Math.min(OVER, Math.max(1, (1 - part) / (REST * part)));
+const accent = (part) => Math.min(MAX_ACCENT, Math.max(1, (1 - part) / (REST_SHARE * part)));
 
 /** What halves can hold, so that both views can show it. */
-const MOST = 65504;
+const MAX_HALF = 65504;
 
 export class PaintCanvas {
   /** @param {[height: number, width: number]} size @param {Uint16Array} present
@@ -126,15 +126,15 @@ export class PaintCanvas {
   /** Make of the pixels what the stroke does to them.
    * @param {Region} region @param {Effect} effect */
   apply(region, effect) {
-    const change = changing(this, effect);
+    const change = pixelChange(this, effect);
     const { importance, image, present } = this;
     this.each(region, false, (tile, q, p) => {
       const covered = tile.coverage[q];
       if (covered <= 0) return;
       change(tile, q, p, covered);
-      if (importance[p] < DUST) importance[p] = 0;
+      if (importance[p] < MIN_IMPORTANCE) importance[p] = 0;
       for (let i = 3 * p; i < 3 * p + 3; i++)
-        image[i] = importance[p] ? Math.min(MOST, Math.max(0, image[i])) : VALUES[present[i]];
+        image[i] = importance[p] ? Math.min(MAX_HALF, Math.max(0, image[i])) : VALUES[present[i]];
     });
   }
 

@@ -1,22 +1,22 @@
 /**
- * The picture engine: what the interface calls (ui/engine.js says what it wants of it).
+ * The picture engine, which implements `Engine` of ui/engine_interface.js.
  *
- * It holds the painting, shows the pictures, turns what the hand does into strokes, and follows
- * what the session says of pixels and weights.
+ * It holds the painting, shows the pictures, turns pointer input into strokes, and follows the
+ * pixels and weights that the session sends.
  */
 import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half.js';
-import { FIRST, LABELS, Stroke, askFor } from './stroke.js';
-import { Hearers, SocketHost } from './socket_host.js';
+import { DEFAULT_TOOL, LABELS, Stroke, adjustArea } from './stroke.js';
+import { Emitter, SocketHost } from './socket_host.js';
 import { union } from '../../../viewer/drawing/layer.js';
 import { Encoder } from '../../../viewer/drawing/lut.js';
 import { fullOf } from '../../../viewer/drawing/overlay.js';
 import { Screen } from './screen.js';
 import { at, zoomed } from '../../../viewer/drawing/view.js';
-import { Work } from './session_mirror.js';
+import { SessionMirror } from './session_mirror.js';
 
 /** @typedef {import("./brush.js").Point} Point */
-/** @typedef {import("./stroke.js").Use} Use */
+/** @typedef {import("./stroke.js").ToolSettings} ToolSettings */
 /** @typedef {import("./socket_host.js").Host} Host */
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").RGB} RGB */
@@ -24,7 +24,7 @@ import { Work } from './session_mirror.js';
 /** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
 
 /** Albedo that is black: what falls there is not seen. */
-const LEAST_ALBEDO = 0.02;
+const MIN_ALBEDO = 0.02;
 
 /** The session behind the server that the page came from. @returns {Host} */
 export function openHost() {
@@ -34,26 +34,26 @@ export function openHost() {
 }
 
 /** @param {Host} host @param {{view?: 'gl' | 'cpu' | null}} [options]
- * @returns {Painter} */
+ * @returns {PictureEngine} */
 export function openEngine(host, options = {}) {
   const asked = new URLSearchParams(location.search).get('view');
   const view = options.view ?? (asked === 'gl' || asked === 'cpu' ? asked : null);
-  return new Painter(host, { view });
+  return new PictureEngine(host, { view });
 }
 
-export class Painter extends Hearers {
+export class PictureEngine extends Emitter {
   /** @param {Host} host @param {{view: 'gl' | 'cpu' | null}} options */
   constructor(host, { view }) {
     super();
     this.element = document.createElement('div');
     this.element.className = 'pictures';
-    this.screen = new Screen(this.element, { view, refill: () => this.work.refill() });
-    this.work = new Work(host, this.screen, (kind, event) => this.tell(kind, event));
-    this.on('lost', () => this.given());
+    this.screen = new Screen(this.element, { view, refill: () => this.mirror.refill() });
+    this.mirror = new SessionMirror(host, this.screen, (kind, event) => this.tell(kind, event));
+    this.on('lost', () => this.dropStroke());
     /** @type {Stroke | null} */
     this.stroke = null;
-    /** @type {Use} */
-    this.hand = FIRST;
+    /** @type {ToolSettings} */
+    this.tool = DEFAULT_TOOL;
     /** @type {Encoder | null} */
     this.encoder = null;
   }
@@ -65,9 +65,9 @@ export class Painter extends Hearers {
     this.screen.resize(width, height);
   }
 
-  /** @param {import("./session_mirror.js").Show} show */
+  /** @param {import("./picture_slots.js").Show} show */
   show(show) {
-    this.work.show(show);
+    this.mirror.show(show);
   }
 
   /** In CSS pixels of the element. @returns {(Omit<Pane, 'middle'>)[]} */
@@ -107,11 +107,11 @@ export class Painter extends Hearers {
    * is known: the GPU is waited for else @returns {RGB} */
   paintAt(kind, x, y, light = this.lightAt(kind, x, y)) {
     const place = this.within(x, y);
-    const { albedo, width } = this.work.canvas ?? {};
-    if (this.hand.as === 'look' || !place || !albedo || !width) return light;
+    const { albedo, width } = this.mirror.canvas ?? {};
+    if (this.tool.as === 'colour' || !place || !albedo || !width) return light;
     const at = 3 * (place[1] * width + place[0]);
     return /** @type {RGB} */ (
-      light.map((x, c) => x / Math.max(LEAST_ALBEDO, VALUES[albedo[at + c]]))
+      light.map((x, c) => x / Math.max(MIN_ALBEDO, VALUES[albedo[at + c]]))
     );
   }
 
@@ -120,7 +120,7 @@ export class Painter extends Hearers {
    * @returns {{object: string | null, index: number, shares: number[]} | null} */
   pointed(x, y) {
     const place = this.within(x, y);
-    const { canvas, state, weights } = this.work;
+    const { canvas, state, weights } = this.mirror;
     if (!place || !this.screen.view || !canvas || !state) return null;
     const light = this.screen.view.planesAt(...place).map((one, i) => one * weights[i]);
     const levels = Array.from({ length: weights.length / 3 }, (_, k) =>
@@ -135,18 +135,18 @@ export class Painter extends Hearers {
   /** Which object each pixel shows, once that is known.
    * @returns {{data: Int16Array, width: number, height: number} | null} */
   objects() {
-    const { objects, width, height } = this.work.canvas ?? {};
+    const { objects, width, height } = this.mirror.canvas ?? {};
     return objects && width && height ? { data: objects, width, height } : null;
   }
 
   /** The greatest importance that is painted, and 1 at least: what an overlay shows as all. */
   greatest() {
-    return fullOf(this.work.canvas?.importance ?? new Float32Array(0));
+    return fullOf(this.mirror.canvas?.importance ?? new Float32Array(0));
   }
 
   /** Codes that light is shown with, at an exposure. @param {RGB} rgb @param {number} stops */
   codes(rgb, stops) {
-    const { lut } = this.work;
+    const { lut } = this.mirror;
     if (this.encoder?.lut !== lut || this.encoder.stops !== stops)
       this.encoder = new Encoder(lut, stops);
     const rgba = new Uint8ClampedArray(4);
@@ -162,21 +162,21 @@ export class Painter extends Hearers {
   }
 
   /** Show, and paint, another view of the session. @param {number} view */
-  see(view) {
+  showView(view) {
     if (this.stroke) this.end();
-    this.work.see(view);
+    this.mirror.showView(view);
   }
 
   // What the hand does
 
-  /** @param {Use} use */
-  use(use) {
-    this.hand = use;
+  /** @param {ToolSettings} settings */
+  setTool(settings) {
+    this.tool = settings;
   }
 
   /** Where strokes go, if there is any painting to be done. */
   get place() {
-    const { canvas, strokes, isReady } = this.work;
+    const { canvas, strokes, isReady } = this.mirror;
     return canvas && strokes && isReady ? { canvas, strokes } : null;
   }
 
@@ -184,10 +184,10 @@ export class Painter extends Hearers {
   begin(point) {
     if (this.stroke) this.end();
     const { place } = this;
-    if (!place || place.strokes.isTaken || this.hand.tool === 'pick') return;
+    if (!place || place.strokes.isTaken || this.tool.tool === 'pick') return;
     const scale = this.panes()[0]?.scale ?? 1;
-    this.stroke = new Stroke(place.canvas, this.hand, point, scale);
-    this.work.isPainting = this.screen.isHeld = true;
+    this.stroke = new Stroke(place.canvas, this.tool, point, scale);
+    this.mirror.isPainting = this.screen.isHeld = true;
     place.strokes.begin();
     this.touched(this.stroke.begin());
   }
@@ -196,17 +196,17 @@ export class Painter extends Hearers {
   move(points) {
     if (!this.stroke) return;
     this.touched(this.stroke.move(points));
-    if (this.stroke.use.tool === 'ask') this.tell('asking', this.stroke.asked);
+    if (this.stroke.settings.tool === 'adjust') this.tell('asking', this.stroke.asked);
   }
 
   end() {
     const { stroke, place } = this;
     if (!stroke || !place) return;
     const { stops, mired } = stroke.asked;
-    if (stroke.use.tool === 'ask' && !stops && !mired) return void this.cancel();
+    if (stroke.settings.tool === 'adjust' && !stops && !mired) return void this.cancel();
     this.ended();
     place.canvas.end();
-    place.strokes.end(LABELS[stroke.use.tool]);
+    place.strokes.end(LABELS[stroke.settings.tool]);
   }
 
   /** The stroke that has begun is none. @returns {boolean} whether one had begun */
@@ -216,22 +216,22 @@ export class Painter extends Hearers {
     this.ended();
     const region = place.canvas.drop();
     place.strokes.drop();
-    if (region) this.work.redraw([region]);
+    if (region) this.mirror.redraw([region]);
     return true;
   }
 
   /** The stroke in the hand is given up: it would lie over what another page has painted, or be
    * heard by nobody. */
-  given() {
+  dropStroke() {
     if (!this.stroke) return;
     this.ended();
-    const region = this.work.canvas?.drop();
-    if (region) this.work.redraw([region]);
+    const region = this.mirror.canvas?.drop();
+    if (region) this.mirror.redraw([region]);
   }
 
   ended() {
     this.stroke = null;
-    this.work.isPainting = this.screen.isHeld = false;
+    this.mirror.isPainting = this.screen.isHeld = false;
   }
 
   /** A straight stroke, whole. @param {Point} from @param {Point} to */
@@ -243,27 +243,27 @@ export class Painter extends Hearers {
 
   /** Brighter and warmer by so much, in an object, or for null everywhere.
    * @param {{stops: number, mired: number, object: number | null}} asked */
-  ask(asked) {
+  adjust(asked) {
     if (this.stroke) this.end();
     const { place } = this;
     if (!place || place.strokes.isTaken) return;
     place.strokes.begin();
-    this.touched([askFor(place.canvas, asked)]);
+    this.touched([adjustArea(place.canvas, asked)]);
     place.canvas.end();
-    place.strokes.end(LABELS.ask);
+    place.strokes.end(LABELS.adjust);
   }
 
   /** @param {Region[]} regions */
   touched(regions) {
-    this.work.redraw(regions);
+    this.mirror.redraw(regions);
     const region = regions.reduce((a, b) => /** @type {Region} */ (union(a, b)), regions[0]);
-    if (region) this.work.strokes?.touch(region);
+    if (region) this.mirror.strokes?.touch(region);
   }
 
   close() {
-    this.work.strokes?.hurry();
-    this.work.strokes?.close();
-    this.work.loader.close();
+    this.mirror.strokes?.hurry();
+    this.mirror.strokes?.close();
+    this.mirror.loader.close();
     this.screen.close();
     this.element.remove();
   }

@@ -1,5 +1,5 @@
 /**
- * Fetches the pictures that the session has, and those that it has made anew.
+ * Fetches the pictures of the session, again whenever one is replaced.
  *
  * Planes are clean ones where there are any and they are wanted, else raw ones. A few are on
  * their way at a time, and what is there is not fetched again.
@@ -8,12 +8,12 @@
 /** @typedef {import("./message_frames.js").Picture} Picture */
 
 /** Pictures on their way at a time. */
-const AT_ONCE = 4;
+const MAX_FETCHES = 4;
 
 /** Milliseconds before what could not be fetched is tried again. */
-const AGAIN = 2000;
+const RETRY_MS = 2000;
 
-export class Loader {
+export class PictureLoader {
   /** @param {import("./socket_host.js").Host} host
    * @param {(slot: string, name: string, picture: Picture) => void} use a picture for its slot
    * @param {(done: number, total: number, isFirst: boolean) => void} tell isFirst: some light has no
@@ -94,7 +94,7 @@ export class Loader {
     const isFirst = missing.some(([slot]) => slot.startsWith('plane ') && !this.there.has(slot));
     this.tell(this.total - missing.length, this.total, isFirst);
     for (const [slot, name] of missing) {
-      if (this.onTheWay.size >= AT_ONCE) return;
+      if (this.onTheWay.size >= MAX_FETCHES) return;
       if (!this.onTheWay.has(slot)) this.load(slot, name);
     }
   }
@@ -113,7 +113,7 @@ export class Loader {
     } catch (error) {
       // What was refused since another page has the session comes when this one has it again.
       if (!this.isHeld) {
-        wait = AGAIN;
+        wait = RETRY_MS;
         console.warn(error);
       }
     }

@@ -1,4 +1,4 @@
-/** Where the pictures are drawn: one view, its size in device pixels, and when it draws. */
+/** The canvas of the pictures: its view, its size in device pixels, and when it draws. */
 import { chooseView } from '../../../viewer/drawing/choose.js';
 import { DEFAULTS, panes } from '../../../viewer/drawing/view.js';
 

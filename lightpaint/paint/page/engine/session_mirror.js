@@ -1,12 +1,13 @@
 /**
- * What the page has of the session: the painting, weights, pictures; and how they follow it.
+ * The page's copy of the session: painting, weights and pictures, kept up to date by its messages.
  */
 import { PaintCanvas } from './paint_canvas.js';
 import { union } from '../../../viewer/drawing/layer.js';
-import { Loader } from './picture_loader.js';
+import { PictureLoader } from './picture_loader.js';
 import { SRGB, lutOf } from '../../../viewer/drawing/lut.js';
 import { VERSION, inView, stateOfView } from './message_frames.js';
-import { Strokes } from './stroke_sender.js';
+import { showsPresent, sizes, wantedPictures } from './picture_slots.js';
+import { StrokeSender } from './stroke_sender.js';
 
 /** @typedef {import("./socket_host.js").Host} Host */
 /** @typedef {import("./message_frames.js").Message} Message */
@@ -14,25 +15,16 @@ import { Strokes } from './stroke_sender.js';
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").RGB} RGB */
 /** @typedef {import("./screen.js").Screen} Screen */
+/** @typedef {import("./picture_slots.js").Show} Show */
 
-/**
- * What is shown. gains: which lights are heard, null for all. instead, other: weights that the
- * solution and the other mix are shown with.
- * @typedef {Omit<import("../../../viewer/drawing/view.js").Params, 'live'> & {transform: string, clean: boolean,
- *   gains: boolean[] | null, instead: RGB[] | null, other: RGB[] | null}} Show
- */
-
-/** Pictures that are wanted as soon as there are any, by name. */
-const WANTED = ['present', 'albedo', 'objects', 'verified', 'beyond'];
-
-export class Work {
+export class SessionMirror {
   /** @param {Host} host @param {Screen} screen
    * @param {(kind: string, event: any) => void} tell */
   constructor(host, screen, tell) {
     this.host = host;
     this.screen = screen;
     this.tell = tell;
-    this.loader = new Loader(
+    this.loader = new PictureLoader(
       host,
       (slot, name, picture) => this.loaded(slot, name, picture),
       (done, total, isFirst) => tell('loading', { done, total, isFirst }),
@@ -45,7 +37,7 @@ export class Work {
     this.view = 0;
     /** @type {PaintCanvas | null} */
     this.canvas = null;
-    /** @type {Strokes | null} */
+    /** @type {StrokeSender | null} */
     this.strokes = null;
     /** @type {Show | null} */
     this.shown = null;
@@ -86,7 +78,7 @@ export class Work {
   }
 
   /** Show another view. @param {number} view */
-  see(view) {
+  showView(view) {
     const { said } = this;
     if (!said?.views?.[view] || view === this.view) return;
     // Whatever was done since is to be asked for.
@@ -113,7 +105,7 @@ export class Work {
       this.strokes?.close();
       const lost = (/** @type {number} */ count, /** @type {boolean} */ isStale) =>
         this.tell('lost', { count, isStale });
-      this.strokes = new Strokes(this.host, refused, lost);
+      this.strokes = new StrokeSender(this.host, refused, lost);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
     }
     this.strokes.paintOn(this.canvas, view);
@@ -196,22 +188,12 @@ export class Work {
     }
   }
 
-  /** Which pictures are to be there. */
+  /** Tell the loader which pictures to keep up to date. */
   want() {
-    const { state, shown, loader } = this;
+    const { state, shown, loader, view } = this;
     if (!state) return;
-    const isClean = shown?.clean ?? true;
-    /** @type {[slot: string, name: string | null][]} */
-    const named = WANTED.map((name) => [name, inView(name, this.view)]);
-    for (let k = 0; k < state.lights.length; k++) {
-      const clean = inView(`clean/${k}`, this.view);
-      const isThere = isClean && clean in loader.resources;
-      named.push([`plane ${k}`, isThere ? clean : inView(`plane/${k}`, this.view)]);
-    }
-    const transform = shown?.transform ?? 'srgb';
-    named.push(['lut', transform === 'srgb' ? null : `lut/${transform}`]);
-    loader.want(named);
-    if (transform === 'srgb') this.setLut(SRGB);
+    loader.want(wantedPictures(state.lights.length, shown, view, loader.resources));
+    if ((shown?.transform ?? 'srgb') === 'srgb') this.setLut(SRGB);
   }
 
   /** @param {string} slot @param {string} name @param {Picture} picture */
@@ -315,14 +297,4 @@ export class Work {
     this.screen.view?.setCanvas(region, canvas.image, canvas.importance);
     this.screen.request(this.isPainting);
   }
-}
-
-/** How many lights there are, and how large each view is. @param {Message} state */
-function sizes({ lights, size, views = [{ size }] }) {
-  return String([lights.length, ...views.map((/** @type {any} */ view) => view.size)]);
-}
-
-/** @param {Show | null} show */
-function showsPresent(show) {
-  return show?.left === 'present' || show?.right === 'present';
 }

@@ -1,10 +1,10 @@
 /**
- * The session, wherever it is; here behind a socket and HTTP.
+ * The session behind a WebSocket and HTTP.
  *
- * Every message has a number, and is answered by one that gives it back. A lost connection is
- * made anew, and begins with `hello`.
+ * Every message has a number, which its reply repeats. After a lost connection the host reconnects and
+ * begins with `hello`.
  */
-import { Entry, PROTOCOL, REFUSALS, shown } from './access_key.js';
+import { AccessKey, PROTOCOL, REFUSALS, shown } from './access_key.js';
 import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
 
 /** @typedef {import("./message_frames.js").Arrays} Arrays */
@@ -21,7 +21,7 @@ import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
  * @typedef {object} Host
  * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K], arrays?: Arrays) =>
  *   Promise<Message>} send
- * @property {<K extends keyof Heard>(kind: K, hear: (message: Heard[K]) => void) => void} on
+ * @property {<K extends keyof HostEvents>(kind: K, hear: (message: HostEvents[K]) => void) => void} on
  * @property {(name: string) => Promise<Picture>} fetch
  * @property {() => void} close
  * @property {() => Promise<void>} [gate] is waited for by what is said after strokes
@@ -29,13 +29,13 @@ import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
 
 /** What a page hears: what the session tells, and what its host knows of the connection.
  * @typedef {Events & {connection: {kind: 'connection', state: 'open' | 'lost' | 'stale'},
- *   silence: {kind: 'silence', isSilent: boolean}}} Heard */
+ *   silence: {kind: 'silence', isSilent: boolean}}} HostEvents */
 
 /** What does not wait for strokes that are on their way. */
-export const AT_ONCE = ['paint', 'drop', 'hello', 'take_over', 'fetch'];
+export const UNQUEUED = ['paint', 'drop', 'hello', 'take_over', 'fetch'];
 
 /** Who hears what: the part that all hosts share. */
-export class Hearers {
+export class Emitter {
   constructor() {
     /** Until strokes that are done have been answered: what else is said comes after them.
      * @type {() => Promise<void>} */
@@ -64,10 +64,10 @@ export class Hearers {
 const WAITS = { first: 250, most: 5000 };
 
 /** @implements {Host} */
-export class SocketHost extends Hearers {
+export class SocketHost extends Emitter {
   /** Where the page came from, and what knows the key to it.
    * @param {string | URL} [base] @param {{key: () => Promise<string | null>}} [entry] */
-  constructor(base = document.baseURI, entry = new Entry(base)) {
+  constructor(base = document.baseURI, entry = new AccessKey(base)) {
     super();
     this.base = new URL('.', base);
     this.entry = entry;
@@ -178,7 +178,7 @@ export class SocketHost extends Hearers {
    * @param {Arrays} [arrays] @returns {Promise<Message>} */
   async send(kind, fields, arrays = {}) {
     const isOpen = this.socket?.readyState === WebSocket.OPEN;
-    if (isOpen && !AT_ONCE.includes(kind)) await this.gate();
+    if (isOpen && !UNQUEUED.includes(kind)) await this.gate();
     return new Promise((resolve, reject) => {
       if (this.socket?.readyState !== WebSocket.OPEN)
         return reject(new Error('there is no connection to the painter'));

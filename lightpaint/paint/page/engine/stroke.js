@@ -1,35 +1,33 @@
-/**
- * The tool in the hand: what a stroke of it does to the canvas, from where it begins to its end.
- */
+/** A stroke of a tool on the canvas, from its first point to its last. */
 import { Path, fill, flood, stamp } from './brush.js';
 import { warmer } from '../../../viewer/drawing/colour.js';
-import { groundOf } from './whole_adjustment.js';
+import { wholeAdjustment } from './whole_adjustment.js';
 
 /** @typedef {import("./brush.js").Point} Point */
 /** @typedef {import("./stroke_effects.js").Effect} Effect */
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./message_frames.js").RGB} RGB */
-/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'ask'} Tool */
+/** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'adjust'} Tool */
 
 /**
  * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: how many
  * times as much as before counts what the importance brush goes over. about: whether a drag asks at
  * a soft spot of that size, or of the object under it; a spot, where that is not said.
- * @typedef {{tool: Tool, rgb: RGB, as: 'light' | 'look', size: number, hardness: number,
- *   flow: number, importance: number, about?: 'spot' | 'object'}} Use */
+ * @typedef {{tool: Tool, rgb: RGB, as: 'light' | 'colour', size: number, hardness: number,
+ *   flow: number, importance: number, about?: 'spot' | 'object'}} ToolSettings */
 
 /** Pixels of the screen that a drag goes for one stop, and for one mired. */
 export const DRAG = { stop: 80, mired: 1 };
 
 /** Stops that a drag asks for at most. */
-const MOST_STOPS = 8;
+const MAX_STOPS = 8;
 
-/** @type {Use} */
-export const FIRST = {
+/** @type {ToolSettings} */
+export const DEFAULT_TOOL = {
   tool: 'brush',
   rgb: [1, 1, 1],
-  as: 'look',
+  as: 'colour',
   size: 60,
   hardness: 0.5,
   flow: 1,
@@ -44,61 +42,62 @@ export const LABELS = {
   pick: 'pick',
   fill: 'fill',
   line: 'line',
-  ask: 'adjust',
+  adjust: 'adjust',
 };
 
 /** What brighter and warmer light is. @param {number} stops @param {number} mired
  * @returns {Effect} */
-export function asking(stops, mired) {
-  return { kind: 'ask', gain: 2 ** stops, tint: warmer(mired) };
+export function adjustment(stops, mired) {
+  return { kind: 'adjust', gain: 2 ** stops, tint: warmer(mired) };
 }
 
 /** One stroke. Its methods say what they have changed. */
 export class Stroke {
-  /** @param {PaintCanvas} canvas @param {Use} use @param {Point} point where it begins
+  /** @param {PaintCanvas} canvas @param {ToolSettings} settings @param {Point} point where it begins
    * @param {number} scale pixels of the screen for each of the picture */
-  constructor(canvas, use, point, scale) {
+  constructor(canvas, settings, point, scale) {
     this.canvas = canvas;
-    this.use = use;
+    this.settings = settings;
     this.start = point;
     this.scale = scale;
     canvas.begin();
-    this.effect = effectOf(canvas, use);
-    this.path = new Path(canvas, use);
+    this.effect = effectOf(canvas, settings);
+    this.path = new Path(canvas, settings);
     /** What a drag asks for. */
     this.asked = { stops: 0, mired: 0 };
   }
 
   /** @returns {Region[]} */
   begin() {
-    const { canvas, use, start } = this;
-    if (use.tool === 'fill') {
+    const { canvas, settings, start } = this;
+    if (settings.tool === 'fill') {
       const object = canvas.objectAt(start.x, start.y);
-      return this.applied([fill(canvas, object, use.flow)]);
+      return this.applied([fill(canvas, object, settings.flow)]);
     }
-    if (use.tool !== 'ask') return this.applied(this.path.to(start));
+    if (settings.tool !== 'adjust') return this.applied(this.path.to(start));
     const object = canvas.objectAt(start.x, start.y);
-    if (use.about === 'object' && object >= 0) fill(canvas, object, 1);
-    else stamp(canvas, { ...start, pressure: 1 }, { size: 2 * use.size, hardness: 0, flow: 1 });
+    if (settings.about === 'object' && object >= 0) fill(canvas, object, 1);
+    else
+      stamp(canvas, { ...start, pressure: 1 }, { size: 2 * settings.size, hardness: 0, flow: 1 });
     return [];
   }
 
   /** @param {Point[]} points @returns {Region[]} */
   move(points) {
-    const { tool } = this.use;
+    const { tool } = this.settings;
     const last = points.at(-1);
     if (!last || tool === 'fill') return [];
-    if (tool === 'ask') return this.ask(last);
+    if (tool === 'adjust') return this.adjust(last);
     if (tool === 'line') return this.line(last);
     return this.applied(points.flatMap((point) => this.path.to(point)));
   }
 
   /** A straight line from where it began. @param {Point} to @returns {Region[]} */
   line(to) {
-    const { canvas, use, start } = this;
+    const { canvas, settings, start } = this;
     const before = canvas.uncover();
     canvas.region = null;
-    const path = new Path(canvas, use);
+    const path = new Path(canvas, settings);
     // Its last stamp is at its end.
     const length = Math.hypot(to.x - start.x, to.y - start.y);
     path.step = length / Math.max(1, Math.ceil(length / path.step)) || path.step;
@@ -107,18 +106,18 @@ export class Stroke {
   }
 
   /** @param {Point} to @returns {Region[]} */
-  ask(to) {
+  adjust(to) {
     const { start, scale, canvas } = this;
     const stops = ((start.y - to.y) * scale) / DRAG.stop;
     const mired = ((to.x - start.x) * scale) / DRAG.mired;
-    this.asked = { stops: Math.min(MOST_STOPS, Math.max(-MOST_STOPS, stops)), mired };
-    this.effect = asking(this.asked.stops, mired);
+    this.asked = { stops: Math.min(MAX_STOPS, Math.max(-MAX_STOPS, stops)), mired };
+    this.effect = adjustment(this.asked.stops, mired);
     return this.applied(canvas.region ? [canvas.region] : []);
   }
 
   /** @param {Region[]} regions @returns {Region[]} */
   applied(regions) {
-    for (const region of joined(regions)) this.canvas.apply(region, this.effect);
+    for (const region of merged(regions)) this.canvas.apply(region, this.effect);
     return regions;
   }
 }
@@ -126,24 +125,24 @@ export class Stroke {
 /** Brighter and warmer in an object, or for null everywhere, as a stroke of its own.
  * @param {PaintCanvas} canvas @param {{stops: number, mired: number, object: number | null}} asked
  * @returns {Region} */
-export function askFor(canvas, { stops, mired, object }) {
+export function adjustArea(canvas, { stops, mired, object }) {
   canvas.begin();
   const region = object === null ? flood(canvas) : fill(canvas, object, 1);
-  canvas.apply(region, asking(stops, mired));
+  canvas.apply(region, adjustment(stops, mired));
   return region;
 }
 
-/** @param {PaintCanvas} canvas @param {Use} use @returns {Effect} */
-function effectOf(canvas, use) {
-  if (use.tool === 'eraser') return { kind: 'erase', ground: groundOf(canvas) };
-  if (use.tool === 'weight') return { kind: 'weigh', times: use.importance };
-  if (use.tool === 'ask') return asking(0, 0);
-  return { kind: 'paint', rgb: use.rgb, as: use.as };
+/** @param {PaintCanvas} canvas @param {ToolSettings} settings @returns {Effect} */
+function effectOf(canvas, settings) {
+  if (settings.tool === 'eraser') return { kind: 'erase', ground: wholeAdjustment(canvas) };
+  if (settings.tool === 'weight') return { kind: 'weigh', times: settings.importance };
+  if (settings.tool === 'adjust') return adjustment(0, 0);
+  return { kind: 'paint', rgb: settings.rgb, as: settings.as };
 }
 
 /** Regions in a few, of which none lies within another: stamps overlap, and each of them would
  * be worked out again. @param {Region[]} regions @returns {Region[]} */
-function joined(regions) {
+function merged(regions) {
   /** @type {Region[]} */
   const made = [];
   for (const region of regions) {

@@ -1,10 +1,10 @@
-/** What a stroke makes of the pixels that it covers. */
+/** Effects of strokes on the pixels that they cover. */
 import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half.js';
 
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./paint_canvas.js").Tile} Tile */
-/** @typedef {import("./whole_adjustment.js").Ground} Ground */
+/** @typedef {import("./whole_adjustment.js").WholeAdjustment} WholeAdjustment */
 /** @typedef {import("./message_frames.js").RGB} RGB */
 
 /**
@@ -13,24 +13,24 @@ import { VALUES } from '../../../viewer/drawing/half.js';
  * erase: it is the present look again, and not painted; of a picture that was asked for as a whole
  * it is what was asked of that. weigh: it counts so many times as much
  * as it did; what is not painted is kept as it is, and counts as a stroke would. ask: its light is
- * multiplied, its luminance times `gain` and its colour by `tint`.
- * @typedef {{kind: 'paint', rgb: RGB, as: 'light' | 'look'} | {kind: 'erase', ground: Ground | null} |
- *   {kind: 'weigh', times: number} | {kind: 'ask', gain: number, tint: RGB}} Effect
+ * scaledImportance, its luminance times `gain` and its colour by `tint`.
+ * @typedef {{kind: 'paint', rgb: RGB, as: 'light' | 'colour'} | {kind: 'erase', ground: WholeAdjustment | null} |
+ *   {kind: 'weigh', times: number} | {kind: 'adjust', gain: number, tint: RGB}} Effect
  */
 
 /** Importance that is left, or reached, however often it is made less or more. */
-const [LEAST, MOST] = [0.01, 1000];
+const [MIN, MAX] = [0.01, 1000];
 
 /** So many times as much, within these; what lies beyond them already does not come nearer.
  * @param {number} importance @param {number} times */
-function multiplied(importance, times) {
-  const least = Math.min(LEAST, importance);
-  return Math.min(Math.max(MOST, importance), Math.max(least, importance * times));
+function scaledImportance(importance, times) {
+  const least = Math.min(MIN, importance);
+  return Math.min(Math.max(MAX, importance), Math.max(least, importance * times));
 }
 
 /** Make light brighter, and warmer. Its luminance is what the gain makes of it, whatever its colour
- * was. @param {Float64Array} light changed @param {Ground} by */
-function ask(light, { gain, tint }) {
+ * was. @param {Float64Array} light changed @param {WholeAdjustment} by */
+function adjust(light, { gain, tint }) {
   const before = luminance(light);
   for (let c = 0; c < 3; c++) light[c] *= tint[c];
   const after = luminance(light);
@@ -41,7 +41,7 @@ function ask(light, { gain, tint }) {
 /** What a stroke does to one pixel, by how that was before and how far it is covered.
  * @param {PaintCanvas} canvas @param {Effect} effect
  * @returns {(tile: Tile, q: number, p: number, covered: number) => void} */
-export function changing(canvas, effect) {
+export function pixelChange(canvas, effect) {
   const { image, importance, present, albedo } = canvas;
   /** @type {(tile: Tile, q: number, p: number, covered: number, to: (c: number) => number) => void} */
   const towards = (tile, q, p, covered, to) => {
@@ -54,7 +54,7 @@ export function changing(canvas, effect) {
   const its = new Float64Array(3); // one for all pixels: they are many
   /** @type {(tile: Tile, q: number, p: number, covered: number) => void} */
   const count = (tile, q, p, covered) => {
-    const before = multiplied(tile.importance[q], lift);
+    const before = scaledImportance(tile.importance[q], lift);
     importance[p] = before < full ? before + covered * (full - before) : before;
   };
   switch (effect.kind) {
@@ -72,7 +72,7 @@ export function changing(canvas, effect) {
       if (ground)
         return (tile, q, p, covered) => {
           for (let c = 0; c < 3; c++) its[c] = VALUES[present[3 * p + c]];
-          ask(its, ground);
+          adjust(its, ground);
           towards(tile, q, p, covered, (c) => its[c]);
           importance[p] = tile.importance[q] + covered * (1 - tile.importance[q]);
         };
@@ -85,12 +85,12 @@ export function changing(canvas, effect) {
       return (tile, q, p, covered) => {
         towards(tile, q, p, 0, () => 0);
         const before = tile.importance[q];
-        importance[p] = before + covered * (multiplied(before || 1, effect.times) - before);
+        importance[p] = before + covered * (scaledImportance(before || 1, effect.times) - before);
       };
-    case 'ask':
+    case 'adjust':
       return (tile, q, p, covered) => {
         for (let c = 0; c < 3; c++) its[c] = tile.image[3 * q + c];
-        ask(its, effect);
+        adjust(its, effect);
         towards(tile, q, p, covered, (c) => its[c]);
         count(tile, q, p, covered);
       };

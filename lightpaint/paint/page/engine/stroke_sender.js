@@ -1,5 +1,5 @@
 /**
- * Sends strokes to the session: what changed, while the brush is down; one message in flight.
+ * Sends the changed pixels of strokes to the session, one message at a time.
  *
  * What changes in the meantime is sent together with the next one. A stroke that is done is kept
  * until the session has said that it has it, and sent again, whole, after a lost connection.
@@ -13,12 +13,12 @@ import { union } from '../../../viewer/drawing/layer.js';
 
 /** The stroke in progress. dirty: what is not sent. whole: where it has been.
  * @typedef {{stroke: number, view: number, dirty: Region | null, whole: Region | null,
- *   isKnown: boolean}} Live */
+ *   isKnown: boolean}} CurrentStroke */
 /** A stroke that is done, or dropped, and not yet answered. cut: what of it has to be sent.
  * @typedef {{stroke: number, view: number, cut: Region, whole: Region, arrays: Arrays,
- *   label: string} | {stroke: number, isDropped: true}} Left */
+ *   label: string} | {stroke: number, isDropped: true}} PendingStroke */
 
-export class Strokes {
+export class StrokeSender {
   /** @param {import("./socket_host.js").Host} host
    * @param {() => void} [refused] hears that the session has not taken a stroke
    * @param {(count: number, isStale: boolean) => void} [lost] hears how many strokes are not sent
@@ -31,9 +31,9 @@ export class Strokes {
     this.refused = refused;
     this.lost = lost;
     this.count = 0;
-    /** @type {Live | null} */
+    /** @type {CurrentStroke | null} */
     this.live = null;
-    /** @type {Left[]} */
+    /** @type {PendingStroke[]} */
     this.left = [];
     this.isBusy = false;
     this.isOpen = true;
@@ -68,7 +68,7 @@ export class Strokes {
     });
   }
 
-  /** Strokes are of this picture from now on. @param {PaintCanvas} canvas @param {number} view */
+  /** StrokeSender are of this picture from now on. @param {PaintCanvas} canvas @param {number} view */
   paintOn(canvas, view) {
     this.canvas = canvas;
     this.view = view;
@@ -185,7 +185,7 @@ export class Strokes {
 
   /** @template {"paint" | "drop"} K @param {K} kind
    * @param {import("./messages.js").Requests[K]} fields @param {Arrays} arrays
-   * @param {Left | null} left what is answered with it */
+   * @param {PendingStroke | null} left what is answered with it */
   async send(kind, fields, arrays, left) {
     this.isBusy = true;
     this.isDropping = kind === 'drop';

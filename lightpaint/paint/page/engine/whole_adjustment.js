@@ -1,11 +1,11 @@
-/** What was asked of a whole picture: what lies below the strokes on it. */
+/** The adjustment of a whole picture, under the strokes that were painted on it. */
 import { luminance } from '../../../viewer/drawing/colour.js';
 import { VALUES } from '../../../viewer/drawing/half.js';
 
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./message_frames.js").RGB} RGB */
 /** Luminance times `gain`, colour by `tint`, as an ask has it.
- * @typedef {{gain: number, tint: RGB}} Ground */
+ * @typedef {{gain: number, tint: RGB}} WholeAdjustment */
 
 /** Pixels that are looked at, and that are enough. */
 const LOOKED_AT = 4096;
@@ -20,9 +20,9 @@ const DARK = 0.01;
 /**
  * Of a picture of which all is painted, by how much it was asked to be brighter and warmer where
  * nothing else was painted; null where that was not the same all over.
- * @param {PaintCanvas} canvas @returns {Ground | null}
+ * @param {PaintCanvas} canvas @returns {WholeAdjustment | null}
  */
-export function groundOf({ isAll, importance, image, present }) {
+export function wholeAdjustment({ isAll, importance, image, present }) {
   if (!isAll) return null;
   /** Stops of luminance, and of red and blue over green. @type {[number[], number[], number[]]} */
   const ratios = [[], [], []];

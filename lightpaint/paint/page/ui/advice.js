@@ -1,4 +1,4 @@
-/** What keeps the lights from the paint as a button: what letting go of it would do is seen first. */
+/** A button that removes what keeps the lights from the paint, and a preview of its effect. */
 
 import { html, useEffect, useRef } from '../vendor/preact.js';
 import { Button, Dialog } from './controls.js';
@@ -7,9 +7,9 @@ import { Icon } from './icons.js';
 import { put } from './thumbnail.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./ui_state.js").Help} Cause */
+/** @typedef {import("./ui_state.js").Advice} Cause */
 /** @typedef {import("./ui_state.js").Change} Change */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
 /** Keys of a light that each kind of wish has. @type {Record<string, string[]>} */
 const KEYS = {
@@ -20,7 +20,7 @@ const KEYS = {
 };
 
 /** What a button does, of one light and of several. @type {Record<string, [string, string]>} */
-const WORDS = {
+const BUTTON_WORDS = {
   off: ['Turn on', 'Turn on'],
   lock: ['Unlock', 'Unlock'],
   limits: ['Remove the limit of', 'Remove the limits of'],
@@ -37,14 +37,14 @@ const OF_ALL = {
 };
 
 /** Characters of a light's name on a button, beside which a sentence stands. */
-const ON_BUTTON = 14;
+const BUTTON_CHARACTERS = 14;
 
 /** What is called so, with its lights. @param {Cause} cause @param {number} [most] characters of a
  * light's name */
 function nameOf({ kind, names }, most = Infinity) {
   if (kind in OF_ALL) return OF_ALL[kind];
   const which = names.length === 1 ? shortened(names[0], most) : `${names.length} lights`;
-  return `${WORDS[kind][names.length === 1 ? 0 : 1]} ${which}`;
+  return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${which}`;
 }
 
 /** The same at length. @param {Cause} cause @param {string} name */
@@ -54,7 +54,7 @@ function titleOf({ kind, hold }, name) {
 }
 
 /** The message that lets go of it; null of what was not asked on this page, or is let go already.
- * @param {Cause} cause @param {Ui} ui @param {Hands["session"]} session @returns {Change | null} */
+ * @param {Cause} cause @param {Ui} ui @param {App["session"]} session @returns {Change | null} */
 function changeOf({ kind, names, hold }, ui, session) {
   /** @param {string} key @param {any} value @returns {Change} */
   const set = (key, value) => ({ kind: 'set', fields: { values: { [key]: value } } });
@@ -73,32 +73,32 @@ function changeOf({ kind, names, hold }, ui, session) {
 }
 
 /** What stays asked of a light: what a hand had held has before it.
- * @param {string} name @param {string[]} keys @param {Ui} ui @param {Hands["session"]} session */
+ * @param {string} name @param {string[]} keys @param {Ui} ui @param {App["session"]} session */
 function without(name, keys, ui, session) {
   const light = ui.lights.findIndex((one) => one.name === name);
   const isLevel = keys.includes('off') || keys.includes('lock');
-  const asked = (isLevel && session.before.get(light)) || ui.asked[name];
+  const asked = (isLevel && session.unlockedConstraints.get(light)) || ui.asked[name];
   return Object.fromEntries(Object.entries(asked).filter(([key]) => !keys.includes(key)));
 }
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function Help({ ui, hands }) {
+/** @param {{ui: Ui, app: App}} props */
+export function AdviceButton({ ui, app }) {
   const { help } = ui;
-  const change = help && changeOf(help, ui, hands.session);
+  const change = help && changeOf(help, ui, app.session);
   if (!help || !change) return null;
   const name = nameOf(help);
   const closes = help.closes === null ? '' : `: ${Math.round(100 * help.closes)} % closer`;
-  return html`<${Button} label=${`${nameOf(help, ON_BUTTON)}${closes}`} class="help"
+  return html`<${Button} label=${`${nameOf(help, BUTTON_CHARACTERS)}${closes}`} class="help"
     tip=${`${name}${closes}. Shows a preview first.`}
-    act=${() => hands.session.preview(titleOf(help, name), change)} />`;
+    act=${() => app.session.preview(titleOf(help, name), change)} />`;
 }
 
-/** The answer as it is and as it would be, before anything is done. @param {{ui: Ui, hands: Hands}}
+/** The answer as it is and as it would be, before anything is done. @param {{ui: Ui, app: App}}
  * props */
-export function PreviewDialog({ ui, hands }) {
+export function PreviewDialog({ ui, app }) {
   const { preview } = ui;
   if (!preview) return null;
-  const close = () => hands.store.set({ preview: null });
+  const close = () => app.store.set({ preview: null });
   const { label, text, isAtCost, before, after } = preview;
   return html`<${Dialog} title=${label} close=${close} class="preview">
     <div class="pair">
@@ -108,7 +108,7 @@ export function PreviewDialog({ ui, hands }) {
       ${isAtCost && html`<${Icon} name="warn" />`}
       <span>${text || 'Computing the preview …'}</span></p>
     <div class="row"><${Button} label="Cancel" act=${close} />
-      <${Button} label="Apply" primary disabled=${!text} act=${() => hands.session.makeChange()} />
+      <${Button} label="Apply" primary disabled=${!text} act=${() => app.session.makeChange()} />
     </div>
   </${Dialog}>`;
 }

@@ -1,17 +1,15 @@
-/** How true the answer is: in sentences, laid over the pictures, and by a render of it. */
+/** The panel that shows where and why the answer differs, and verifies it with a render. */
 
 import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/preact.js';
-import { Bar } from './progress_bar.js';
-import { Button, Choice, Whole, comeInto } from './controls.js';
-import { lightText, number, progressText, shortened } from './format.js';
-import { Help } from './advice.js';
+import { ProgressBar } from './progress_bar.js';
+import { Button, Choice } from './controls.js';
+import { number, progressText } from './format.js';
 import { Icon } from './icons.js';
-import { isUnseen, keepLook } from './look_actions.js';
-import { exposureOf, overlayOf } from './ui_state.js';
-import { hintOf, look } from './tools.js';
+import { overlayOf } from './ui_state.js';
+import { updateShow } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 /** @typedef {import("./engine_interface.js").Pane} Pane */
 
 const OVERLAYS = [
@@ -32,10 +30,10 @@ const MEANINGS = {
   importance: ['unpainted', PAINTED],
 };
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function TruthPanel({ ui, hands }) {
-  const { session, store } = hands;
-  const choose = (/** @type {any} */ overlay) => look(store, { overlay });
+/** @param {{ui: Ui, app: App}} props */
+export function AnalysisPanel({ ui, app }) {
+  const { session, store } = app;
+  const choose = (/** @type {any} */ overlay) => updateShow(store, { overlay });
   const frame = useRef(/** @type {HTMLElement | null} */ (null));
   // Reasons take more room than what was there before them.
   useLayoutEffect(() => {
@@ -55,10 +53,10 @@ export function TruthPanel({ ui, hands }) {
       <${Button} label=${ui.explaining ? 'Finding reasons …' : 'Why not closer?'}
         disabled=${ui.explaining} act=${() => session.explain()}
         tip="What keeps the answer from matching the painting" />
-      ${ui.explaining && html`<${Bar} progress=${{ done: 0, total: 0 }} label="Finding reasons" />`}
-      ${ui.state?.can_render && html`<${Verify} ui=${ui} hands=${hands} />`}
+      ${ui.explaining && html`<${ProgressBar} progress=${{ done: 0, total: 0 }} label="Finding reasons" />`}
+      ${ui.state?.can_render && html`<${Verify} ui=${ui} app=${app} />`}
     </div>
-    ${ui.verified && html`<${Verified} ui=${ui} hands=${hands} />`}
+    ${ui.verified && html`<${Verified} ui=${ui} app=${app} />`}
   </div>`;
 }
 
@@ -93,16 +91,16 @@ function placed(pane, [rows, columns]) {
 
 /** What the colours over a picture mean, at that picture. What is out of reach is found anew when it
  * is looked at and the answer is another one.
- * @param {{ui: Ui, hands: Hands, panes: Pane[]}} props */
-export function Legend({ ui, hands, panes }) {
+ * @param {{ui: Ui, app: App, panes: Pane[]}} props */
+export function Legend({ ui, app, panes }) {
   const overlay = overlayOf(ui);
   const isSought = overlay === 'beyond' && ui.deltaE !== null && !ui.isLive && !ui.explained.length;
   useEffect(() => {
-    if (isSought && !ui.explaining) hands.session.explain();
+    if (isSought && !ui.explaining) app.session.explain();
   }, [isSought, ui.explaining]);
   const isCounted = overlay === 'importance';
   const most = useMemo(
-    () => (isCounted ? hands.engine.greatest() : 1),
+    () => (isCounted ? app.engine.greatest() : 1),
     [isCounted, ui.version, ui.weights, ui.view],
   );
   const on = overlay === 'importance' ? 'painting' : 'solution';
@@ -123,9 +121,9 @@ export function Legend({ ui, hands, panes }) {
   </div>`;
 }
 
-/** @param {{ui: Ui, hands: Hands}} props */
-function Verify({ ui, hands }) {
-  const { session } = hands;
+/** @param {{ui: Ui, app: App}} props */
+function Verify({ ui, app }) {
+  const { session } = app;
   if (!ui.verifying) {
     // Not by the second click of a double click on "Analysis", under which it comes to lie.
     const begin = (/** @type {MouseEvent} */ { detail }) => detail < 2 && session.verify();
@@ -133,12 +131,12 @@ function Verify({ ui, hands }) {
       tip="Render the scene with this lighting, and compare" />`;
   }
   return html`<${Button} label="Stop" icon="close" act=${() => session.verify(false)} />
-    <${Bar} progress=${ui.verifying} label="Verifying" />
+    <${ProgressBar} progress=${ui.verifying} label="Verifying" />
     <span class="faint">${progressText(ui.verifying)}</span>`;
 }
 
-/** @param {{ui: Ui, hands: Hands}} props */
-function Verified({ ui, hands }) {
+/** @param {{ui: Ui, app: App}} props */
+function Verified({ ui, app }) {
   const { verified, show } = ui;
   const frame = useRef(/** @type {HTMLElement | null} */ (null));
   // It may have come below what there is room for.
@@ -146,9 +144,9 @@ function Verified({ ui, hands }) {
   if (!verified) return null;
   const isShown = show.left === 'solution' && show.right === 'verified';
   const compare = () => {
-    hands.store.set({ mix: null });
-    look(
-      hands.store,
+    app.store.set({ mix: null });
+    updateShow(
+      app.store,
       isShown
         ? { left: 'painting', right: 'solution', layout: 'side' }
         : { left: 'solution', right: 'verified', layout: 'wipe', instead: null },
@@ -160,81 +158,4 @@ function Verified({ ui, hands }) {
     }</span></p>
     <${Button} label="Answer | Render" icon="wipe" on=${isShown} act=${compare} />
   </div>`;
-}
-
-const DELTA_E =
-  'Mean colour difference from the painting (ΔE 2000), and what it was with the present lighting. 1 is just visible, 5 is obvious.';
-
-const STATES = {
-  live: 'A quick answer while you paint. The exact one follows.',
-  analysing: 'The lights are solved. The sentence still describes the answer before.',
-  'answer not shown': 'The sentence describes the answer, which is neither of the looks compared.',
-};
-
-/** Below the pictures, in one sentence: how close the answer comes.
- * @param {{ui: Ui, hands: Hands}} props */
-export function AnswerLine({ ui, hands }) {
-  const { store } = hands;
-  const text = ui.headline || (ui.ready ? 'Solving …' : '');
-  const isOpen = ui.side && !ui.panel && ui.open.truth;
-  const isOld = ui.headline !== '' && !ui.isJudged;
-  const busy = ui.isLive ? 'live' : isOld ? 'analysing' : null;
-  const isApart = isUnseen(ui);
-  const state = isApart && text ? 'answer not shown' : busy;
-  const turn = (/** @type {MouseEvent} */ event) => {
-    const button = /** @type {HTMLElement} */ (event.currentTarget);
-    store.set({ side: true, panel: null, open: { ...ui.open, truth: !isOpen } });
-    if (!isOpen) comeInto(button, '.is-truth');
-  };
-  return html`<div class="answer">
-    <p class=${`headline ${isOld || isApart ? 'is-old' : ''}`} role="status">
-      <${Whole} class="said" text=${text} most=${100} />
-      ${
-        // In one place, so that the sentence keeps its lines.
-        state && html`<span class="live" data-tip=${STATES[state]}><b>${state}</b></span>`
-      }
-      ${
-        !state &&
-        ui.deltaE !== null &&
-        html`<span class="faint" data-tip=${DELTA_E}>ΔE ${number(ui.deltaE, 2)}${
-          ui.deltaAsked !== null && html`<span class="was">, was ${number(ui.deltaAsked, 2)}</span>`
-        }</span>`
-      }
-    </p>
-    <${Help} ui=${ui} hands=${hands} />
-    ${
-      ui.ready &&
-      html`<${Button} label="Save look" icon="plus" keys="Control+S"
-      tip="Save painting and answer as a look"
-      act=${() => keepLook(hands)} />`
-    }
-    ${
-      // It stays where it is when it is pressed: nothing else slides under the pointer.
-      ui.ready && html`<${Button} label="Analysis" on=${isOpen} act=${turn} />`
-    }
-  </div>`;
-}
-
-/** What light is under the pointer, and which lights make it up; else what the tool does.
- * @param {{ui: Ui}} props */
-export function Here({ ui }) {
-  if (!ui.pointed) {
-    const text = ui.ready ? hintOf(ui.tool) : ''; // there is nothing to drag on yet
-    return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;
-  }
-  const { object, shares, light } = ui.pointed;
-  const exposed = light.map((x) => x * 2 ** exposureOf(ui.state));
-  const most = (isUnseen(ui) ? [] : shares)
-    .map((share, k) => ({ share, k }))
-    .filter(({ share }) => share >= 0.01)
-    .sort((a, b) => b.share - a.share)
-    .slice(0, 5);
-  return html`<p class="here" id="lp-status">${object && html`<span class="object">${shortened(object, 40)}</span>`}
-    <span class="light-here">${lightText(exposed)}${
-      ui.tool === 'pick' && html` · RGB ${exposed.map((x) => number(x, 3)).join(' ')}`
-    }</span>
-    ${most.map(
-      ({ share, k }) => html`<span key=${k}>${shortened(ui.lights[k]?.label ?? '', 24)}
-      <b>${Math.round(100 * share)} %</b></span>`,
-    )}</p>`;
 }

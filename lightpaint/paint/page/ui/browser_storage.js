@@ -1,6 +1,6 @@
-/** What a browser remembers of the interface from one time to the next: folds, and what the hand had. */
+/** Interface state that the browser stores between visits: open panels and tool settings. */
 
-import { LEAST_SIZE, MOST_SIZE, used } from './tools.js';
+import { MIN_BRUSH_SIZE, MAX_BRUSH_SIZE, distinctPaints } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
@@ -8,7 +8,7 @@ import { LEAST_SIZE, MOST_SIZE, used } from './tools.js';
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
 /** Where it lies. What was kept by an older page, or by somebody else, is looked at before it counts. */
-const [FOLDS, HAND] = ['lightpaint.open', 'lightpaint.hand'];
+const [FOLDS_KEY, TOOL_KEY] = ['lightpaint.open', 'lightpaint.hand'];
 
 /** @param {string} key @returns {Record<string, unknown>} */
 function read(key) {
@@ -30,43 +30,43 @@ function write(key, value) {
 }
 
 /** What was unfolded the last time. @returns {Record<string, boolean>} */
-export function openBefore() {
-  const folds = Object.entries(read(FOLDS)).filter(([, value]) => typeof value === 'boolean');
+export function storedFolds() {
+  const folds = Object.entries(read(FOLDS_KEY)).filter(([, value]) => typeof value === 'boolean');
   return /** @type {Record<string, boolean>} */ (Object.fromEntries(folds));
 }
 
 /** What the hand had the last time, of that what is sound.
  * @returns {Partial<Ui>} the size as it is kept: as a part of the picture's height, in `share` */
-export function handBefore() {
-  const kept = read(HAND);
-  const paint = paintIn(kept);
-  const second = paintIn(kept.second);
+export function storedTool() {
+  const kept = read(TOOL_KEY);
+  const paint = validPaint(kept);
+  const second = validPaint(kept.second);
   const shares = { flow: 0.01, fillFlow: 0.01, hardness: 0 };
   const found = Object.entries(shares).filter(([key, least]) => isWithin(kept[key], least, 1));
   return {
     ...Object.fromEntries(found.map(([key]) => [key, kept[key]])),
     ...paint,
     ...(second ? { second } : {}),
-    recent: usedIn(kept),
+    recent: recentPaints(kept),
   };
 }
 
 /** Colours that were used lately. @param {Record<string, unknown>} kept @returns {Paint[]} */
-function usedIn({ recent }) {
-  const all = Array.isArray(recent) ? recent.map(paintIn) : [];
-  return used(/** @type {Paint[]} */ (all.filter((one) => one !== null)));
+function recentPaints({ recent }) {
+  const all = Array.isArray(recent) ? recent.map(validPaint) : [];
+  return distinctPaints(/** @type {Paint[]} */ (all.filter((one) => one !== null)));
 }
 
 /** The size of the brush in a picture of a height: what it was in another one, else a seventh.
  * @param {number} height in pixels */
-export function sizeBefore(height) {
-  const { share } = read(HAND);
+export function storedBrushSize(height) {
+  const { share } = read(TOOL_KEY);
   const size = isWithin(share, 0, 10) ? Number(share) * height : Math.max(4, 0.14 * height);
-  return Math.round(Math.min(MOST_SIZE, Math.max(LEAST_SIZE, size)));
+  return Math.round(Math.min(MAX_BRUSH_SIZE, Math.max(MIN_BRUSH_SIZE, size)));
 }
 
 /** @param {any} kept @returns {Paint | null} */
-function paintIn(kept) {
+function validPaint(kept) {
   const { colour, stops } = kept ?? {};
   const isColour =
     Array.isArray(colour) && colour.length === 3 && colour.every((x) => isWithin(x, 0, 1));
@@ -79,25 +79,44 @@ function paintIn(kept) {
 const isWithin = (x, least, most) => typeof x === 'number' && x >= least && x <= most;
 
 /** Keep it from now on. @param {UiStore} store @returns {() => void} what ends it */
-export function keep(store) {
+export function storeChanges(store) {
   let last = store.value;
   return store.listen(() => {
     const before = last;
     last = store.value;
-    if (last.open !== before.open) write(FOLDS, last.open);
+    if (last.open !== before.open) write(FOLDS_KEY, last.open);
     // The hand that a page begins with is what was read, maybe long before there is a scene.
     if (!last.state || !before.state) return;
-    if (HELD.some((key) => last[key] !== before[key])) write(HAND, handOf(last));
+    if (STORED_FIELDS.some((key) => last[key] !== before[key])) write(TOOL_KEY, storedFields(last));
   });
 }
 
 /** What the hand has. @type {(keyof Ui)[]} */
-const HELD = ['colour', 'stops', 'second', 'recent', 'flow', 'fillFlow', 'hardness', 'size'];
+const STORED_FIELDS = [
+  'colour',
+  'stops',
+  'second',
+  'recent',
+  'flow',
+  'fillFlow',
+  'hardness',
+  'size',
+];
 
 /** What is in the hand; and what was used lately, also in a painter that is open beside this one.
  * @param {Ui} ui */
-function handOf({ colour, stops, second, recent: own, flow, fillFlow, hardness, size, state }) {
+function storedFields({
+  colour,
+  stops,
+  second,
+  recent: own,
+  flow,
+  fillFlow,
+  hardness,
+  size,
+  state,
+}) {
   const share = size / state.size[0];
-  const recent = used([...own, ...usedIn(read(HAND))]);
+  const recent = distinctPaints([...own, ...recentPaints(read(TOOL_KEY))]);
   return { colour, stops, second, recent, flow, fillFlow, hardness, share };
 }

@@ -1,4 +1,4 @@
-/** The brush over the pictures, and what lies under it. */
+/** The brush cursor over the pictures, and the light and object under it. */
 
 import { paneAt } from './pointer_input.js';
 
@@ -30,7 +30,7 @@ export function ring(
   rings.hidden = !pane;
   if (!pane) return;
   const isPoint =
-    ['pick', 'fill'].includes(ui.tool) || (ui.tool === 'ask' && ui.about === 'object');
+    ['pick', 'fill'].includes(ui.tool) || (ui.tool === 'adjust' && ui.about === 'object');
   const size = isPoint ? 14 : Math.max(4, ui.size * pane.scale);
   place(own, x, y, size, ui.hardness);
   twin.hidden = !others.length;

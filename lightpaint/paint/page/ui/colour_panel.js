@@ -1,4 +1,4 @@
-/** The colour of the paint: as white and green, as HSV, as RGB, as hex; how bright; swatches. */
+/** The colour of the paint as white, HSV, RGB or hex, its brightness, and swatches. */
 
 import { html, useState } from '../vendor/preact.js';
 import { encode, decode, ofHex, ofHsv, ofKelvin, toHex, toHsv, toKelvin } from './paint_colour.js';
@@ -9,7 +9,7 @@ import { paintOf } from './ui_state.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").RGB} RGB */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
 /** Warm is right: as on the sliders, and where somebody asks by a drag. */
 const WHITES = [9000, 6500, 5600, 4300, 3200, 2700, 1900];
@@ -28,15 +28,15 @@ const MIXERS = [
   { value: 'rgb', label: 'RGB' },
 ];
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function ColourPanel({ ui, hands }) {
-  const { store } = hands;
+/** @param {{ui: Ui, app: App}} props */
+export function ColourPanel({ ui, app }) {
+  const { store } = app;
   const set = (/** @type {RGB} */ colour) => store.set({ colour });
   const Mixer = { white: White, hsv: Hsv, rgb: Rgb }[ui.mixer];
   return html`<div class="colour">
     <div class="colour-row">
       <span class="patch" data-tip="Left: the colour. Right: how the display shows it at this brightness."
-        style=${{ '--colour': toHex(ui.colour), '--shown': shownAs(ui, hands) }}></span>
+        style=${{ '--colour': toHex(ui.colour), '--shown': shownAs(ui, app) }}></span>
       <${Hex} colour=${ui.colour} set=${set} />
       <${Choice} label="Colour model" value=${ui.mixer} choices=${MIXERS}
         change=${(/** @type {any} */ mixer) => store.set({ mixer })} />
@@ -45,11 +45,11 @@ export function ColourPanel({ ui, hands }) {
     <${Slider} label="Brightness" value=${ui.stops} least=${-8} most=${8} step=${0.1} digits=${1}
       unit="st" rest=${0} tip="Stops above display white. Paint can be brighter than white."
       change=${(/** @type {number} */ stops) => store.set({ stops })} />
-    <${Swatches} ui=${ui} hands=${hands} />
+    <${Swatches} ui=${ui} app=${app} />
   </div>`;
 }
 
-/** What the pictures show of the paint in the hand, on white. @param {Ui} ui @param {Hands} hands */
+/** What the pictures show of the paint in the hand, on white. @param {Ui} ui @param {App} app */
 export function shownAs(ui, { engine }) {
   return `rgb(${engine.codes(paintOf(ui), ui.show.stops).join(' ')})`;
 }
@@ -141,9 +141,9 @@ function Rgb({ colour, set }) {
   )}`;
 }
 
-/** @param {{ui: Ui, hands: Hands}} props */
-function Swatches({ ui, hands }) {
-  const { store } = hands;
+/** @param {{ui: Ui, app: App}} props */
+function Swatches({ ui, app }) {
+  const { store } = app;
   const swatch = (/** @type {RGB} */ rgb, /** @type {string} */ tip, /** @type {number} */ stops) =>
     html`<${Swatch} key=${tip} rgb=${rgb} tip=${tip}
       act=${() => store.set({ colour: rgb, stops })} />`;

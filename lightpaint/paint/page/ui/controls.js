@@ -101,7 +101,7 @@ export function Check({ label, on, change, tip, disabled }) {
  *   least?: number, most?: number, step?: number, digits?: number, figures?: number, unit?: string,
  *   start?: number, hidden?: boolean, empty?: string, disabled?: boolean, tip?: string}} props
  */
-export function Number_(props) {
+export function NumberField(props) {
   const { label, value, change, step = 1, digits = 2, unit, hidden, empty, disabled } = props;
   const { least = -Infinity, most = Infinity, figures, start = 0, tip } = props;
   const [typed, setTyped, now] = useTyped();
@@ -185,7 +185,7 @@ export function Slider(props) {
       onDblClick=${() => rest !== undefined && change(rest, true)} />
     ${
       !plain &&
-      html`<${Number_} label=${label} hidden value=${value} least=${least} most=${most}
+      html`<${NumberField} label=${label} hidden value=${value} least=${least} most=${most}
       step=${step} digits=${digits} unit=${unit ?? ''} disabled=${disabled}
       change=${(/** @type {number} */ made) => change(made, true)} />`
     }
@@ -197,7 +197,7 @@ export function Slider(props) {
  * is in its tip, which the keyboard reaches.
  * @param {{text: string, most: number, class?: string, tag?: string}} props
  */
-export function Whole({ text, most, class: name, tag: Tag = 'span' }) {
+export function TruncatedText({ text, most, class: name, tag: Tag = 'span' }) {
   const isLong = text.length > most;
   return html`<${Tag} class=${name} data-tip=${isLong ? text : undefined}
     tabindex=${isLong ? 0 : undefined}>${text}</${Tag}>`;
@@ -224,7 +224,7 @@ export function Fold({ title, open, toggle, children, extra, class: name }) {
  * Have a part of the painter seen, once it is there; maybe with the focus.
  * @param {HTMLElement} beside whatever in the same painter @param {string} name @param {boolean} [isFocused]
  */
-export function comeInto(beside, name, isFocused = false) {
+export function reveal(beside, name, isFocused = false) {
   const root = beside.closest('.lightpaint');
   requestAnimationFrame(() => {
     const part = /** @type {HTMLElement | null | undefined} */ (root?.querySelector(name));

@@ -1,28 +1,27 @@
-/** Windows over the painter: all keys, files to write. */
+/** Dialogs over the painter: keyboard shortcuts and export. */
 
 import { html, useState } from '../vendor/preact.js';
-import { Bar } from './progress_bar.js';
+import { ProgressBar } from './progress_bar.js';
 import { Button, Check, Dialog } from './controls.js';
 import { progressText, within } from './format.js';
-import { KEYS, MOD } from './shortcuts.js';
+import { SHORTCUTS, MOD } from './shortcuts.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function Dialogs({ ui, hands }) {
-  const close = () => hands.store.set({ dialog: null });
-  if (ui.dialog === 'keys') return html`<${KeysDialog} close=${close} />`;
-  if (ui.dialog === 'export')
-    return html`<${ExportDialog} ui=${ui} hands=${hands} close=${close} />`;
+/** @param {{ui: Ui, app: App}} props */
+export function Dialogs({ ui, app }) {
+  const close = () => app.store.set({ dialog: null });
+  if (ui.dialog === 'keys') return html`<${ShortcutsDialog} close=${close} />`;
+  if (ui.dialog === 'export') return html`<${ExportDialog} ui=${ui} app=${app} close=${close} />`;
   return null;
 }
 
 /** @param {{close: () => void}} props */
-function KeysDialog({ close }) {
+function ShortcutsDialog({ close }) {
   const spoken = (/** @type {string} */ key) => (key === 'Ctrl' ? MOD : key);
   return html`<${Dialog} title="Keyboard shortcuts" close=${close} class="keys">
-    ${KEYS.map(
+    ${SHORTCUTS.map(
       ({ title, keys }) => html`<section key=${title}><h3>${title}</h3><dl>
       ${keys.map(
         ({ shown, does }) => html`<div key=${does}>
@@ -37,7 +36,7 @@ function KeysDialog({ close }) {
 
 /** @type {{key: import("../engine/messages.js").Export["what"][number], label: string,
  *   about: string}[]} */
-const FILES = [
+const EXPORTS = [
   { key: 'target', label: 'Painting', about: 'painting.exr, for lightpaint solve' },
   { key: 'picture', label: 'Picture', about: 'answer.png: the answer as a picture' },
   { key: 'lighting', label: 'Lighting', about: 'lighting.json: level and colour of every light' },
@@ -47,9 +46,9 @@ const FILES = [
 
 const UNPAINTED = 'Nothing is painted yet, so no painting and no report were exported.';
 
-/** @param {{ui: Ui, hands: Hands, close: () => void}} props */
-function ExportDialog({ ui, hands, close }) {
-  const can = FILES.filter(
+/** @param {{ui: Ui, app: App, close: () => void}} props */
+function ExportDialog({ ui, app, close }) {
+  const can = EXPORTS.filter(
     ({ key }) =>
       (key !== 'relit' || ui.state?.can_render) &&
       (key !== 'report' || ui.state?.can_report !== false),
@@ -66,16 +65,16 @@ function ExportDialog({ ui, hands, close }) {
       <span class="faint">${about}</span></div>`,
     )}
     <div class="row"><span class="faint folder">to ${folder}</span>
-      <${CopyButton} text=${folder} tip="Copy the folder's path" hands=${hands} />
+      <${CopyButton} text=${folder} tip="Copy the folder's path" app=${app} />
       ${
         isBusy &&
-        html`<${Bar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Exporting" />
+        html`<${ProgressBar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Exporting" />
         <span class="faint">${ui.writing && progressText(ui.writing)}</span>
-        <${Button} label="Stop" icon="close" act=${() => hands.session.write([])}
+        <${Button} label="Stop" icon="close" act=${() => app.session.write([])}
           tip="Files that are written already stay" />`
       }
       <${Button} label=${isBusy ? 'Exporting …' : 'Export'} primary disabled=${isBusy || !what.length}
-        act=${() => hands.session.write(what)} /></div>
+        act=${() => app.session.write(what)} /></div>
     ${isBusy && html`<p class="faint">Export continues if you close this window.</p>`}
     ${
       exported &&
@@ -86,23 +85,23 @@ function ExportDialog({ ui, hands, close }) {
       ${
         exported.command &&
         html`<h3>The same from the command line</h3>
-        <${Copied} text=${exported.command} hands=${hands} />`
+        <${CommandLine} text=${exported.command} app=${app} />`
       }
     </div>`
     }
   </${Dialog}>`;
 }
 
-/** @param {{text: string, hands: Hands}} props */
-function Copied({ text, hands }) {
+/** @param {{text: string, app: App}} props */
+function CommandLine({ text, app }) {
   return html`<div class="command"><code tabindex="0">${text}</code>
-    <${CopyButton} text=${text} label="Copy" hands=${hands} />
+    <${CopyButton} text=${text} label="Copy" app=${app} />
   </div>`;
 }
 
 /** Says by itself that it has copied.
- * @param {{text: string, hands: Hands, label?: string, tip?: string}} props */
-function CopyButton({ text, hands, label, tip }) {
+ * @param {{text: string, app: App, label?: string, tip?: string}} props */
+function CopyButton({ text, app, label, tip }) {
   const [isDone, setDone] = useState(false);
   const copy = async () => {
     try {
@@ -110,9 +109,9 @@ function CopyButton({ text, hands, label, tip }) {
       setDone(true);
     } catch {
       // Browsers let pages copy that come from this machine, or by https.
-      hands.session.toast('This browser does not let the page copy. Select the text instead.');
+      app.session.toast('This browser does not let the page copy. Select the text instead.');
     }
   };
-  return html`<${Button} label=${label && (isDone ? 'Copied' : label)} tip=${isDone && tip ? 'Copied' : tip}
+  return html`<${Button} label=${label && (isDone ? 'CommandLine' : label)} tip=${isDone && tip ? 'CommandLine' : tip}
     icon=${isDone ? 'check' : 'copy'} act=${copy} />`;
 }

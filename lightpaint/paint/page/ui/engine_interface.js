@@ -1,11 +1,12 @@
 /**
- * What the interface wants of the picture engine and of its host: all that crosses between them.
- * Whoever mounts the painter brings both.
+ * Types of all that passes between the interface, the picture engine and its host.
+ *
+ * The caller of `mount` provides both.
  */
 
 /** @typedef {import("../engine/messages.js").RGB} RGB */
 /** @typedef {import("../engine/messages.js").Requests} Requests */
-/** @typedef {import("../engine/socket_host.js").Heard} Heard */
+/** @typedef {import("../engine/socket_host.js").HostEvents} HostEvents */
 /** @typedef {{data: any, shape: number[]}} Picture */
 /** @typedef {{kind: string, reply?: number, arrays?: Record<string, Picture>, [field: string]: any}} Message */
 
@@ -16,7 +17,7 @@
  * @typedef {object} Host
  * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K],
  *   arrays?: Record<string, Picture>) => Promise<Message>} send
- * @property {<K extends keyof Heard>(kind: K, hear: (message: Heard[K]) => void) => void} on
+ * @property {<K extends keyof HostEvents>(kind: K, hear: (message: HostEvents[K]) => void) => void} on
  * @property {(name: string) => Promise<Picture>} fetch
  * @property {() => void} close
  */
@@ -43,16 +44,16 @@
  * @property {RGB[] | null} other
  */
 
-/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "ask"} Tool */
+/** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust"} Tool */
 
 /**
  * The tool in the hand. `rgb`: linear light of the colour, its stops included. `size`: diameter in
  * pixels of the picture. `importance`: how many times as much as before counts what the importance
  * brush goes over.
- * @typedef {object} Use
+ * @typedef {object} ToolSettings
  * @property {Tool} tool
  * @property {RGB} rgb
- * @property {"light" | "look"} as
+ * @property {"light" | "colour"} as
  * @property {number} size
  * @property {number} hardness
  * @property {number} flow
@@ -77,16 +78,16 @@
  * @property {HTMLElement} element where the pictures are drawn
  * @property {(width: number, height: number) => void} resize in CSS pixels
  * @property {(show: Show) => void} show
- * @property {(use: Use) => void} use
+ * @property {(settings: ToolSettings) => void} setTool
  * @property {() => Pane[]} panes
- * @property {(view: number) => void} see another view: what is shown, and painted
+ * @property {(view: number) => void} showView another view: what is shown, and painted
  * @property {(x: number, y: number, factor: number) => {zoom: number, pan: [number, number]}} zoomAt
  * @property {(point: Point) => void} begin a stroke of the tool in the hand
  * @property {(points: Point[]) => void} move
  * @property {() => void} end
  * @property {() => boolean} cancel the stroke that has begun; whether there was one
  * @property {(from: Point, to: Point) => void} line a straight stroke, whole
- * @property {(asked: {stops: number, mired: number, object: number | null}) => void} ask
+ * @property {(asked: {stops: number, mired: number, object: number | null}) => void} adjust
  *   brighter and warmer by so much, in an object or, for null, in the whole picture
  * @property {(kind: Kind, x: number, y: number) => RGB} lightAt
  * @property {(kind: Kind, x: number, y: number, light?: RGB) => RGB} paintAt what to paint with, in the manner

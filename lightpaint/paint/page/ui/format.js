@@ -1,4 +1,4 @@
-/** Numbers as people read them. A true minus, a thin choice of digits, the unit behind. */
+/** Numbers as text: a true minus sign, few digits, units behind. */
 
 import { luminance, toKelvin } from './paint_colour.js';
 

@@ -1,4 +1,4 @@
-/** The slider of whites: by the mired, in which equal steps look equal; warm is right. */
+/** A slider for colour temperature, in mireds, so that equal steps look equal; warm is right. */
 
 import { html } from '../vendor/preact.js';
 import { ofKelvin, toHex } from './paint_colour.js';

@@ -1,4 +1,4 @@
-/** How bright a light is, beside how it is now: in stops, in percent, as it is typed. */
+/** A text field for the level of a light, relative to the scene: in stops or percent. */
 
 import { html } from '../vendor/preact.js';
 import { luminance } from './paint_colour.js';

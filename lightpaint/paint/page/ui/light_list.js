@@ -1,18 +1,18 @@
-/** The list of lights: search, sort, groups that fold, a row for each light. */
+/** The list of lights: search, sorting, groups that fold, and a row for each light. */
 
 import { inView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
 import { luminance } from './paint_colour.js';
-import { Button, Select, Whole } from './controls.js';
-import { askedOf, heldOf, tieOf } from './tied_lights.js';
+import { Button, Select, TruncatedText } from './controls.js';
+import { constraintsOf, lockedLights, findTie } from './tied_lights.js';
 import { counted, percent } from './format.js';
 import { Icon } from './icons.js';
-import { comparedAnswer, isUnseen } from './look_actions.js';
+import { comparedAnswer, isAnswerHidden } from './look_actions.js';
 import { LightRow } from './light_row.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
 const SORTS = [
   { value: 'scene', label: 'Scene order' },
@@ -24,13 +24,13 @@ const SORTS = [
 /** With more lights than these, only rows that are unfolded have their slider. */
 const MANY = 16;
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function LightsPanel({ ui, hands }) {
-  const { store } = hands;
+/** @param {{ui: Ui, app: App}} props */
+export function LightList({ ui, app }) {
+  const { store } = app;
   const found = sorted(ui, matching(ui));
   const groups = grouped(ui, found);
   const isMany = ui.lights.length > MANY;
-  return html`<div class=${`lights ${isUnseen(ui) ? 'is-unseen' : ''}`}>
+  return html`<div class=${`lights ${isAnswerHidden(ui) ? 'is-unseen' : ''}`}>
     ${
       ui.lights.length > 5 &&
       html`<div class="lights-tools">
@@ -45,47 +45,47 @@ export function LightsPanel({ ui, hands }) {
     ${ui.ready && !found.length && html`<p class="faint">No light has this name.</p>`}
     ${groups.map(({ name, members }) =>
       name === null
-        ? members.map((k) => row(ui, hands, k, isMany))
-        : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} hands=${hands}
+        ? members.map((k) => row(ui, app, k, isMany))
+        : html`<${Group} key=${`group ${name}`} name=${name} ui=${ui} app=${app}
           members=${members} isMany=${isMany} />`,
     )}
   </div>`;
 }
 
 /** Beside the title, where it moves no row: some lights are not shown; or of which of two looks
- * they are; or several are held. @param {{ui: Ui, hands: Hands}} props */
-export function OfAll({ ui, hands }) {
+ * they are; or several are held. @param {{ui: Ui, app: App}} props */
+export function LightListActions({ ui, app }) {
   const isPart = ui.solo.length > 0 || ui.mute.length > 0;
   if (ui.mix && !isPart) {
     const whose = comparedAnswer(ui)?.name ?? 'the answer (not shown)';
-    return html`<${Whole} class="whose" text=${`of ${whose}`} most=${20} />`;
+    return html`<${TruncatedText} class="whose" text=${`of ${whose}`} most=${20} />`;
   }
-  const held = heldOf(ui).length;
+  const held = lockedLights(ui).length;
   if (!isPart && held < 2) return null;
   if (!isPart) {
-    return html`<${Button} label="Unlock all" class="of-all" act=${() => hands.session.releaseAll()}
+    return html`<${Button} label="Unlock all" class="of-all" act=${() => app.session.unlockAll()}
       tip=${`${held} lights are locked or off. Let the solve set them again.`} />`;
   }
   return html`<${Button} label="Show all" class="of-all"
     tip="Solo or mute hides some lights. The answer has them all."
-    act=${() => hands.store.set({ solo: [], mute: [] })} />`;
+    act=${() => app.store.set({ solo: [], mute: [] })} />`;
 }
 
-/** @param {Ui} ui @param {Hands} hands @param {number} k @param {boolean} isMany */
-function row(ui, hands, k, isMany) {
+/** @param {Ui} ui @param {App} app @param {number} k @param {boolean} isMany */
+function row(ui, app, k, isMany) {
   const light = ui.lights[k];
   const isOpen = ui.unfolded.includes(k);
-  return html`<${LightRow} key=${light.name} k=${k} light=${light} hands=${hands}
-    rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${askedOf(ui, k)} tied=${tieOf(ui, k)}
+  return html`<${LightRow} key=${light.name} k=${k} light=${light} app=${app}
+    rgb=${ui.weights[k] ?? light.present} lit=${ui.lit[k]} asked=${constraintsOf(ui, k)} tied=${findTie(ui, k)}
     isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     here=${ui.pointed?.shares[k]} hasSlider=${isOpen || !isMany}
     picture=${inView(`thumb/${k}`, ui.view)} thumb=${ui.resources[inView(`thumb/${k}`, ui.view)]}
     others=${isOpen ? ui.lights : undefined} />`;
 }
 
-/** @param {{name: string, ui: Ui, hands: Hands, members: number[], isMany: boolean}} props */
-function Group({ name, ui, hands, members, isMany }) {
-  const { store } = hands;
+/** @param {{name: string, ui: Ui, app: App, members: number[], isMany: boolean}} props */
+function Group({ name, ui, app, members, isMany }) {
+  const { store } = app;
   const key = `group ${name}`;
   const open = ui.open[key] ?? true;
   const share = members.reduce((sum, k) => sum + (ui.lit[k]?.share ?? 0), 0);
@@ -100,7 +100,7 @@ function Group({ name, ui, hands, members, isMany }) {
       <${Button} label="S" class="letter" on=${isSolo} tip=${`Show ${name} alone`}
         act=${() => store.set({ solo: isSolo ? solo : [...solo, ...members] })} />
     </div>
-    ${open && members.map((k) => row(ui, hands, k, isMany))}
+    ${open && members.map((k) => row(ui, app, k, isMany))}
   </div>`;
 }
 
@@ -159,7 +159,7 @@ const FEWEST = 3;
  * @param {Ui} ui @param {number} k @returns {string | null} */
 function groupOf(ui, k) {
   const { name, group } = ui.lights[k];
-  const tie = tieOf(ui, k);
+  const tie = findTie(ui, k);
   const others = tie && (tie.length === 2 ? tie[1] : `${tie.length - 1} more`);
   if (tie) return `${tie[0]} and ${others}, tied`;
   return group ?? (ui.lights.length > MANY ? stemOf(name) : null);
@@ -167,7 +167,7 @@ function groupOf(ui, k) {
 
 /** @param {Ui} ui @param {number} k */
 function isStem(ui, k) {
-  return !ui.lights[k].group && !tieOf(ui, k);
+  return !ui.lights[k].group && !findTie(ui, k);
 }
 
 /** `window` of `window_12`, `cyc` of `cyc left`. @param {string} name @returns {string | null} */

@@ -1,21 +1,21 @@
-/** One light: what it is in the answer, whether it is shown, and its dimmer. */
+/** A row of the light list: the light in the answer, solo, mute, lock and dimmer. */
 
 import { Component, html } from '../vendor/preact.js';
 import { atFull, luminance, toHex, toKelvin } from './paint_colour.js';
-import { Asking } from './light_constraints.js';
+import { LightConstraints } from './light_constraints.js';
 import { Button, Slider } from './controls.js';
 import { number, percent, stopsText, whiteText } from './format.js';
 import { Icon } from './icons.js';
 import { BRIGHTEST, DARKEST, Level, atLevel, nowOf, stopsOf } from './level_field.js';
-import { Thumb } from './thumbnail.js';
+import { Thumbnail } from './thumbnail.js';
 
 /** @typedef {import("./ui_state.js").Light} Light */
-/** @typedef {import("./ui_state.js").Lit} Lit */
-/** @typedef {import("./ui_state.js").Asked} Asked */
+/** @typedef {import("./ui_state.js").LightAnswer} LightAnswer */
+/** @typedef {import("./ui_state.js").Constraints} Constraints */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 /**
- * @typedef {{k: number, light: Light, hands: Hands, rgb: RGB, lit?: Lit, asked?: Asked,
+ * @typedef {{k: number, light: Light, app: App, rgb: RGB, lit?: LightAnswer, asked?: Constraints,
  *   tied?: string[], isLive: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
  *   here?: number, hasSlider: boolean, picture: string, thumb?: number, others?: Light[]}} Props
  */
@@ -36,19 +36,19 @@ export class LightRow extends Component {
 
   /** A row that goes away under the pointer is not told that the pointer has left. */
   componentWillUnmount() {
-    const { k, hands } = this.props;
-    if (hands.store.value.hovered === k) hands.store.set({ hovered: null });
+    const { k, app } = this.props;
+    if (app.store.value.hovered === k) app.store.set({ hovered: null });
   }
 
   render() {
-    const { k, light, hands, isOpen, hasSlider, here, isMute, asked } = this.props;
-    const { store } = hands;
+    const { k, light, app, isOpen, hasSlider, here, isMute, asked } = this.props;
+    const { store } = app;
     const dim = isMute || asked?.off ? 'is-dim' : '';
     const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered });
     return html`<div class=${`light ${dim} ${isOpen ? 'is-open' : ''}`} role="group"
       aria-label=${light.label} data-light=${light.name}>
       <div class="light-thumb" onPointerEnter=${hover(k)} onPointerLeave=${hover(null)}>
-        <${Thumb} name=${this.props.picture} generation=${this.props.thumb} hands=${hands} />
+        <${Thumbnail} name=${this.props.picture} generation=${this.props.thumb} app=${app} />
         <${Share} share=${this.props.lit?.share ?? 0} here=${here} />
         <${Badge} ...${this.props} />
       </div>
@@ -66,18 +66,19 @@ export class LightRow extends Component {
         ${this.numbers()}
         ${hasSlider && !light.is_fixed && this.dimmer()}
       </div>
-      ${isOpen && html`<${Asking} ...${this.props} />`}
+      ${isOpen && html`<${LightConstraints} ...${this.props} />`}
     </div>`;
   }
 
   /** Shown or not; then, apart, what is asked of the solve. */
   marks() {
-    const { k, light, hands, isSolo, isMute, asked = {} } = this.props;
-    const { store, session } = hands;
+    const { k, light, app, isSolo, isMute, asked = {} } = this.props;
+    const { store, session } = app;
     const turn = (/** @type {"solo" | "mute"} */ key, /** @type {boolean} */ on) =>
       store.set((ui) => ({ [key]: on ? ui[key].filter((one) => one !== k) : [...ui[key], k] }));
     const isHeld = asked.lock !== undefined || Boolean(asked.off);
-    const lock = () => (isHeld ? session.release(k) : session.hold(k, this.props.rgb, true));
+    const lock = () =>
+      isHeld ? session.unlockLight(k) : session.lockLight(k, this.props.rgb, true);
     return html`<span class="marks" role="group" aria-label="Display">
       <${Button} label="S" class="letter" on=${isSolo} act=${() => turn('solo', isSolo)}
         tip=${`Solo: show ${light.label} alone. The answer does not change.`} />
@@ -119,11 +120,11 @@ export class LightRow extends Component {
   }
 
   dimmer() {
-    const { k, light, rgb, hands, asked } = this.props;
+    const { k, light, rgb, app, asked } = this.props;
     const stops = stopsOf(rgb, light) ?? DARKEST;
     const move = (/** @type {number} */ to, /** @type {boolean} */ done) => {
       this.grasped ??= rgb;
-      hands.session.hold(k, moved(this.grasped, light, to), done);
+      app.session.lockLight(k, moved(this.grasped, light, to), done);
       if (done) this.grasped = null;
     };
     const text = luminance(rgb) > 0 ? stopsText(stops) : 'off';
@@ -132,8 +133,8 @@ export class LightRow extends Component {
         least=${DARKEST} most=${BRIGHTEST} step=${0.05} rest=${0} text=${text}
         disabled=${Boolean(asked?.off)} change=${move} />
       <${Level} light=${light} rgb=${rgb} disabled=${Boolean(asked?.off)}
-        say=${(/** @type {string} */ words) => hands.session.toast(words)}
-        change=${(/** @type {RGB} */ made) => hands.session.hold(k, made, true)} />
+        say=${(/** @type {string} */ words) => app.session.toast(words)}
+        change=${(/** @type {RGB} */ made) => app.session.lockLight(k, made, true)} />
     </div>`;
   }
 }
@@ -165,7 +166,7 @@ function Share({ share, here }) {
 }
 
 /** What is worth a word, below the picture: the rows keep their height while lights change.
- * @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} props */
+ * @param {{light: Light, lit?: LightAnswer, asked?: Constraints, tied?: string[]}} props */
 function Badge(props) {
   const { lit, asked = {}, tied } = props;
   const said = notes(props);
@@ -187,10 +188,10 @@ function unfold(store, k) {
   }));
 }
 
-/** What colour it may have, if that is asked. @param {Asked} asked */
+/** What colour it may have, if that is asked. @param {Constraints} asked */
 const colourOf = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
 
-/** In a word, and in words. @param {{light: Light, lit?: Lit, asked?: Asked, tied?: string[]}} about
+/** In a word, and in words. @param {{light: Light, lit?: LightAnswer, asked?: Constraints, tied?: string[]}} about
  * @returns {string[][]} */
 function notes({ light, lit, asked = {}, tied }) {
   /** @type {[unknown, string, string][]} */

@@ -1,31 +1,31 @@
-/** Looks are kept, and gone on from; which of them is what is seen now. */
+/** Saving and loading of looks, and which look equals the current state. */
 
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
 /** Difference of lights, of the brightest of them, up to which two answers are the same: round-off
  * of sums in another order. */
 const SAME = 1e-6;
 
 /** Keep painting and answer, as hands have left the lights, under a name that no other look has.
- * @param {Hands} hands */
-export function keepLook(hands) {
-  const { session } = hands;
-  session.keeping = session.keeping.then(() => session.moving).then(() => keep(hands));
-  return session.keeping;
+ * @param {App} app */
+export function saveLook(app) {
+  const { session } = app;
+  session.savingLook = session.savingLook.then(() => session.moveInProgress).then(() => keep(app));
+  return session.savingLook;
 }
 
-/** @param {Hands} hands */
+/** @param {App} app */
 async function keep({ session, store }) {
   const reply = await session.send('save_look', { name: unused(store.value.looks) });
   if (reply?.kind === 'looks') mark(store, Math.max(...reply.looks.map(idOf)));
 }
 
-/** Go on from a look: a step that can be undone. @param {Hands} hands @param {number} look */
-export async function goOnFrom({ session, store }, look) {
+/** Go on from a look: a step that can be undone. @param {App} app @param {number} look */
+export async function loadLook({ session, store }, look) {
   const name = store.value.looks.find(({ id }) => id === look)?.name ?? null;
   // Until it is there, the pictures are of what was there before.
   store.set({ comingTo: name });
@@ -63,7 +63,7 @@ export function comparedAnswer(ui) {
 }
 
 /** Whether the answer is not shown, since looks are compared that it is not. @param {Ui} ui */
-export const isUnseen = (ui) => ui.mix !== null && !comparedAnswer(ui);
+export const isAnswerHidden = (ui) => ui.mix !== null && !comparedAnswer(ui);
 
 /** @param {UiStore} store @param {number} look */
 function mark(store, look) {

@@ -1,21 +1,23 @@
-/** Looks that were kept: small pictures with names, to go on from, to compare and to mix. They lie in
- * a strip that is always as high, so that the pictures above it stay as they are. */
+/**
+ * The strip of saved looks, to load, compare and crossfade. Its height never changes, so that the
+ * pictures above it stay where they are.
+ */
 
 import { inView } from '../engine/message_frames.js';
 import { html, useEffect, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { Button, Select, Slider } from './controls.js';
-import { currentLook, goOnFrom } from './look_actions.js';
+import { currentLook, loadLook } from './look_actions.js';
 import { MOD } from './shortcuts.js';
-import { betweenOf, mixOf, unmixed } from './ui_state.js';
-import { Thumb } from './thumbnail.js';
-import { look } from './tools.js';
+import { mixName, mixedWeights, withoutMix } from './ui_state.js';
+import { Thumbnail } from './thumbnail.js';
+import { updateShow } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Look} Look */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function Looks({ ui, hands }) {
+/** @param {{ui: Ui, app: App}} props */
+export function LookStrip({ ui, app }) {
   const { looks } = ui;
   const list = useRef(/** @type {HTMLElement | null} */ (null));
   const count = useRef(Infinity);
@@ -30,8 +32,8 @@ export function Looks({ ui, hands }) {
     ${
       looks.length > 0 &&
       html`<ul ref=${list}>${looks.map(
-        (one) => html`<${Kept} key=${one.id} one=${one} isCurrent=${one.id === current}
-          ui=${ui} hands=${hands} />`,
+        (one) => html`<${LookItem} key=${one.id} one=${one} isCurrent=${one.id === current}
+          ui=${ui} app=${app} />`,
       )}</ul>`
     }
     ${
@@ -39,13 +41,13 @@ export function Looks({ ui, hands }) {
       ui.ready &&
       html`<p class="faint">No looks yet: <kbd>${MOD} S</kbd> saves painting and answer as a look.</p>`
     }
-    ${looks.length > 1 && html`<${Mix} ui=${ui} hands=${hands} />`}
+    ${looks.length > 1 && html`<${LookCrossfade} ui=${ui} app=${app} />`}
   </div></section>`;
 }
 
-/** @param {{one: Look, isCurrent: boolean, ui: Ui, hands: Hands}} props */
-function Kept({ one, isCurrent, ui, hands }) {
-  const { session } = hands;
+/** @param {{one: Look, isCurrent: boolean, ui: Ui, app: App}} props */
+function LookItem({ one, isCurrent, ui, app }) {
+  const { session } = app;
   const [isNaming, setNaming] = useState(false);
   const [isSure, setSure] = useState(false);
   const drop = () => (isSure ? session.send('drop_look', { look: one.id }) : setSure(true));
@@ -56,12 +58,12 @@ function Kept({ one, isCurrent, ui, hands }) {
     onPointerLeave=${() => setSure(false)}>
     <button type="button" class="look-picture" aria-label=${`Load ${one.name}`}
       aria-current=${isCurrent ? 'true' : undefined} data-tip=${tip}
-      onClick=${() => goOnFrom(hands, one.id)}>
-      <${Thumb} name=${picture} generation=${ui.resources[picture] ?? 0} hands=${hands} />
+      onClick=${() => loadLook(app, one.id)}>
+      <${Thumbnail} name=${picture} generation=${ui.resources[picture] ?? 0} app=${app} />
     </button>
     ${
       isNaming
-        ? html`<${Naming} one=${one} hands=${hands} done=${() => setNaming(false)} />`
+        ? html`<${LookNameField} one=${one} app=${app} done=${() => setNaming(false)} />`
         : html`<button type="button" class="look-name" data-tip=${`Rename ${one.name}`}
           onClick=${() => setNaming(true)}>${one.name}</button>`
     }
@@ -74,13 +76,13 @@ function Kept({ one, isCurrent, ui, hands }) {
   </li>`;
 }
 
-/** @param {{one: Look, hands: Hands, done: () => void}} props */
-function Naming({ one, hands, done }) {
+/** @param {{one: Look, app: App, done: () => void}} props */
+function LookNameField({ one, app, done }) {
   const ref = useRef(/** @type {HTMLInputElement | null} */ (null));
   useEffect(() => ref.current?.select(), []);
   const take = () => {
     const name = ref.current?.value.trim();
-    if (name && name !== one.name) hands.session.send('rename_look', { look: one.id, name });
+    if (name && name !== one.name) app.session.send('rename_look', { look: one.id, name });
     done();
   };
   const press = (/** @type {KeyboardEvent} */ event) => {
@@ -100,23 +102,27 @@ function pairOf(ui) {
   return { a: ids[at > 0 ? at - 1 : 1], b };
 }
 
-/** Two looks beside each other, and what lies between them. @param {{ui: Ui, hands: Hands}} props */
-function Mix({ ui, hands }) {
-  const { store } = hands;
+/** Two looks beside each other, and what lies between them. @param {{ui: Ui, app: App}} props */
+function LookCrossfade({ ui, app }) {
+  const { store } = app;
   const now = ui.mix ?? { ...pairOf(ui), share: 1 };
   const choices = ui.looks.map((one) => ({ value: String(one.id), label: one.name }));
   const nameOf = (/** @type {number} */ id) => ui.looks.find((one) => one.id === id)?.name ?? '';
   const set = (/** @type {{a?: number, b?: number, share?: number}} */ changed) => {
     const mix = { ...now, ...changed };
     store.set({ mix });
-    look(store, { left: 'solution', right: 'other', instead: mixOf(ui, { ...mix, share: 0 }) });
+    updateShow(store, {
+      left: 'solution',
+      right: 'other',
+      instead: mixedWeights(ui, { ...mix, share: 0 }),
+    });
   };
   const keep = () =>
-    hands.session.send('mix_looks', {
+    app.session.send('mix_looks', {
       first: now.a,
       second: now.b,
       part: now.share,
-      name: betweenOf(ui.looks, now),
+      name: mixName(ui.looks, now),
     });
   return html`<div class="mix" role="group" aria-label="Compare two looks">
     ${
@@ -131,10 +137,10 @@ function Mix({ ui, hands }) {
         tip=${`To ${nameOf(now.b)}`}
         change=${(/** @type {string} */ id) => set({ b: Number(id) })} />
       <${Button} icon="plus" label="Save as look" class="keep" act=${keep}
-        tip=${`Save ${betweenOf(ui.looks, now)}`} />`
+        tip=${`Save ${mixName(ui.looks, now)}`} />`
     }
     <${Button} icon="side" label=${ui.mix ? 'Back to the painting' : 'Compare looks'} class="compare"
       tip=${ui.mix ? 'Show painting and answer again' : 'Two looks side by side, and a crossfade between them'}
-      on=${Boolean(ui.mix)} act=${() => (ui.mix ? store.set(unmixed) : set({}))} />
+      on=${Boolean(ui.mix)} act=${() => (ui.mix ? store.set(withoutMix) : set({}))} />
   </div>`;
 }

@@ -1,21 +1,21 @@
-/** What a person has to know now: toasts, a session that is elsewhere, a render in progress, tips. */
+/** Notices: toasts, banners about the connection, running tasks, tool tips. */
 
 import { html, useEffect, useRef, useState } from '../vendor/preact.js';
 import { Button } from './controls.js';
 import { counted, progressText } from './format.js';
 import { Icon } from './icons.js';
-import { Bar } from './progress_bar.js';
+import { ProgressBar } from './progress_bar.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function Toasts({ ui, hands }) {
+/** @param {{ui: Ui, app: App}} props */
+export function Toasts({ ui, app }) {
   return html`<div class="toasts" role="log" aria-live="polite" aria-label="Messages">
     ${ui.toasts.map(
       ({ id, text, tone }) => html`<div class=${`toast is-${tone}`} key=${id}>
       ${tone === 'warn' && html`<${Icon} name="warn" />`}<span>${text}</span>
-      <${Button} icon="close" tip="Dismiss" act=${() => hands.session.dismiss(id)} /></div>`,
+      <${Button} icon="close" tip="Dismiss" act=${() => app.session.dismiss(id)} /></div>`,
     )}
   </div>`;
 }
@@ -34,26 +34,26 @@ function stale(unheard) {
   return `This page belongs to a painter that has ended. Open the address that the terminal shows now.${lost}`;
 }
 
-/** Over the pictures; in the middle where there are none. @param {{ui: Ui, hands: Hands}} props */
-export function Banner({ ui, hands }) {
+/** Over the pictures; in the middle where there are none. @param {{ui: Ui, app: App}} props */
+export function Banner({ ui, app }) {
   const { closed, connection, isSilent } = ui;
   const said = (/** @type {string} */ text, /** @type {any} */ more = null) =>
     html`<div class=${`banner ${ui.ready ? '' : 'is-alone'}`} role="alert">
       <${Icon} name="warn" /><span>${text}</span>${more}</div>`;
   if (isSilent) return said(SILENT);
   if (closed && connection !== 'stale')
-    return said(closed.text, html`<${WayOn} ui=${ui} hands=${hands} />`);
+    return said(closed.text, html`<${ReconnectButton} ui=${ui} app=${app} />`);
   if (connection === 'lost') return said(LOST);
   if (connection === 'stale') return said(stale(ui.unheard));
   return null;
 }
 
-/** What can be done where the session is not. @param {{ui: Ui, hands: Hands}} props */
-function WayOn({ ui, hands }) {
+/** What can be done where the session is not. @param {{ui: Ui, app: App}} props */
+function ReconnectButton({ ui, app }) {
   const reason = ui.closed?.reason;
   if (reason === 'taken') {
     return html`<${Button} label="Take over" primary tip="Continue here instead of in the other tab"
-      act=${() => hands.session.send('take_over')} />`;
+      act=${() => app.session.send('take_over')} />`;
   }
   if (reason !== 'version') return null;
   return html`<${Button} label="Reload the page" primary act=${() => location.reload()} />`;
@@ -62,29 +62,29 @@ function WayOn({ ui, hands }) {
 /**
  * What goes on: what somebody asked for, wherever that was; a basis that still renders; pictures that
  * still load. In short while the pointer is on a picture, of which more is said beside it.
- * @param {{ui: Ui, hands: Hands}} props
+ * @param {{ui: Ui, app: App}} props
  */
-export function Working({ ui, hands }) {
+export function RunningTasks({ ui, app }) {
   if (!ui.ready) return null;
-  return html`${worksOf(ui, hands).map(({ name, progress, text, stop }) => {
+  return html`${worksOf(ui, app).map(({ name, progress, text, stop }) => {
     const far = progressText(progress);
     const whole = [name, far].filter(Boolean).join(': ');
-    return html`<div class="working" key=${name}><${Bar} progress=${progress} label=${name} />
+    return html`<div class="working" key=${name}><${ProgressBar} progress=${progress} label=${name} />
       <span>${ui.pointed ? far || name : text ? `${whole}. ${text}` : whole}</span>
       ${stop && html`<${Button} icon="close" tip=${`Stop: ${name.toLowerCase()}`} act=${stop} />`}</div>`;
   })}`;
 }
 
 /** @typedef {{name: string, progress: {done: number, total: number, left_s?: number},
- *   text?: string, stop?: () => void}} Work */
+ *   text?: string, stop?: () => void}} Task */
 
 /** Those that are seen nowhere else; of what comes by itself one only. @param {Ui} ui
- * @param {Hands} hands @returns {Work[]} */
+ * @param {App} app @returns {Task[]} */
 function worksOf(ui, { session }) {
   const { basis, loading, writing, verifying } = ui;
   const isOpen = ui.side && !ui.panel && ui.open.truth;
   const endless = { done: 0, total: 0 };
-  /** @type {Work[]} */
+  /** @type {Task[]} */
   const works = [];
   if ((ui.isWriting || writing) && ui.dialog !== 'export')
     works.push({

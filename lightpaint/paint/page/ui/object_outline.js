@@ -1,4 +1,4 @@
-/** The outline of the object that a click would fill, or a drag asks about. */
+/** The outline of the object that a click would fill, or that a drag adjusts. */
 
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
 
@@ -17,12 +17,12 @@ const [WITHIN, AROUND] = [
 function objectOf({ tool, about, pointed }) {
   if (!pointed) return null;
   if (tool === 'fill') return pointed.index;
-  return tool === 'ask' && about === 'object' && pointed.index >= 0 ? pointed.index : null;
+  return tool === 'adjust' && about === 'object' && pointed.index >= 0 ? pointed.index : null;
 }
 
 /** Drawn anew when it is another object, or lies elsewhere, and at no other time.
  * @param {{ui: Ui, engine: Engine, panes: Pane[]}} props */
-export function Outline({ ui, engine, panes }) {
+export function ObjectOutline({ ui, engine, panes }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const object = objectOf(ui);
   const places = panes.map(({ x, y, width, height, left, top, scale }) =>

@@ -1,4 +1,4 @@
-/** Colours of paint, as the engine has them. */
+/** Colour functions for paint. */
 
 export {
   decode,

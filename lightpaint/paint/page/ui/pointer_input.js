@@ -1,9 +1,10 @@
 /**
- * Hands on the pictures: a mouse, a pen, fingers. One finger paints, two pan and zoom; Space or the
- * middle button pan; Ctrl and the wheel zoom.
+ * Mouse, pen and touch on the pictures.
+ *
+ * One finger paints, two pan and zoom. Space or the middle button pan; Ctrl and the wheel zoom.
  */
 
-import { look, remember, take } from './tools.js';
+import { updateShow, rememberPaint, pickPaint } from './tools.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
 /** @typedef {import("./engine_interface.js").Point} Point */
@@ -76,14 +77,14 @@ export class Pointer {
     const { tool } = this.store.value;
     if (!point) return;
     if (event.altKey || tool === 'pick') {
-      take(this.store, this.engine.paintAt(point.kind, point.x, point.y));
+      pickPaint(this.store, this.engine.paintAt(point.kind, point.x, point.y));
       this.pane = null;
       return;
     }
     if (!this.canPaint()) return;
-    remember(this.store);
+    rememberPaint(this.store);
     this.store.set({ hint: false });
-    if (event.shiftKey && this.last && tool !== 'ask') {
+    if (event.shiftKey && this.last && tool !== 'adjust') {
       this.engine.line(this.last, point);
       this.last = point;
       return;
@@ -93,7 +94,7 @@ export class Pointer {
     this.way = 0;
     this.engine.begin(point);
     this.last = point;
-    this.isAsking = tool === 'ask';
+    this.isAsking = tool === 'adjust';
     if (this.isAsking) this.store.set({ asking: { stops: 0, mired: 0 } });
   }
 
@@ -148,13 +149,14 @@ export class Pointer {
     const { tool } = this.store.value;
     if (!pane || isElsewhere(this.store.value)) return;
     const point = { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale, pressure: 1 };
-    if (tool === 'pick') return take(this.store, this.engine.paintAt(pane.kind, point.x, point.y));
-    if (tool === 'ask')
+    if (tool === 'pick')
+      return pickPaint(this.store, this.engine.paintAt(pane.kind, point.x, point.y));
+    if (tool === 'adjust')
       return this.say(
         'Adjust needs a drag. To type values instead, press By numbers above the pictures.',
       );
     if (!this.canPaint()) return;
-    remember(this.store);
+    rememberPaint(this.store);
     this.store.set({ hint: false });
     if (isLine && this.last) this.engine.line(this.last, point);
     else {
@@ -186,7 +188,10 @@ export class Pointer {
     const far = (/** @type {{x: number, y: number}} */ a) =>
       Math.hypot(a.x - other.x, a.y - other.y);
     const factor = far(place) / Math.max(1, far(own));
-    look(this.store, this.engine.zoomAt((place.x + other.x) / 2, (place.y + other.y) / 2, factor));
+    updateShow(
+      this.store,
+      this.engine.zoomAt((place.x + other.x) / 2, (place.y + other.y) / 2, factor),
+    );
     this.pan((place.x - own.x) / 2, (place.y - own.y) / 2);
   }
 
@@ -194,7 +199,7 @@ export class Pointer {
   pan(x, y) {
     const scale = this.engine.panes()[0]?.scale ?? 1;
     const [px, py] = this.store.value.show.pan;
-    look(this.store, { pan: [px - x / scale, py - y / scale] });
+    updateShow(this.store, { pan: [px - x / scale, py - y / scale] });
   }
 
   /** @param {WheelEvent} event */
@@ -202,7 +207,7 @@ export class Pointer {
     const { x, y } = this.place(/** @type {any} */ (event));
     const { zoom } = this.store.value.show;
     if (event.ctrlKey || event.metaKey) {
-      look(this.store, this.engine.zoomAt(x, y, 2 ** (-event.deltaY / 240)));
+      updateShow(this.store, this.engine.zoomAt(x, y, 2 ** (-event.deltaY / 240)));
     } else if (zoom > 1) {
       this.pan(-(event.shiftKey ? event.deltaY : event.deltaX), event.shiftKey ? 0 : -event.deltaY);
     } else {

@@ -1,4 +1,4 @@
-/** What is said beside the pointer: what a drag asks for, which light the picker would take. */
+/** A label at the pointer: the adjustment of a drag, or the light that the picker would take. */
 
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
 import { toHex } from './paint_colour.js';
@@ -10,7 +10,7 @@ import { paneAt } from './pointer_input.js';
 /** @typedef {import("./ui_state.js").Ui} Ui */
 
 /** @param {{ui: Ui, engine: Engine, rings: {current: HTMLElement | null}}} props */
-export function Near({ ui, engine, rings }) {
+export function PointerLabel({ ui, engine, rings }) {
   const ref = useRef(/** @type {HTMLElement | null} */ (null));
   useLayoutEffect(() => {
     if (ref.current && rings.current) place(ref.current, rings.current, engine, ui);

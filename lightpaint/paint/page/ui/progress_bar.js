@@ -1,9 +1,9 @@
-/** How far something is. */
+/** A progress bar. */
 
 import { html } from '../vendor/preact.js';
 
 /** @param {{progress: {done: number, total: number, unit?: string}, label: string}} props */
-export function Bar({ progress, label }) {
+export function ProgressBar({ progress, label }) {
   const { done, total } = progress;
   const isKnown = total > 0;
   return html`<span class=${`bar ${isKnown ? '' : 'is-endless'}`} role="progressbar"

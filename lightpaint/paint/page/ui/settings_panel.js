@@ -1,12 +1,13 @@
-/** How a painting is answered: a panel over those at the side, so that the pictures show what each
- * setting does. */
+/**
+ * The solve settings: a panel over the side panels, so that the pictures show the effect of each.
+ */
 
 import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
-import { Button, Choice, Number_, useId } from './controls.js';
+import { Button, Choice, NumberField, useId } from './controls.js';
 import { number } from './format.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
 const AUTO = 'The best choice for a painting made here';
 
@@ -26,17 +27,17 @@ const HOLDS = [
   { value: 'hold', label: 'Hold', tip: 'They stay near their present look' },
   { value: 'go', label: 'Ignore', tip: 'They may change freely: only the paint counts' },
 ];
-const MEANT = [
-  { value: false, label: 'Sketch', tip: 'Strokes show what should change' },
+const PAINT_READINGS = [
+  { value: false, label: 'Sketch', tip: 'StrokeSender show what should change' },
   { value: true, label: 'Literal', tip: 'Each stroke is the exact light you want' },
 ];
-const UNSURE = [
+const MINOR_LIGHTS = [
   { value: false, label: 'May change', tip: 'Every change that brings the answer closer' },
   { value: true, label: 'Stay', tip: 'As they are now, unless a change helps much' },
 ];
 
 /** What a choice means, in a few words. @type {Record<string, Record<string, string>>} */
-const MEANS = {
+const DESCRIPTIONS = {
   space: {
     display: 'differences as the eye sees them on a display',
     linear: 'differences in linear light, where bright areas count most',
@@ -52,54 +53,54 @@ const MEANS = {
 const HOLD = 3;
 const PREFER_CURRENT = 0.01;
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function SettingsPanel({ ui, hands }) {
+/** @param {{ui: Ui, app: App}} props */
+export function SettingsPanel({ ui, app }) {
   const { settings, meant } = ui;
   const id = useId();
   const set = (/** @type {string} */ key) => (/** @type {any} */ value) =>
-    hands.session.setting(key, value);
-  const close = () => hands.store.set({ panel: null });
+    app.session.changeSetting(key, value);
+  const close = () => app.store.set({ panel: null });
   const hold = settings.hold ?? null;
-  const manner = hold === null ? 'auto' : hold === 0 ? 'go' : 'hold';
+  const mode = hold === null ? 'auto' : hold === 0 ? 'go' : 'hold';
   const stays = settings.prefer_current || null;
   return html`<${Panel} labelledby=${id} close=${close}>
     <div class="panel-head">
       <h2 id=${id}>Solve settings</h2>
       <${Button} icon="close" tip="Close" keys="Escape" act=${close} />
     </div>
-    <${Row} title="Unpainted parts" says=${said(hold === null, ofUnpainted(meant.hold))}>
-      <${Choice} label="Unpainted parts" value=${manner} choices=${HOLDS}
+    <${Row} title="Unpainted parts" says=${withSource(hold === null, describeHold(meant.hold))}>
+      <${Choice} label="Unpainted parts" value=${mode} choices=${HOLDS}
         change=${(/** @type {string} */ to) => set('hold')({ auto: null, hold: hold || HOLD, go: 0 }[to])} />
       ${
-        manner === 'hold' &&
-        html`<${Number_} label="Strength" value=${hold} least=${0.01} most=${100} step=${0.1}
+        mode === 'hold' &&
+        html`<${NumberField} label="Strength" value=${hold} least=${0.01} most=${100} step=${0.1}
         unit="×" tip="1: they count as much as all paint together. 3 is the usual value."
         change=${set('hold')} />`
       }
     </${Row}>
-    <${Row} title="Colour space of the match" says=${said(!settings.space, MEANS.space[meant.space])}>
+    <${Row} title="Colour space of the match" says=${withSource(!settings.space, DESCRIPTIONS.space[meant.space])}>
       <${Choice} label="Colour space of the match" value=${settings.space ?? null} choices=${SPACES}
         change=${set('space')} /></${Row}>
     <${Row} title="Light colours"
-      says=${said(!settings.colors, MEANS.colors[meant.colors])}>
+      says=${withSource(!settings.colors, DESCRIPTIONS.colors[meant.colors])}>
       <${Choice} label="Light colours" value=${settings.colors ?? null}
         choices=${COLOURS} change=${set('colors')} /></${Row}>
     <${Row} title="Read the paint as" says=${
       settings.literal
         ? 'Every stroke is exact: linear light, nothing held, any colour, unless set otherwise above'
-        : 'Strokes show what should change; the rest of the picture counts, too'
+        : 'StrokeSender show what should change; the rest of the picture counts, too'
     }>
-      <${Choice} label="Read the paint as" value=${Boolean(settings.literal)} choices=${MEANT}
+      <${Choice} label="Read the paint as" value=${Boolean(settings.literal)} choices=${PAINT_READINGS}
         change=${set('literal')} /></${Row}>
     <${Row} title="Lights that make little difference" says=${
       stays ? 'They stay as they are now' : 'They may change, too'
     }>
-      <${Choice} label="Lights that make little difference" value=${stays !== null} choices=${UNSURE}
+      <${Choice} label="Lights that make little difference" value=${stays !== null} choices=${MINOR_LIGHTS}
         change=${(/** @type {boolean} */ stay) =>
           set('prefer_current')(stay ? (stays ?? PREFER_CURRENT) : null)} />
       ${
         stays !== null &&
-        html`<${Number_} label="Strength" value=${stays} least=${0.001} most=${10} step=${0.01}
+        html`<${NumberField} label="Pull" value=${stays} least=${0.001} most=${10} step=${0.01}
         digits=${3} tip="0.01: only where the paint leaves it open. 1: unless a change helps very much."
         change=${set('prefer_current')} />`
       }
@@ -109,7 +110,7 @@ export function SettingsPanel({ ui, hands }) {
         ? 'The most useful ones, besides locked lights; the others are off'
         : 'No limit'
     }>
-      <${Number_} label="At most" value=${settings.sparse ?? null} least=${1} digits=${0}
+      <${NumberField} label="At most" value=${settings.sparse ?? null} least=${1} digits=${0}
         most=${ui.lights.length || 1} empty="all" unit="lights"
         tip="Empty: no limit" change=${set('sparse')} /></${Row}>
   </${Panel}>`;
@@ -149,12 +150,12 @@ function Row({ title, says, children }) {
 
 /** What is so, and whether that follows from the painting. @param {boolean} isAuto
  * @param {string | undefined} text */
-function said(isAuto, text = '') {
+function withSource(isAuto, text = '') {
   return isAuto && text ? `Now: ${text}` : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 /** What becomes of what is not painted. @param {number | null | undefined} hold */
-function ofUnpainted(hold) {
+function describeHold(hold) {
   if (hold === undefined || hold === null) return '';
   if (!hold) return 'free to change';
   const weight = hold === 1 ? 'the same weight as' : `${number(hold)} times the weight of`;

@@ -1,4 +1,4 @@
-/** What messages of the session say, as state of the interface. */
+/** Changes of the interface state that follow from messages of the session. */
 
 /** @typedef {import('./engine_interface.js').Message} Message */
 /** @typedef {import('./engine_interface.js').RGB} RGB */
@@ -6,11 +6,11 @@
 /** @typedef {import('../engine/messages.js').Events} Events */
 
 import { stateOfView } from '../engine/message_frames.js';
-import { mixOf, unmixed } from './ui_state.js';
+import { mixedWeights, withoutMix } from './ui_state.js';
 
 /** What is shown while something that was asked for is under way, as it is when nothing is.
  * @type {Record<string, Partial<Ui>>} */
-export const ENDED = {
+export const TASK_ENDED = {
   export: { isWriting: false, writing: null },
   verify: { verifying: null },
   explain: { explaining: false },
@@ -18,10 +18,15 @@ export const ENDED = {
 };
 
 /** When nothing is known to be under way. */
-export const IDLE = { ...ENDED.export, ...ENDED.verify, ...ENDED.explain, ...ENDED.preview };
+export const IDLE = {
+  ...TASK_ENDED.export,
+  ...TASK_ENDED.verify,
+  ...TASK_ENDED.explain,
+  ...TASK_ENDED.preview,
+};
 
 /** @param {Events["state"]} message @returns {Partial<Ui>} */
-export function stateOf(message, /** @type {import('./ui_state.js').Ui} */ before) {
+export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ before) {
   const isBack = before.connection !== 'open' || before.closed !== null;
   const views = message.views ?? [];
   const view = before.view < views.length ? before.view : 0;
@@ -49,8 +54,8 @@ export function stateOf(message, /** @type {import('./ui_state.js').Ui} */ befor
       basis && !basis.done
         ? { what: 'basis', done: basis.spp, total: basis.wanted, unit: 'samples' }
         : null,
-    ...(isApart(looks ?? [], before) ? unmixed(before) : {}),
-    ...(message.verified ? rendersOf(message.verified, view) : {}),
+    ...(isApart(looks ?? [], before) ? withoutMix(before) : {}),
+    ...(message.verified ? rendersUpdate(message.verified, view) : {}),
     // A scene is first shown as it is painted.
     ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
     ...answerFields(message.answer ?? {}, { ...before, view, views, lit: [] }),
@@ -63,24 +68,24 @@ const render = ({ is_old: isOld = false, ...about }) => ({ ...about, isOld });
 
 /** Renders that were made before the page began. @param {any[]} verified @param {number} view
  * @returns {Partial<Ui>} */
-function rendersOf(verified, view) {
+function rendersUpdate(verified, view) {
   const verifiedOf = Object.fromEntries(verified.map((one) => [one.view, render(one)]));
   return { verifiedOf, verified: verifiedOf[view] ?? null };
 }
 
 /** Which looks there are. @param {Events["looks"]} message @param {Ui} ui @returns {Partial<Ui>} */
-export function looksOf({ looks, resources }, ui) {
+export function looksUpdate({ looks, resources }, ui) {
   return {
     looks,
     resources: { ...ui.resources, ...resources },
-    ...(isApart(looks, ui) ? unmixed(ui) : {}),
+    ...(isApart(looks, ui) ? withoutMix(ui) : {}),
   };
 }
 
 /** Whether one of the looks that are compared is there no more.
  * @param {import('./ui_state.js').Look[]} looks @param {Ui} ui */
 function isApart(looks, ui) {
-  return ui.mix !== null && !mixOf({ ...ui, looks }, ui.mix);
+  return ui.mix !== null && !mixedWeights({ ...ui, looks }, ui.mix);
 }
 
 /** @param {{name: string, stops: number} | undefined} transform */
@@ -98,7 +103,7 @@ function answerFields(answer, before) {
   /** @type {Partial<Ui>} */
   const made = { isLive: false, isJudged: headline !== undefined };
   if (headline !== undefined)
-    Object.assign(made, { ofViews }, seenOf({ ...answer, ofViews }, before));
+    Object.assign(made, { ofViews }, closenessUpdate({ ...answer, ofViews }, before));
   // Without paint there is nothing to be sure of, or to be held back from.
   const known = made.deltaE === null && !ofViews ? UNKNOWN : {};
   if (lights) {
@@ -114,7 +119,7 @@ function answerFields(answer, before) {
 }
 
 /** How close the view is that is shown. @param {any} answer @param {Ui} ui @returns {Partial<Ui>} */
-function seenOf(answer, { view, views }) {
+function closenessUpdate(answer, { view, views }) {
   const isOne = views.length < 2;
   const its = isOne || !answer.ofViews ? answer : answer.ofViews[view];
   if (!its)
@@ -134,7 +139,7 @@ const UNKNOWN = { error: null, held: false, unreached: false };
 
 /** What changes with the view that is shown. @param {Ui} ui @param {number} view
  * @returns {Partial<Ui>} */
-export function viewOf(ui, view) {
+export function viewUpdate(ui, view) {
   const verified = ui.verifiedOf[view] ?? null;
   const isRender = ui.show.right === 'verified' && !verified;
   const isAsLarge = String(ui.views[view].size) === String(ui.views[ui.view].size);
@@ -152,7 +157,7 @@ export function viewOf(ui, view) {
     explained: [],
     pointed: null,
     show,
-    ...(ofViews ? seenOf({ ofViews }, { ...ui, view }) : {}),
+    ...(ofViews ? closenessUpdate({ ofViews }, { ...ui, view }) : {}),
     lit: ui.lit.map((one, k) => ({ ...one, share: shares?.[view]?.[k] ?? one.share })),
   };
 }
@@ -167,14 +172,14 @@ export function verifiedOf(message, ui) {
 
 /** Why it is not closer, unless somebody has painted on. @param {any} message @param {Ui} ui
  * @returns {Partial<Ui>} */
-export function explainedOf({ view = 0, sentences, is_old: isOld = false }, ui) {
+export function explanationUpdate({ view = 0, sentences, is_old: isOld = false }, ui) {
   const isIts = view === ui.view && !isOld && !ui.isLive;
   return { explaining: false, explained: isIts ? sentences : [] };
 }
 
 /** What a change would do, unless another one is looked at by now. @param {any} message
  * @param {Ui} ui @returns {Partial<Ui>} */
-export function previewedOf({ number, text, is_at_cost: isAtCost, arrays }, { preview }) {
+export function previewUpdate({ number, text, is_at_cost: isAtCost, arrays }, { preview }) {
   if (!preview || preview.number !== number) return {};
   return { preview: { ...preview, text, isAtCost, before: arrays.before, after: arrays.after } };
 }
@@ -191,7 +196,7 @@ function weightsOf(message) {
 
 /** Of an answer, and of a patch, unless it is of before what was said already: an exact answer that
  * was found as somebody undid. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
-export function answerOf(message, ui) {
+export function answerUpdate(message, ui) {
   if (message.version < ui.version) return {};
   const made = /** @type {Partial<Ui>} */ (weightsOf(message));
   made.version = message.version ?? ui.version;
@@ -216,7 +221,7 @@ export function answerOf(message, ui) {
 }
 
 /** @param {Events["progress"]} message @param {Ui} ui @returns {Partial<Ui>} */
-export function progressOf({ what, done, total, unit }, ui) {
+export function progressUpdate({ what, done, total, unit }, ui) {
   const made = { what, done, total, unit };
   if (what === 'export') return { writing: timed(made, ui.writing), isWriting: true };
   if (/verif/i.test(what)) return { verifying: timed(made, ui.verifying) };

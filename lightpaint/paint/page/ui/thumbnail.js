@@ -1,19 +1,19 @@
-/** A small picture of the session on a canvas of its own. */
+/** A thumbnail from the session, on a canvas of its own. */
 
 import { html, useEffect, useRef } from '../vendor/preact.js';
 
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
 /**
- * @param {{name: string, generation?: number, hands: Hands}} props generation:
+ * @param {{name: string, generation?: number, app: App}} props generation:
  *   undefined while there is no such picture
  */
-export function Thumb({ name, generation, hands }) {
+export function Thumbnail({ name, generation, app }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const drawn = useRef(/** @type {string | null} */ (null));
   useEffect(() => {
     if (generation === undefined) return undefined;
-    const { session, store } = hands;
+    const { session, store } = app;
     let isGone = false;
     let isThere = false;
     // A picture of something else is not shown for it.

@@ -1,15 +1,23 @@
-/** The tools at the side, and above the pictures what the one in the hand can be set to. */
+/** The toolbar, and the options of the current tool above the pictures. */
 
 import { inView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
 import { toHex } from './paint_colour.js';
 import { shownAs } from './colour_panel.js';
-import { Button, Choice, Number_, Select, Slider, comeInto } from './controls.js';
+import { Button, Choice, NumberField, Select, Slider, reveal } from './controls.js';
 import { signed } from './format.js';
-import { choose, flowOf, LEAST_SIZE, MOST_SIZE, setFlow, swap, TOOLS } from './tools.js';
+import {
+  chooseTool,
+  flowOf,
+  MIN_BRUSH_SIZE,
+  MAX_BRUSH_SIZE,
+  setFlow,
+  swapColours,
+  TOOLS,
+} from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
 /** Sizes are felt as ratios. */
 const RATIO = {
@@ -33,35 +41,35 @@ const PAINT_AS = [
     label: 'Light',
     tip: 'Paint the light on a surface: its own colour stays visible',
   },
-  { value: 'look', label: 'Colour', tip: 'Paint the final colour, as it should appear' },
+  { value: 'colour', label: 'Colour', tip: 'Paint the final colour, as it should appear' },
 ];
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function ToolBar({ ui, hands }) {
-  const { store } = hands;
+/** @param {{ui: Ui, app: App}} props */
+export function ToolBar({ ui, app }) {
+  const { store } = app;
   const both = { ...ui, ...ui.second };
   const style = {
     '--first': toHex(ui.colour),
-    '--first-shown': shownAs(ui, hands),
+    '--first-shown': shownAs(ui, app),
     '--second': toHex(both.colour),
-    '--second-shown': shownAs(both, hands),
+    '--second-shown': shownAs(both, app),
   };
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(
       ({ tool, icon, keys, tip }) => html`<${Button} key=${tool} icon=${icon} tip=${tip}
-      keys=${keys} on=${ui.tool === tool} act=${() => choose(store, tool)}
+      keys=${keys} on=${ui.tool === tool} act=${() => chooseTool(store, tool)}
       disabled=${tool === 'fill' && !ui.state?.objects?.length} />`,
     )}
     <div class="spring"></div>
     <button type="button" class="two-colours" style=${style} data-tip="Swap colours" data-keys="X"
       aria-keyshortcuts="X" aria-label=${`Swap colours: the current one is ${toHex(ui.colour)}, ${signed(ui.stops)} stops`}
-      onClick=${() => swap(store)}><i></i><i></i></button>
+      onClick=${() => swapColours(store)}><i></i><i></i></button>
   </nav>`;
 }
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function ToolOptions({ ui, hands }) {
-  const { store } = hands;
+/** @param {{ui: Ui, app: App}} props */
+export function ToolOptions({ ui, app }) {
+  const { store } = app;
   const label = TOOLS.find(({ tool }) => tool === ui.tool)?.label ?? '';
   const strokes = ['brush', 'eraser', 'weight', 'line'].includes(ui.tool);
   const paints = ['brush', 'fill', 'line'].includes(ui.tool);
@@ -84,16 +92,16 @@ export function ToolOptions({ ui, hands }) {
       change=${(/** @type {number} */ importance) => store.set({ importance })} />`
     }
     ${
-      ui.tool === 'ask' &&
+      ui.tool === 'adjust' &&
       ui.state?.objects?.length > 0 &&
       html`<${Choice} label="Area"
       value=${ui.about} choices=${ABOUT} change=${(/** @type {any} */ about) =>
         store.set({ about })} />`
     }
     ${
-      (strokes || (ui.tool === 'ask' && ui.about === 'spot')) &&
+      (strokes || (ui.tool === 'adjust' && ui.about === 'spot')) &&
       html`<${Slider} label="Size"
-      value=${ui.size} least=${LEAST_SIZE} curve=${RATIO} most=${MOST_SIZE} unit="px" keys="[ ]"
+      value=${ui.size} least=${MIN_BRUSH_SIZE} curve=${RATIO} most=${MAX_BRUSH_SIZE} unit="px" keys="[ ]"
       tip="Size" change=${(/** @type {number} */ size) => store.set({ size })} />`
     }
     ${
@@ -111,7 +119,7 @@ export function ToolOptions({ ui, hands }) {
       change=${(/** @type {number} */ flow) => setFlow(store, flow / 100)} />`
     }
     ${
-      ui.tool === 'ask' &&
+      ui.tool === 'adjust' &&
       html`<${Button} label="By numbers" on=${isAsking}
       tip="Type stops and mired, for an object or the whole picture" act=${numbers} />`
     }
@@ -122,9 +130,9 @@ export function ToolOptions({ ui, hands }) {
 const WHOLE = '';
 
 /** The ask of a drag in numbers, for one object or for the whole picture. Also a panel's content.
- * @param {{ui: Ui, hands: Hands}} props */
-export function Ask({ ui, hands }) {
-  const { store, engine } = hands;
+ * @param {{ui: Ui, app: App}} props */
+export function Ask({ ui, app }) {
+  const { store, engine } = app;
   const { stops, mired, object } = ui.inNumbers;
   const objects = /** @type {string[]} */ (ui.state?.objects ?? []);
   // By its name: another view numbers its objects in another way, and may not show this one.
@@ -140,16 +148,16 @@ export function Ask({ ui, hands }) {
     store.set((now) => ({ inNumbers: { ...now.inNumbers, ...changed } }));
   const ask = (/** @type {MouseEvent} */ event) => {
     store.set({ hint: false });
-    engine.ask({ stops, mired, object: object === null ? null : objects.indexOf(object) });
+    engine.adjust({ stops, mired, object: object === null ? null : objects.indexOf(object) });
     // Who has clicked looks at the pictures next, and has their keys again.
-    if (event.detail) comeInto(/** @type {HTMLElement} */ (event.currentTarget), '.stage', true);
+    if (event.detail) reveal(/** @type {HTMLElement} */ (event.currentTarget), '.stage', true);
   };
   return html`<div class="ask" data-numbers>
     <${Select} label="Area" value=${object ?? WHOLE} choices=${choices}
       change=${(/** @type {string} */ to) => set({ object: to === WHOLE ? null : to })} />
-    <${Number_} label="Brighter" value=${stops} least=${-8} most=${8} step=${0.1} unit="st"
+    <${NumberField} label="Brighter" value=${stops} least=${-8} most=${8} step=${0.1} unit="st"
       change=${(/** @type {number} */ to) => set({ stops: to })} />
-    <${Number_} label="Warmer" value=${mired} least=${-300} most=${300} step=${5} digits=${0}
+    <${NumberField} label="Warmer" value=${mired} least=${-300} most=${300} step=${5} digits=${0}
       unit="mired" change=${(/** @type {number} */ to) => set({ mired: to })} />
     <${Button} label="Apply" disabled=${isMissing || (!stops && !mired)} act=${ask}
       tip="Applied as one stroke, which can be undone" />

@@ -1,4 +1,4 @@
-/** The tools, and what a person does with them that is no stroke: colours, sizes, looks of it. */
+/** The tools, their hints, and changes of their settings. */
 
 import { toHex } from './paint_colour.js';
 import { exposureOf } from './ui_state.js';
@@ -34,9 +34,9 @@ export const TOOLS = [
   { tool: 'fill', label: 'Fill', icon: 'fill', keys: 'G', tip: 'Fill: paint a whole object' },
   { tool: 'line', label: 'Line', icon: 'line', keys: 'L', tip: 'Line: paint a straight line' },
   {
-    tool: 'ask',
+    tool: 'adjust',
     label: 'Adjust',
-    icon: 'ask',
+    icon: 'adjust',
     keys: 'A',
     tip: 'Adjust: drag up for brighter, right for warmer',
   },
@@ -49,7 +49,7 @@ const HINTS = /** @type {Record<Tool, string>} */ ({
   pick: 'Click either picture: the light there becomes the paint.',
   fill: 'Click an object to paint all of it.',
   line: 'Drag from one end of the line to the other.',
-  ask: 'Drag on a picture: up brighter, down darker, right warmer, left cooler.',
+  adjust: 'Drag on a picture: up brighter, down darker, right warmer, left cooler.',
 });
 
 /** Where fingers point. @type {Partial<Record<Tool, string>>} */
@@ -60,7 +60,7 @@ const TOUCH_HINTS = {
 };
 
 /** What a tool does. @param {Tool} tool */
-export function hintOf(tool) {
+export function toolHint(tool) {
   const isTouch = matchMedia('(pointer: coarse)').matches;
   return (isTouch && TOUCH_HINTS[tool]) || HINTS[tool];
 }
@@ -82,31 +82,31 @@ const FIRST = {
     title: PAINT.title,
     text: 'Choose a colour, then click an object in this picture. The other one shows what the lights can do.',
   },
-  ask: {
+  adjust: {
     title: 'Adjust how it should look',
     text: 'Drag on this picture: up brighter, down darker, right warmer, left cooler.',
   },
 };
 
 /** @param {Tool} tool */
-export const firstHintOf = (tool) => FIRST[tool] ?? PAINT;
+export const firstHint = (tool) => FIRST[tool] ?? PAINT;
 
-export const LEAST_SIZE = 2;
-export const MOST_SIZE = 1000;
+export const MIN_BRUSH_SIZE = 2;
+export const MAX_BRUSH_SIZE = 1000;
 
 /** Of paint, over or under white, that its slider has. */
-export const MOST_STOPS = 8;
+export const MAX_STOPS = 8;
 
 /** Colours that were used lately, at most. */
-const MOST_RECENT = 7;
+const MAX_RECENT = 7;
 
 /** @param {UiStore} store @param {Tool} tool */
-export function choose(store, tool) {
+export function chooseTool(store, tool) {
   store.set({ tool });
 }
 
 /** @param {UiStore} store */
-export function swap(store) {
+export function swapColours(store) {
   store.set(({ colour, stops, second }) => ({
     colour: second.colour,
     stops: second.stops,
@@ -115,11 +115,11 @@ export function swap(store) {
 }
 
 /** Take light from a picture as paint. @param {UiStore} store @param {RGB} light */
-export function take(store, light) {
+export function pickPaint(store, light) {
   const shown = light.map((x) => Math.max(0, x) * 2 ** exposureOf(store.value.state));
   const top = Math.max(...shown);
   if (!(top > 0)) return store.set({ colour: [0, 0, 0], stops: 0 });
-  const stops = Math.min(MOST_STOPS, Math.max(-MOST_STOPS, Math.log2(top)));
+  const stops = Math.min(MAX_STOPS, Math.max(-MAX_STOPS, Math.log2(top)));
   // What is darker than that is a darker colour.
   const scale = Math.max(top, 2 ** stops);
   store.set({ colour: /** @type {RGB} */ (shown.map((x) => x / scale)), stops: Math.log2(scale) });
@@ -128,17 +128,17 @@ export function take(store, light) {
 /** @typedef {{colour: RGB, stops: number}} Paint */
 
 /** Remember what was painted with. @param {UiStore} store */
-export function remember(store) {
+export function rememberPaint(store) {
   const { colour, stops, recent, tool } = store.value;
   if (!['brush', 'fill', 'line'].includes(tool)) return;
   if (recent.length && isSame({ colour, stops }, recent[0])) return;
-  store.set({ recent: used([{ colour, stops }, ...recent]) });
+  store.set({ recent: distinctPaints([{ colour, stops }, ...recent]) });
 }
 
 /** Each once, and no more than there is room for. @param {Paint[]} paints the latest first */
-export function used(paints) {
+export function distinctPaints(paints) {
   const once = paints.filter((one, k) => !paints.slice(0, k).some((other) => isSame(one, other)));
-  return once.slice(0, MOST_RECENT);
+  return once.slice(0, MAX_RECENT);
 }
 
 /** @param {Paint} one @param {Paint} other */
@@ -155,24 +155,24 @@ export function setFlow(store, flow) {
 }
 
 /** @param {UiStore} store @param {number} way +1 or −1 */
-export function resize(store, way) {
+export function resizeBrush(store, way) {
   const size = store.value.size * (way > 0 ? 1.15 : 1 / 1.15);
-  store.set({ size: Math.round(Math.min(MOST_SIZE, Math.max(LEAST_SIZE, size + way))) });
+  store.set({ size: Math.round(Math.min(MAX_BRUSH_SIZE, Math.max(MIN_BRUSH_SIZE, size + way))) });
 }
 
 /** @param {UiStore} store @param {number} way */
-export function harden(store, way) {
+export function hardenBrush(store, way) {
   const hardness = store.value.hardness + way * 0.1;
   store.set({ hardness: Math.min(1, Math.max(0, Math.round(hardness * 10) / 10)) });
 }
 
 /** @param {UiStore} store @param {Partial<import("./engine_interface.js").Show>} changes */
-export function look(store, changes) {
+export function updateShow(store, changes) {
   store.set((ui) => ({ show: { ...ui.show, ...changes } }));
 }
 
 /** Panels away, and back. @param {UiStore} store */
-export function fold(store) {
+export function togglePanels(store) {
   store.set(({ side, panel }) => ({ side: !(side || panel), panel: null }));
 }
 

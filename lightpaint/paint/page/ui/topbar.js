@@ -1,13 +1,13 @@
-/** Above the pictures: what is open, undo, how the pictures are looked at. */
+/** The bar above the pictures: scene, undo, layout, exposure, view transform and zoom. */
 
 import { html } from '../vendor/preact.js';
-import { Button, Check, Choice, Select, Slider, Whole } from './controls.js';
+import { Button, Check, Choice, Select, Slider, TruncatedText } from './controls.js';
 import { signed } from './format.js';
 import { showPixels } from './shortcuts.js';
-import { fold, look } from './tools.js';
+import { togglePanels, updateShow } from './tools.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
 const LAYOUTS = [
   { value: 'side', label: 'Side by side', icon: 'side', keys: 'V' },
@@ -15,15 +15,15 @@ const LAYOUTS = [
   { value: 'blink', label: 'Blink', icon: 'blink', keys: 'V' },
 ];
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function TopBar({ ui, hands }) {
-  const { store, session } = hands;
+/** @param {{ui: Ui, app: App}} props */
+export function TopBar({ ui, app }) {
+  const { store, session } = app;
   const { show, history } = ui;
   const undo = history.undo.at(-1);
   const redo = history.redo.at(-1);
   const title = ui.state?.scene || 'lightpaint';
   return html`<header class="top">
-    <div class="title"><${Whole} text=${title} most=${16} tag="strong" /></div>
+    <div class="title"><${TruncatedText} text=${title} most=${16} tag="strong" /></div>
     <div class="group" role="group" aria-label="History">
       <${Button} icon="undo" tip=${undo ? `Undo: ${undo}` : 'Undo'} keys="Control+Z"
         disabled=${!undo} act=${() => session.send('undo')} />
@@ -32,14 +32,14 @@ export function TopBar({ ui, hands }) {
     </div>
     <div class="spring"></div>
     <${Choice} label="Layout" icons value=${show.layout} choices=${LAYOUTS}
-      change=${(/** @type {any} */ layout) => look(store, { layout })} />
-    <${Compare} ui=${ui} hands=${hands} />
+      change=${(/** @type {any} */ layout) => updateShow(store, { layout })} />
+    <${Compare} ui=${ui} app=${app} />
     <${Slider} label="Exposure" value=${show.stops} least=${-6} most=${6} step=${0.1} digits=${1}
       unit="st" rest=${0} keys=", ." tip="Display exposure. The light does not change."
       text=${`${signed(show.stops)} stops`}
-      change=${(/** @type {number} */ stops) => look(store, { stops })} />
-    <${ViewChoice} ui=${ui} hands=${hands} />
-    <${Zoom} ui=${ui} hands=${hands} />
+      change=${(/** @type {number} */ stops) => updateShow(store, { stops })} />
+    <${ViewChoice} ui=${ui} app=${app} />
+    <${Zoom} ui=${ui} app=${app} />
     <div class="group" role="group" aria-label="Painter">
       <${Button} icon="settings" tip="Solve settings"
         on=${ui.panel === 'settings'}
@@ -48,36 +48,36 @@ export function TopBar({ ui, hands }) {
         act=${() => store.set({ dialog: 'export' })} />
       <${Button} icon="keys" tip="Keyboard shortcuts" keys="?" act=${() => store.set({ dialog: 'keys' })} />
       <${Button} icon="panel" tip="Show or hide the panels" keys="P" on=${ui.side || ui.panel !== null}
-        act=${() => fold(store)} />
+        act=${() => togglePanels(store)} />
     </div>
   </header>`;
 }
 
 /** How large a pixel of the picture is on the page, unless all of it is fitted in.
- * @param {{ui: Ui, hands: Hands}} props */
-function Zoom({ ui: { show, fit }, hands }) {
+ * @param {{ui: Ui, app: App}} props */
+function Zoom({ ui: { show, fit }, app }) {
   const scale = (fit ?? 1) * show.zoom;
   const isFitted = show.zoom === 1 && show.pan.every((x) => x === 0);
   return html`<div class="group" role="group" aria-label="Zoom">
     <${Button} label=${isFitted ? 'Fit' : `${Math.round(100 * scale)} %`} class="zoom" keys="F"
       tip="Fit the whole picture. Zoom with Ctrl and the wheel, or with + and −."
-      act=${() => look(hands.store, { zoom: 1, pan: [0, 0] })} />
+      act=${() => updateShow(app.store, { zoom: 1, pan: [0, 0] })} />
     <${Button} label="1:1" class="zoom pixels" keys="Shift+F" on=${Math.abs(scale - 1) < 1e-3}
-      tip="100 %: one image pixel on one pixel of the page" act=${() => showPixels(hands)} />
+      tip="100 %: one image pixel on one pixel of the page" act=${() => showPixels(app)} />
   </div>`;
 }
 
-/** @param {{ui: Ui, hands: Hands}} props */
-function ViewChoice({ ui, hands }) {
+/** @param {{ui: Ui, app: App}} props */
+function ViewChoice({ ui, app }) {
   const { show } = ui;
   if (!ui.ready) return null;
   const names = (ui.state?.transforms ?? []).map((/** @type {any} */ one) => one.name ?? one);
   return html`<${Select} label="View" hidden value=${show.transform}
     tip="View transform: how the display shows linear light"
     choices=${names.map((/** @type {string} */ name) => ({ value: name, label: spoken(name) }))}
-    change=${(/** @type {string} */ transform) => look(hands.store, { transform })} />
+    change=${(/** @type {string} */ transform) => updateShow(app.store, { transform })} />
   <${Check} label="Denoise" on=${show.clean} tip="Denoise the pictures (C). The solve does not change."
-    change=${(/** @type {boolean} */ clean) => look(hands.store, { clean })} />`;
+    change=${(/** @type {boolean} */ clean) => updateShow(app.store, { clean })} />`;
 }
 
 /** @param {string} name */
@@ -91,9 +91,9 @@ function spoken(name) {
   return known[name] ?? name.replace(/^ocio:/, '').replace('/', ' · ');
 }
 
-/** Which two pictures are compared. @param {{ui: Ui, hands: Hands}} props */
-function Compare({ ui, hands }) {
-  const { store } = hands;
+/** Which two pictures are compared. @param {{ui: Ui, app: App}} props */
+function Compare({ ui, app }) {
+  const { store } = app;
   const { show } = ui;
   const value = ui.mix ? 'looks' : `${show.left} ${show.right}`;
   const choices = [
@@ -108,6 +108,6 @@ function Compare({ ui, hands }) {
       if (pair === 'looks') return;
       const [left, right] = /** @type {any} */ (pair.split(' '));
       store.set({ mix: null });
-      look(store, { left, right, instead: null, other: null });
+      updateShow(store, { left, right, instead: null, other: null });
     }} />`;
 }

@@ -1,4 +1,4 @@
-/** What the interface knows: of the session, and of itself. */
+/** The state of the interface: what the session has sent, and settings of the page itself. */
 
 import { ofKelvin } from './paint_colour.js';
 
@@ -7,10 +7,10 @@ import { ofKelvin } from './paint_colour.js';
 /** @typedef {import("./engine_interface.js").Tool} Tool */
 
 /** @typedef {import("../engine/messages.js").LightInfo} Light */
-/** @typedef {import("../engine/messages.js").LightAnswer} Lit */
+/** @typedef {import("../engine/messages.js").LightAnswer} LightAnswer */
 /** @typedef {import("../engine/messages.js").LookInfo} Look */
-/** @typedef {Record<string, any>} Asked */
-/** @typedef {import("../engine/messages.js").Advice} Help */
+/** @typedef {Record<string, any>} Constraints */
+/** @typedef {import("../engine/messages.js").Advice} Advice */
 /** A message that changes what is asked.
  * @typedef {{[K in "set" | "ask_all" | "tie"]:
  *   {kind: K, fields: import("../engine/messages.js").Requests[K]}}["set" | "ask_all" | "tie"]}
@@ -40,17 +40,17 @@ import { ofKelvin } from './paint_colour.js';
  * @property {number[][] | null} shares of each light, in each view
  * @property {Record<number, any>} verifiedOf renders, by view
  * @property {Light[]} lights
- * @property {Lit[]} lit the last exact answer
+ * @property {LightAnswer[]} lit the last exact answer
  * @property {RGB[]} weights the last answer
  * @property {string} headline
- * @property {Help | null} help what the headline advises
+ * @property {Advice | null} help what the headline advises
  * @property {Preview | null} preview of a change that is looked at before it is made
  * @property {number | null} deltaE
  * @property {number | null} deltaAsked the same of the present lighting: how much was asked for
  * @property {string[]} sentences
  * @property {boolean} isLive the last answer is the quick one, of a stroke in progress
  * @property {boolean} isJudged whether what is said of the answer is of the last one
- * @property {Record<string, Asked>} asked
+ * @property {Record<string, Constraints>} asked
  * @property {string[][]} ties
  * @property {Record<string, any>} settings
  * @property {Record<string, any>} meant
@@ -82,7 +82,7 @@ import { ofKelvin } from './paint_colour.js';
  * @property {number} flow
  * @property {number} fillFlow that of Fill
  * @property {number} importance
- * @property {"light" | "look"} as
+ * @property {"light" | "colour"} as
  * @property {"spot" | "object"} about what a drag asks about
  * @property {RGB} colour linear, its largest channel at most 1
  * @property {number} stops brightness of the paint over `colour`
@@ -111,7 +111,7 @@ import { ofKelvin } from './paint_colour.js';
 /** @typedef {import("./ui_store.js").Store<Ui>} UiStore */
 
 /** @type {Show} */
-const SHOW = {
+const DEFAULT_SHOW = {
   left: 'painting',
   right: 'solution',
   layout: 'side',
@@ -129,7 +129,7 @@ const SHOW = {
 };
 
 /** @returns {Ui} */
-export function first() {
+export function initialState() {
   return {
     ready: false,
     waiting: '',
@@ -190,7 +190,7 @@ export function first() {
     mixer: 'white',
     asking: null,
     inNumbers: { stops: 0.5, mired: 0, object: null },
-    show: SHOW,
+    show: DEFAULT_SHOW,
     solo: [],
     mute: [],
     hovered: null,
@@ -211,13 +211,13 @@ export function first() {
  * What is drawn: what was chosen, with what is only looked at for a moment.
  * @param {Ui} ui @returns {Show}
  */
-export function shown(ui) {
+export function shownSettings(ui) {
   const show = { ...ui.show, overlay: overlayOf(ui) };
   const isAlone = ui.solo.length > 0;
   if (isAlone || ui.mute.length) {
     show.gains = ui.lights.map((_, k) => (isAlone ? ui.solo.includes(k) : !ui.mute.includes(k)));
   }
-  const mixed = ui.mix && mixOf(ui, ui.mix);
+  const mixed = ui.mix && mixedWeights(ui, ui.mix);
   if (mixed) show.other = mixed;
   if (ui.hovered !== null) {
     const k = ui.hovered;
@@ -250,13 +250,13 @@ function alone(rgb, light) {
 }
 
 /** Two looks are compared no more. @param {Ui} ui @returns {Partial<Ui>} */
-export function unmixed({ show }) {
+export function withoutMix({ show }) {
   const pair = /** @type {const} */ ({ left: 'painting', right: 'solution' });
   return { mix: null, show: { ...show, ...pair, instead: null, other: null } };
 }
 
 /** @param {Ui} ui @param {{a: number, b: number, share: number}} mix @returns {RGB[] | null} */
-export function mixOf(ui, { a, b, share }) {
+export function mixedWeights(ui, { a, b, share }) {
   const [from, to] = [a, b].map((id) => ui.looks.find((look) => look.id === id)?.weights);
   if (!from || !to) return null;
   return from
@@ -266,7 +266,7 @@ export function mixOf(ui, { a, b, share }) {
 
 /** What lies between two looks is called so. @param {Look[]} looks
  * @param {{a: number, b: number, share: number}} mix @returns {string} */
-export function betweenOf(looks, { a, b, share }) {
+export function mixName(looks, { a, b, share }) {
   const [from, to] = [a, b].map((id) => looks.find((look) => look.id === id)?.name ?? '');
   return `${from} → ${to}, ${Math.round(100 * share)} %`;
 }

@@ -1,4 +1,4 @@
-/** One place for all that the interface shows, and whoever wants to know of changes. */
+/** A store for the interface state, which notifies listeners of changes. */
 
 /**
  * @template {object} T

@@ -1,29 +1,29 @@
-/** The views of a session: which one is seen and painted. One lighting is for all of them. */
+/** Tabs for the views of a session. One lighting serves all views. */
 
 import { inView } from '../engine/message_frames.js';
 import { html } from '../vendor/preact.js';
 import { number } from './format.js';
-import { viewOf } from './state_updates.js';
-import { Thumb } from './thumbnail.js';
+import { viewUpdate } from './state_updates.js';
+import { Thumbnail } from './thumbnail.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
-/** @typedef {import("./shortcuts.js").Hands} Hands */
+/** @typedef {import("./shortcuts.js").App} App */
 
-/** Show another view. @param {Hands} hands @param {number} view */
-export function see({ store, engine }, view) {
+/** Show another view. @param {App} app @param {number} view */
+export function showView({ store, engine }, view) {
   if (!store.value.ready || view === store.value.view) return;
-  engine.see(view);
-  store.set((ui) => viewOf(ui, view));
+  engine.showView(view);
+  store.set((ui) => viewUpdate(ui, view));
 }
 
-/** The one after it. @param {Hands} hands */
-export function seeNext(hands) {
-  const { views, view } = hands.store.value;
-  if (views.length > 1) see(hands, (view + 1) % views.length);
+/** The one after it. @param {App} app */
+export function showNextView(app) {
+  const { views, view } = app.store.value;
+  if (views.length > 1) showView(app, (view + 1) % views.length);
 }
 
-/** @param {{ui: Ui, hands: Hands}} props */
-export function Views({ ui, hands }) {
+/** @param {{ui: Ui, app: App}} props */
+export function ViewTabs({ ui, app }) {
   if (ui.views.length < 2) return null;
   return html`<div class="views" role="group" aria-label="Views">
     ${ui.views.map(({ name }, k) => {
@@ -32,8 +32,8 @@ export function Views({ ui, hands }) {
       const about = its ? `ΔE ${number(its.delta_e, 2)}` : ui.ofViews && 'not painted';
       return html`<button type="button" class=${`view-tab ${k === ui.view ? 'is-on' : ''}`}
         key=${name} aria-pressed=${String(k === ui.view)} data-tip=${`Show and paint ${name}`}
-        data-keys="N" onClick=${() => see(hands, k)}>
-        <${Thumb} name=${picture} generation=${ui.resources[picture]} hands=${hands} />
+        data-keys="N" onClick=${() => showView(app, k)}>
+        <${Thumbnail} name=${picture} generation=${ui.resources[picture]} app=${app} />
         <span class="view-name">${name}</span>
         <span class="faint">${about}</span>
       </button>`;

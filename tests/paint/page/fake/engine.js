@@ -28,8 +28,8 @@ export class FakeEngine {
     for (const hear of this.hearers[name] ?? []) hear(event);
   }
   close() {}
-  use(use) {
-    this.hand = use;
+  setTool(settings) {
+    this.hand = settings;
   }
   resize(width, height) {
     this.size = [width, height];
@@ -167,7 +167,7 @@ export class FakeEngine {
     if (!this.before) return;
     this.calls.push(['move', points.length]);
     const last = points.at(-1);
-    if (this.hand.tool === 'ask') {
+    if (this.hand.tool === 'adjust') {
       return this.tell('asking', {
         stops: (this.started.y - last.y) / 30,
         mired: last.x - this.started.x,
@@ -243,8 +243,8 @@ export class FakeEngine {
     this.send(true);
   }
 
-  ask(asked) {
-    this.calls.push(['ask', asked]);
+  adjust(asked) {
+    this.calls.push(['adjust', asked]);
     this.strokes += 1;
     this.send(true);
   }

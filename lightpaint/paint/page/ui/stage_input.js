@@ -1,0 +1,80 @@
+/** Events of pointer, wheel and keyboard on the pictures. */
+
+import { useEffect } from '../vendor/preact.js';
+import { pointAway } from './brush_cursor.js';
+import { isTyping } from './keyboard.js';
+
+/** @typedef {import("./engine_interface.js").Engine} Engine */
+/** @typedef {import("./pointer_input.js").Pointer} Pointer */
+/** @typedef {import("./ui_state.js").UiStore} UiStore */
+/** @typedef {import("./shortcuts.js").App} App */
+
+/** @param {import("../vendor/preact.js").Ref<HTMLElement | null>} frame @param {Pointer} pointer
+ * @param {App} app */
+export function useStageInput(frame, pointer, app) {
+  useEffect(() => {
+    const element = frame.current;
+    if (!element) return undefined;
+    const { store, engine } = app;
+    const ends = new AbortController();
+    const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ hear) =>
+      element.addEventListener(name, hear, { signal: ends.signal, passive: false });
+    // Whoever came by a pointer sees where they are; the outline is for the keyboard.
+    on('pointerdown', (event) => {
+      element.dataset.by = 'pointer';
+      pointer.down(event);
+    });
+    on('blur', () => delete element.dataset.by);
+    on('pointermove', (event) => pointer.move(event));
+    on('pointerup', (event) => pointer.up(event));
+    on('pointercancel', (event) => pointer.up(event));
+    on('wheel', (event) => pointer.wheel(event));
+    on('contextmenu', (event) => event.preventDefault());
+    on('pointerleave', () => {
+      pointAway(store);
+      const rings = /** @type {HTMLElement | null} */ (element.querySelector('.rings'));
+      if (rings && !pointer.doing) rings.hidden = true;
+    });
+    on('keydown', (event) => byKeys(event, pointer, engine, store));
+    const pan = (/** @type {boolean} */ isSpace) => {
+      pointer.isSpace = isSpace;
+      element.classList.toggle('is-panning', isSpace);
+    };
+    const over = (/** @type {KeyboardEvent} */ event) => {
+      const inner = /** @type {HTMLElement} */ (event.composedPath()[0]);
+      if (event.code !== 'Space' || isTyping(event)) return;
+      const isHere = element.matches(':hover') || inner === element;
+      pan(event.type === 'keydown' && isHere);
+      if (isHere) event.preventDefault();
+    };
+    // On its way there, since the painter keeps its keys from what is around it.
+    const early = { signal: ends.signal, capture: true };
+    window.addEventListener('keydown', over, early);
+    window.addEventListener('keyup', over, early);
+    // Where the key is let go in another window, this one does not hear of it.
+    window.addEventListener('blur', () => pan(false), { signal: ends.signal });
+    return () => ends.abort();
+  }, []);
+}
+
+/** The brush by keys: arrows move it, Enter paints a dab, or with Shift a line. @param {KeyboardEvent} event
+ * @param {Pointer} pointer @param {Engine} engine @param {UiStore} store */
+function byKeys(event, pointer, engine, store) {
+  const way = /** @type {Record<string, [number, number]>} */ ({
+    ArrowLeft: [-1, 0],
+    ArrowRight: [1, 0],
+    ArrowUp: [0, -1],
+    ArrowDown: [0, 1],
+  })[event.key];
+  if ((!way && event.key !== 'Enter') || event.target !== event.currentTarget) return;
+  event.preventDefault();
+  const element = /** @type {HTMLElement} */ (event.currentTarget);
+  const rings = /** @type {HTMLElement} */ (element.querySelector('.rings'));
+  const pane = engine.panes()[0];
+  const step = event.shiftKey ? 1 : 12;
+  rings.hidden = false;
+  const x = Number(rings.dataset.x ?? pane.x + pane.width / 2) + (way ? way[0] * step : 0);
+  const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0);
+  pointer.moved(x, y);
+  if (event.key === 'Enter') pointer.dab(x, y, event.shiftKey);
+}
