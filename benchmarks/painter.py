@@ -320,8 +320,8 @@ class Opened:
 PAINTER = "document.getElementById('lightpaint')?.painter"
 STAGES = {
     "page": f"() => {PAINTER}",
-    "picture": f"() => {PAINTER}?.engine.mirror.isReady && document.querySelector('.lightpaint .tag')"
-    " && document.querySelector('.is-lights input')",
+    "picture": f"() => {PAINTER}?.engine.mirror.isReady"
+    " && document.querySelector('.lightpaint .tag') && document.querySelector('.is-lights input')",
     "planes": f"() => {{ const {{ loader }} = {PAINTER}.engine.mirror;"
     " return !loader.missing().length && !loader.onTheWay.size; }",
 }

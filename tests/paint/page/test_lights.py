@@ -168,7 +168,8 @@ def test_what_was_asked_of_a_light_is_known_until_it_is_free(painter: Painter, w
         """async ([limits, way]) => {
           const { session } = painter;
           await session.constrainLight(0, limits);
-          const asked = way === 'off' ? session.turn(0, true) : session.lockLight(0, [1, 1, 1], true);
+          const asked =
+            way === 'off' ? session.switchLight(0, true) : session.lockLight(0, [1, 1, 1], true);
           host.tell({ kind: 'answer', exact: true, asked: { key: limits }, arrays: {} });
           await asked;
         }""",

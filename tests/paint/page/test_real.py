@@ -98,7 +98,8 @@ class Person:
         """Wait until all pictures are there, and what was done before."""
         self.page.wait_for_selector(".lightpaint .tag")
         there = (
-            "return mirror.isReady && !mirror.loader.missing().length && !mirror.loader.onTheWay.size"
+            "const { loader } = mirror; return mirror.isReady && !loader.missing().length"
+            " && !loader.onTheWay.size"
             "&& screen.width > 0 && screen.width === engine.element.clientWidth"
         )
         until(lambda: self.look(there), "the page is not ready")
