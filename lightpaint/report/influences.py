@@ -16,9 +16,9 @@ def fit_clauses(solution: Solution) -> tuple[str, ...]:
     elif fit.hold:
         used.append(f"unpainted parts are held ({fit.hold:g})")
     if fit.colors == "gentle":
-        used.append("lamps are pulled to their own colour (gentle)")
+        used.append("lights are pulled to their own colour (gentle)")
     elif fit.colors == "white":
-        used.append("lamps are white")
+        used.append("lights are white")
     if certificate.noise_removed:
         used.append("noise is corrected")
     return tuple(used)

@@ -79,7 +79,7 @@ def test_two_looks_under_a_border(page: Any, batch: Path) -> None:
 
 def test_one_look_large(page: Any, batch: Path) -> None:
     page.goto((batch / "index.html").as_uri())
-    page.get_by_label("Look at third", exact=True).click()
+    page.get_by_label("Enlarge third", exact=True).click()
     page.locator("#wipe").wait_for()
     assert page.locator("#slide").is_hidden()
     assert page.locator("#beside-body tr").count() == 3

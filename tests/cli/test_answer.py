@@ -140,9 +140,9 @@ def test_of_many_lights_the_ten_that_matter_and_what_the_others_do(tmp_path: Pat
             ("--space", "display", "--hold", "0.5", "--colors", "gentle"),
             # Most of the painting is brighter than middle grey, a quarter brighter than white.
             "Fitted as the eye sees it (srgb at -1.2 stops); unpainted parts are held (0.5); "
-            "lamps are pulled to their own colour (gentle); --literal turns this off.",
+            "lights are pulled to their own colour (gentle); --literal turns this off.",
         ),
-        (("--colors", "white"), "Lamps are white; --literal turns this off."),
+        (("--colors", "white"), "Lights are white; --literal turns this off."),
         (
             ("--unpainted", "0.1"),
             "Each unpainted pixel counts 0.1; --literal turns this off.",
@@ -157,7 +157,7 @@ def test_a_picture_of_eight_bits_says_what_it_was_fitted_in(folder: Path):
     (folder / "p.png").write_bytes(png_bytes(np.full((16, 20, 3), 120, np.uint8)))
     said = succeed(folder, "solve", "b.basis.exr", "p.png", "-o", "out")
     [line] = [x for x in said.splitlines() if "--literal" in x]
-    said = "Fitted as the eye sees it (srgb); lamps are pulled to their own colour (gentle)"
+    said = "Fitted as the eye sees it (srgb); lights are pulled to their own colour (gentle)"
     assert line.startswith(said)
 
 

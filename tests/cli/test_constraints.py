@@ -67,7 +67,7 @@ def test_a_lights_file_holds_lights_and_the_render_confirms_it(room: Path, tmp_p
     assert luminance(bulb) <= 0.8 * luminance(np.array([0.5, 0.6, 0.7])) * (1 + 1e-6)
     np.testing.assert_allclose(bulb, luminance(bulb) * kelvin_to_rgb(3200), rtol=1e-9)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "lock 50% (holds it)" in page
+    assert "lock 50% (limits it)" in page
 
     # The command line goes before the file, the file may be left out, and relight needs neither.
     succeed(tmp_path, "solve", "room.xml", "t.exr", "--spp", 64, "--lock", "sun", "-o", "two")

@@ -91,7 +91,7 @@ def test_a_refined_look_is_verified_and_tells_its_errors(
     assert all(light.standard_error is not None for light in written.lights)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "How sure" in page
-    assert "What is missed" in page
+    assert "The difference" in page
 
 
 def test_refining_needs_a_scene(tmp_path: Path, target: lp.Target, make_basis: Any):

@@ -112,5 +112,5 @@ def test_what_decided_stands_in_the_page_and_in_its_numbers(make_basis: Any, ask
     assert meant == {k: v for k, v in fit_options(solution).items() if v is not None}
     assert meant["colors"] == asked.get("colors", "free")
     assert meant["hold"] == asked.get("hold", 0)
-    expected = {"white": "lamps are white", "free": "any colour"}[meant["colors"]]
+    expected = {"white": "lights are white", "free": "any colour"}[meant["colors"]]
     assert expected in said or "counts 0.1" in said

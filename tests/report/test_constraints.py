@@ -41,7 +41,7 @@ def test_the_free_optimum_stands_beside_what_was_asked(make_basis: Any) -> None:
     page = _section(basis, target, solution)
     free = _missed(solve(basis, target))
     captions = re.findall(r"<strong>(.*?)\.</strong> (\d+) % missed", page)
-    expected = [("Without constraints", free), ("As asked", _missed(solution))]
+    expected = [("Without constraints", free), ("With the constraints", _missed(solution))]
     assert captions == [(name, f"{100 * missed:.0f}") for name, missed in expected]
     assert captions[0][1] != captions[1][1]
     assert page.count("<img") == 2

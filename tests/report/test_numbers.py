@@ -145,7 +145,7 @@ def test_every_number_of_the_page_stands_in_a_file(
     constants = [0, 1, 95, 255]
     known = np.abs(np.concatenate([list(_numbers(files)), derived, constants]))
     text = "".join(Words((tmp_path / "report.html").read_text(encoding="utf-8")).shown)
-    shown = text.split("Paint again")[0].replace("−", "-")
+    shown = text.split("Change the painting")[0].replace("−", "-")
     shown = re.sub(r"#[0-9a-f]{6}|8×8|95 of 100|ΔE2000|at [-+\d.]+ stops", "", shown)
     found = re.findall(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", shown)
     assert len(found) > 150
@@ -176,7 +176,7 @@ def test_writing_neither_solves_nor_sums_anew(
     write_report(tmp_path, replace(look, basis=replace(look.basis)), command="")
     # Of all lights: the present look, and what is shown of other answers.
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    others = len(re.findall(r"<strong>(Without constraints|As asked|With \d)", page))
+    others = len(re.findall(r"<strong>(Without constraints|With the constraints|With \d)", page))
     assert others > 2
     assert calls.count("mix") == 1 + others
     assert calls.count("func") == 1

@@ -212,14 +212,14 @@ def test_how_to_paint_again(make_basis: Any):
     result = _result(make_basis)
     painting = result["target"]
     cases = (
-        (painting, "give the command again. The basis is kept; only the verification"),
+        (painting, "run the command again. The basis is kept; only the verification"),
         (replace(painting, content="abc"), "differs from the template"),
-        (replace(painting, everything=True), "lightpaint template scene.xml renders"),
+        (replace(painting, everything=True), "output of lightpaint template scene.xml"),
     )
     for target, words in cases:
         page = Page(report_page(**{**result, "target": target}))
         assert words in page.text("details")
-        assert page.text("summary") == "NumbersPaint again"
+        assert page.text("summary") == "NumbersChange the painting"
         assert all(x.get("open") is None for x in page.all("details"))
 
 

@@ -183,10 +183,10 @@ def test_the_report_says_how_many_bounds_were_not_looked_into(make_basis: Any):
         solution, replace(found, bounds=(bound,)), current, transform=ViewTransform()
     )
     assert "−2.5 <small>per unit of luminance" in page
-    assert "not looked into" not in page
+    assert "were not analysed" not in page
     found = replace(found, bounds=(bound,), bounds_left_out=7)
     page = missed_section(solution, found, current, transform=ViewTransform())
-    assert "7 more seem to matter less, and were not looked into" in page
+    assert "7 more seem to matter less and were not analysed" in page
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ function facts(look) {
   if (look.variation) said.push(look.variation);
   for (const key of SAID) if (look[key]) said.push(look[key]);
   line.append(said.join(' · '));
-  if (look.agrees === false) line.append(made('span', ' a render disagrees', 'warns'));
+  if (look.agrees === false) line.append(made('span', ' render disagrees', 'warns'));
   return line;
 }
 
@@ -101,7 +101,7 @@ function card(look) {
   if (look.picture) {
     const shot = made('button', '', 'shot');
     shot.type = 'button';
-    shot.setAttribute('aria-label', `Look at ${name}`);
+    shot.setAttribute('aria-label', `Enlarge ${name}`);
     const picture = new Image();
     picture.loading = 'lazy';
     picture.alt = '';

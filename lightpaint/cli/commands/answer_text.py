@@ -171,7 +171,7 @@ def _show_short(look: Look) -> None:
     if rest := sorted(set(range(len(lights))) - set(shown)):
         terminal.tell(_spoken_rest(look, rest))
     if any(lights[k].is_active for k in shown):
-        terminal.write("* held by a constraint (--table full shows which)")
+        terminal.write("* limited by a constraint (--table full shows which)")
 
 
 def _important_lights(look: Look) -> list[int]:
@@ -235,7 +235,7 @@ def _show_all(look: Look) -> None:
     held = any(light.constraint for light in look.lighting.lights)
     headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
-    asked = ["constraint (* holds it)"] if held else []
+    asked = ["constraint (* limits it)"] if held else []
     table = terminal.table(*headings, *amounts, *asked)
     errors = spoken_errors(look.uncertainty, len(shares))
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):

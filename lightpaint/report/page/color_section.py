@@ -19,7 +19,7 @@ COLOR_MEANINGS: dict[Colors, str] = {
 }
 
 #: Headings of the table.
-HEADS = ("lamps may have", "mean ΔE", "what would change")
+HEADS = ("light colours", "mean ΔE", "what would change")
 
 #: ΔE by which a closer choice is mentioned at once, and below which it is as close.
 MIN_GAIN, SAME_DELTA_E = 1.0, 0.1
@@ -77,10 +77,9 @@ def colors_section(choices: Choices) -> str:
         for choice in choices
     ]
     return (
-        "<section><h2>What colours cost</h2>"
-        "<p>How near the lights would come if they were freer, or less free, to change their "
-        "colour, with all else as it is. A quick look; <code>colors</code> says which to "
-        f"solve with.</p>{table(HEADS, rows, kind='choices')}</section>"
+        "<section><h2>What light colours cost</h2>"
+        "<p>How close the lights would come with each setting of <code>colors</code>, all else "
+        f"equal. These are quick estimates.</p>{table(HEADS, rows, kind='choices')}</section>"
     )
 
 

@@ -39,13 +39,13 @@ def constraints_section(
     without, asked = (spoken_percent(relative_residual(x)) for x in (free, solution))
     pictures = [
         (free.weights, "Without constraints", f"{without} missed."),
-        (start, "As asked", f"{asked} missed."),
+        (start, "With the constraints", f"{asked} missed."),
     ]
     return (
         '<section><h2>What the constraints cost</h2><div class="explained"><div>'
         f"<p>Free to have any colour and brightness, the lights would miss {without} of the "
-        f"painted light (RMS). As asked, they miss {asked}. Both pictures are sums of the "
-        f"basis images.</p></div>{_curve(solution, free)}</div>"
+        f"painted light (RMS). With the constraints, they miss {asked}. Both pictures are sums "
+        f"of the basis images.</p></div>{_curve(solution, free)}</div>"
         f'<div class="maps">{_figures(basis, pictures, transform, looks)}'
         f"{_numbers(basis, solution, transform, looks)}"
         "</div></section>"
@@ -66,7 +66,7 @@ def _curve(solution: Solution, free: Solution) -> str:
         *((_lights(count), missed) for count, missed in curve if (count, missed) not in near),
     ]
     rows = [row(what, share_cell(spoken_percent(x), min(x, 1.0))) for what, x in told]
-    heads = ("lights on, the best that were found", "missed")
+    heads = ("lights on, the best set found", "missed")
     return f"<div>{table(heads, rows, shown=len(near) + 1)}</div>"
 
 

@@ -28,10 +28,10 @@ from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.uncertainty_sentences import spoken_errors, uncertainty_sentence
 
 #: Headings of the table of uncertainty, and rows of both tables that are not folded.
-ERROR_HEADS, SHOWN_ROWS = ("light", "solved", "95 % between", "of it", "of the picture"), 6
+ERROR_HEADS, SHOWN_ROWS = ("light", "solved", "95 % interval", "of the light", "of the picture"), 6
 
 #: Headings of the table of bounds.
-BOUND_HEADS = ("light", "held by", "less missed<br>without that", "at first")
+BOUND_HEADS = ("light", "limited by", "gain without<br>the limit", "slope")
 
 #: Bounds with a smaller share of the miss are not worth a row.
 SMALLEST_GAIN = 0.002
@@ -59,14 +59,14 @@ def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | No
         if errors[k] > 0
     ]
     meaning = (
-        "<p>The table shows the brightness of each light, and between which values many samples "
-        "would find it in 95 of 100 cases. Lights that do nearly the same may be off by much and "
-        "yet make up for each other in the picture.</p>"
+        "<p>The table shows the luminance of each light, and the interval that holds its exact "
+        "value in 95 of 100 cases. Lights with nearly the same effect may each be far off, and "
+        "still make up for each other in the picture.</p>"
     )
     return (
         '<section><h2>How sure</h2><div class="explained">'
         f"<div><p>{escape(uncertainty_sentence(basis, solution, uncertainty))}</p>"
-        "<p>Together these errors miss about "
+        "<p>Together these errors are about "
         f"{spoken_percent(uncertainty.relative_excess)} of the painted light (RMS).</p>"
         f"{_steps(solution)}{fold('How to read the table', meaning)}</div>"
         f"<div>{table(ERROR_HEADS, rows, kind='sure', shown=SHOWN_ROWS)}</div></div></section>"
@@ -78,8 +78,8 @@ def _steps(solution: Solution) -> str:
     steps = []
     if solution.problem.noise_removed:
         steps.append(
-            f"{spoken_percent(solution.problem.noise_removed)} of the noise's power in the "
-            "equations was taken out of them"
+            f"{spoken_percent(solution.problem.noise_removed)} of the noise power was "
+            "removed from the equations"
         )
     if solution.problem.refinement is not None:
         steps.append(
@@ -103,7 +103,7 @@ def missed_section(
         return ""
     sentences = "".join(f"<p>{escape(text)}</p>" for text in error_sentences(diagnosis, seen))
     return (
-        f'<section><h2>What is missed</h2><div class="explained"><div>{sentences}</div>'
+        f'<section><h2>The difference</h2><div class="explained"><div>{sentences}</div>'
         f"{_shares(diagnosis)}</div>"
         f'<div class="maps">{_maps(solution, diagnosis, current, transform=transform)}</div>'
         f"{_bounds(diagnosis)}</section>"
@@ -112,7 +112,7 @@ def missed_section(
 
 def _shares(diagnosis: Diagnosis) -> str:
     d = diagnosis
-    by_what = "by zero or by what is asked" if d.is_constrained else "needs light below zero"
+    by_what = "by zero or by the constraints" if d.is_constrained else "needs light below zero"
     parts = [
         ("out of reach of any mix", d.unreachable),
         (f"forbidden: {by_what}", d.forbidden),
@@ -126,7 +126,7 @@ def _shares(diagnosis: Diagnosis) -> str:
     if d.ignored > 0:
         times = d.ignored / d.total if d.total > 0 else np.inf
         told = f"{times:.2g} times as much" if np.isfinite(times) else "all"
-        rows.append(row("besides, where it does not count", told))
+        rows.append(row("elsewhere, where it does not count", told))
     return f'<table class="shares"><tbody>{"".join(rows)}</tbody></table>'
 
 
@@ -137,13 +137,13 @@ def _maps(
         (
             "Out of reach",
             diagnosis.unreachable_map,
-            "What no mix of the lights makes, negative ones included.",
+            "What no mix of the lights can make, even with negative light.",
         ),
         (
             "Forbidden",
             diagnosis.forbidden_map,
             "Would need light below zero, or beyond the constraints."
-            + " So is what other views ask for." * (diagnosis.compromise > 0),
+            + " Includes what is given up for other views." * (diagnosis.compromise > 0),
         ),
     ]
     limit = maps_limit(solution, diagnosis, transform=transform)
@@ -169,7 +169,7 @@ def _maps(
         figures.append(
             figure(
                 PagePicture("Not counted", "False-colour map of what does not count.", colours),
-                "Painted and missed where the importance is small.",
+                "The difference where the importance is small.",
                 signed_scale(limit),
             )
         )
@@ -198,17 +198,17 @@ def _bounds(diagnosis: Diagnosis) -> str:
     if not rows:
         return ""
     more = diagnosis.bounds_left_out
-    others = f"<p>{more} more seem to matter less, and were not looked into.</p>" if more else ""
+    others = f"<p>{more} more seem to matter less and were not analysed.</p>" if more else ""
     meaning = (
-        "<p>What would be gained if one of these alone were let go, and all others stayed. It is a "
-        "share of everything that counts, including the unpainted parts that are held. "
-        "A light that is kept, locked, limited, coloured or tied would then have any emission; one "
-        "that is off for no other reason would go below zero and so take light away: a hint at "
-        "which other lights spill where they should not.</p><p>At first: how the objective would "
-        "change, per unit, if that which holds were raised a little.</p>"
+        "<p>Gain: how much of the difference would go if this limit alone were removed. It is a "
+        "share of everything that counts, including the unpainted parts that are held. A light that "
+        "is kept, locked, limited or tied could then have any emission. A light that is off for "
+        "no other reason would go below zero and take light away, which hints at other lights that "
+        "spill where they should not.</p><p>Slope: the change of the objective, per unit, if the "
+        "limit were raised a little.</p>"
     )
     return (
-        '<div class="explained" style="margin-top: 32px"><div><h3>What holds the lights back</h3>'
+        '<div class="explained" style="margin-top: 32px"><div><h3>What limits the lights</h3>'
         f"{others}{fold('How to read the table', meaning)}</div>"
         f"<div>{table(BOUND_HEADS, rows, kind='bounds', shown=SHOWN_ROWS)}</div></div>"
     )

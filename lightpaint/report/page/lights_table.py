@@ -67,11 +67,11 @@ def lights_table(
     most = most_visible_lights(basis, solution.lighting)
     rest = np.setdiff1d(np.arange(len(rows)), most)
     told = (
-        f"{len(rest)} more lights, none of which is more than "
+        f"{len(rest)} more lights, each at most "
         f"{spoken_percent(float(shares[rest].max()))} of the picture, now or as solved"
     )
     return (
-        f"<p>The {len(most)} that do most in the picture, now or as solved.</p>"
+        f"<p>The {len(most)} lights with the largest shares of the picture, now or as solved.</p>"
         + _table([rows[k] for k in most], solution)
         + fold(told, _table([rows[k] for k in rest], solution))
     )
@@ -171,7 +171,7 @@ def _changed(light: BasisLight, setting: LightSetting) -> str:
 
 def _constraint_note(setting: LightSetting) -> str:
     """Return the constraint on a light, and whether it holds the light."""
-    holds = " (holds it)" if setting.is_active else ""
+    holds = " (limits it)" if setting.is_active else ""
     return f" <small>{escape(setting.constraint)}{holds}</small>" if setting.constraint else ""
 
 

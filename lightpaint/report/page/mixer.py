@@ -45,8 +45,8 @@ CURVE, SIDE, LOW, HIGH = 256, 32, -14.0, 7.0
 
 #: The text above the mixer.
 INTRODUCTION = (
-    "Every light by hand, from the answer on. Stops count from the light as it is in the scene; S "
-    "shows one alone, M the picture without it."
+    "Adjust each light by hand, starting from the answer. Stops are relative to the scene. S solos "
+    "a light, M mutes it."
 )
 
 

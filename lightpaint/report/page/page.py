@@ -213,15 +213,15 @@ def _banner(verification: Verification | None) -> str:
     if verification is None:
         return (
             '<p class="note">Not verified: there is no render of the relit scene to compare with, '
-            "as of a saved basis, or because none was asked for.</p>"
+            "because there was only a basis, or because verification was off.</p>"
         )
     if verification.agrees:
         return ""
     return (
         '<div class="warning" role="alert"><strong>⚠ Warning: do not trust the prediction.</strong>'
         "<p>The independent render of the relit scene differs from it by more than the noise of "
-        "both explains. See the map of the verification below for where; check that basis and "
-        "scene belong together, and render both with more samples.</p></div>"
+        "both explains. The verification map below shows where. Check that basis and scene "
+        "belong together, and render both with more samples.</p></div>"
     )
 
 
@@ -245,14 +245,16 @@ def _next_steps(basis: Basis, target: Target, verification: Verification | None)
     """Return how to change the painting and solve again, for readers who open the page much
     later."""
     text = (
-        "Open the painting with its layers, change it, save it under the same name, and give the "
+        "Open the painting with its layers, change it, save it under the same name, and run the "
         "command again. The basis is kept"
     )
     text += "." if verification is None else "; only the verification is rendered anew."
     if target.content:
-        text += " What counts is what differs from the template."
+        text += " Only what differs from the template counts."
     elif target.everything and basis.origin.scene.endswith(".xml"):
         scene = shlex.quote(_absolute_path(basis.origin.scene))
         make = f"<code>lightpaint template {escape(scene)}</code>"
-        text += f" Here every pixel counts; painted over what {make} renders, only the paint does."
+        text += (
+            f" Here every pixel counts. In a painting over the output of {make}, only paint counts."
+        )
     return text

@@ -52,9 +52,9 @@ def suggestion_section(
     if suggestions is None:
         return ""
     how = (
-        "<p>Each is a point light that was tried in free space, with all lights solved anew "
-        "beside it and beside those above it. Paste it into <code>&lt;scene&gt;</code>, and "
-        "solve again: the small pictures are a quick look, and the lights are found anew.</p>"
+        "<p>Each is a point light that was tried in free space, with all lights solved again "
+        "together with it and those above it. Paste it into <code>&lt;scene&gt;</code> and "
+        "solve again; the small pictures are previews.</p>"
         if suggestions
         else ""
     )
@@ -92,9 +92,9 @@ def _suggestion_html(
     listed = facts((k, v) for k, v in told if v)
     swatch = f'<span class="swatch" style="background: {seen.hex}"></span>' if seen.hex else ""
     where = (
-        "the ring is where it would be, perhaps behind something"
+        "the ring marks its position, which may be hidden"
         if suggestion.seen_at
-        else "it would be outside of the picture"
+        else "its position is outside the picture"
     )
     without = "with those above it" if before else "as solved"
     name = escape(suggestion.name)

@@ -86,7 +86,7 @@ class Mixer {
     stage.style.aspectRatio = `${width} / ${height}`;
     this.picture.className = 'mixer-mix';
     this.picture.setAttribute('role', 'img');
-    this.picture.setAttribute('aria-label', 'What the lights make together');
+    this.picture.setAttribute('aria-label', 'The mix of the lights');
     stage.append(this.picture);
     view.append(stage);
     if (!painting) return view;
@@ -123,11 +123,11 @@ class Mixer {
     this.said.setAttribute('role', 'status');
     const buttons = made('div', 'mixer-buttons');
     buttons.append(
-      button('Reset to answer', 'All lights as the answer has them', () => this.reset('answer')),
-      button('Reset to now', 'All lights as the scene has them', () => this.reset('present')),
+      button('Reset to answer', 'All lights as in the answer', () => this.reset('answer')),
+      button('Reset to now', 'All lights as in the scene', () => this.reset('present')),
       button(
         'Copy as lighting.json',
-        'Every light as its sliders stand; solo and mute only change ' + 'what is seen',
+        'The lights as the sliders set them; solo and mute do not count',
         () => this.copy(this.lighting(), 'lighting.json'),
       ),
     );
@@ -236,7 +236,7 @@ class Mixer {
       field.select();
       said.textContent = document.execCommand('copy')
         ? `${what} is on the clipboard.`
-        : 'This browser lets nobody copy here: it is marked below.';
+        : 'This browser does not allow copying here. Copy the selected text below.';
     }
   }
 }
@@ -368,8 +368,8 @@ async function fill(body, root, look) {
 /** @param {unknown} error */
 function whyNone(error) {
   if (typeof DecompressionStream === 'undefined')
-    return 'The mixer is not here: this browser lacks DecompressionStream, which newer ones have.';
-  return `The mixer is not here: ${error instanceof Error ? error.message : error}`;
+    return 'The mixer needs a newer browser, one that has DecompressionStream.';
+  return `The mixer is not available: ${error instanceof Error ? error.message : error}`;
 }
 
 for (const root of document.querySelectorAll('.mixer:not([data-ready])'))
