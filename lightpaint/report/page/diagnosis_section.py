@@ -200,12 +200,12 @@ def _bounds(diagnosis: Diagnosis) -> str:
     more = diagnosis.bounds_left_out
     others = f"<p>{more} more seem to matter less and were not analysed.</p>" if more else ""
     meaning = (
-        "<p>Gain: how much of the difference would go if this limit alone were removed. It is a "
-        "share of everything that counts, including the unpainted parts that are held. A light that "
-        "is kept, locked, limited or tied could then have any emission. A light that is off for "
-        "no other reason would go below zero and take light away, which hints at other lights that "
-        "spill where they should not.</p><p>Slope: the change of the objective, per unit, if the "
-        "limit were raised a little.</p>"
+        "<p>Gain: how much of the difference would go if this limit alone were removed. It is a"
+        " share of everything that counts, including the unpainted parts that are held. A light"
+        " that is kept, locked, limited or tied could then have any emission. A light that is "
+        "off for no other reason would go below zero and take light away, which hints at other "
+        "lights that spill where they should not.</p><p>Slope: the change of the objective, per"
+        " unit, if the limit were raised a little.</p>"
     )
     return (
         '<div class="explained" style="margin-top: 32px"><div><h3>What limits the lights</h3>'

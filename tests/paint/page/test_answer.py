@@ -120,7 +120,7 @@ def test_truth(painter: Painter) -> None:
     bar = painter.page.get_by_role("progressbar", name="Verifying")
     painter.tell(kind="progress", what="verify", done=5, total=16, unit="passes")
     assert bar.get_attribute("aria-valuenow") == "5"
-    painter.button("Stop").click()
+    painter.button("Stop", exact=True).click()
     assert painter.said("verify")[-1]["run"] is False
     painter.button("Verify").click()
     painter.tell(kind="progress", what="lights", done=5, total=16, unit="passes")

@@ -27,7 +27,7 @@ def painted(page: Any, script: str, *, light: float = 0, objects: Any = None) ->
 def stroke(use: str, begin: str, *moves: str) -> str:
     moved = "".join(f"stroke.move([{move}]);" for move in moves)
     return f"""
-        const use = {{ ...hand.FIRST, size: 20, hardness: 1, flow: 1, {use} }};
+        const use = {{ ...hand.DEFAULT_TOOL, size: 20, hardness: 1, flow: 1, {use} }};
         const stroke = new hand.Stroke(canvas, use, {begin}, 1);
         stroke.begin(); {moved}
         if (use.end !== false) canvas.end();
@@ -120,7 +120,7 @@ def test_the_eraser_brings_the_present_look_back(page: Any):
 @pytest.mark.parametrize("mired", [0, 60])
 def test_on_a_whole_that_was_asked_for_the_eraser_brings_that_back(page: Any, mired: int):
     """And no daylight into a night."""
-    all_ = f"hand.askFor(canvas, {{ stops: -2, mired: {mired}, object: null }});"
+    all_ = f"hand.adjustArea(canvas, {{ stops: -2, mired: {mired}, object: null }});"
     path = stroke("rgb: [3, 1, 1], size: 16", place(30, 30), place(50, 30))
     erase = stroke("tool: 'eraser', size: 30", place(30, 30), place(60, 30))
     alone, counts = painted(page, all_, light=0.5)
@@ -131,7 +131,7 @@ def test_on_a_whole_that_was_asked_for_the_eraser_brings_that_back(page: Any, mi
 
 
 def test_a_whole_stays_one_though_some_of_it_counts_less(page: Any):
-    all_ = "hand.askFor(canvas, { stops: -2, mired: 0, object: null });"
+    all_ = "hand.adjustArea(canvas, { stops: -2, mired: 0, object: null });"
     less = "{" + stroke("tool: 'weight', importance: 0.5", place(5, 5)) + "}"
     erase = "{" + stroke("tool: 'eraser', size: 20", place(60, 40)) + "}"
     accent = "{" + stroke("rgb: [1, 1, 1], size: 8", place(30, 30)) + "}"
@@ -166,7 +166,7 @@ def test_the_importance_brush_goes_by_what_counts_already(page: Any):
     """Accents on a picture of which all is painted count 10: more of that is more."""
     path = stroke("rgb: [1, 1, 1], size: 8", place(30, 30), place(50, 30))
     more = stroke("tool: 'weight', importance: 4, size: 8", place(40, 30))
-    all_ = "hand.askFor(canvas, { stops: -1, mired: 0, object: null });"
+    all_ = "hand.adjustArea(canvas, { stops: -1, mired: 0, object: null });"
     _, importance = painted(page, all_ + "{" + path + "}{" + more + "}{" + more + "}", light=0.5)
     assert importance[30, 40] == 160
     assert importance[30, 31] == 10
@@ -193,7 +193,7 @@ def test_what_counts_less_is_never_more(page: Any):
 def test_how_much_something_counts_has_an_end(page: Any):
     """Also where it becomes an accent on all that is asked for: what is more, a session refuses."""
     dot = f"canvas.importance[{10 * W + 10}] = 1000;"
-    all_ = "hand.askFor(canvas, { stops: -1, mired: 0, object: null });"
+    all_ = "hand.adjustArea(canvas, { stops: -1, mired: 0, object: null });"
     _, importance = painted(page, dot + all_, light=0.5)
     assert importance[10, 10] == 1000
     assert importance[40, 40] == 1
@@ -225,7 +225,7 @@ def test_asking_by_numbers_is_exact_in_an_object(page: Any):
     objects[:, 40:] = 1
     image, importance = painted(
         page,
-        "hand.askFor(canvas, { stops: -1.5, mired: 0, object: 1 });",
+        "hand.adjustArea(canvas, { stops: -1.5, mired: 0, object: 1 });",
         light=0.5,
         objects=objects,
     )
@@ -238,13 +238,13 @@ def test_strokes_over_what_was_asked_of_all_count_more_than_it(page: Any):
     """As they do beside what is not painted, which is held by three times as much."""
     objects = np.zeros((H, W), int)
     objects[:, : W // 10] = 1
-    all_ = "hand.askFor(canvas, {{ stops: {}, mired: 0, object: null }});".format
+    all_ = "hand.adjustArea(canvas, {{ stops: {}, mired: 0, object: null }});".format
     path = stroke("rgb: [1, 1, 1], size: 8, hardness: 1, flow: 1", place(30, 30), place(50, 30))
     image, importance = painted(page, all_(-1) + "{" + path + "}" + all_(-1), light=0.5)
     np.testing.assert_allclose([image[30, 40, 0], image[5, 70, 0]], [0.5, 0.125], rtol=1e-6)
     assert importance[30, 40] == 10
     assert importance[5, 70] == 1
-    script = all_(-1) + "hand.askFor(canvas, { stops: 1, mired: 0, object: 1 });"
+    script = all_(-1) + "hand.adjustArea(canvas, { stops: 1, mired: 0, object: 1 });"
     _, importance = painted(page, script, light=0.5, objects=objects)
     rest, its = importance[objects == 0], importance[objects == 1]
     np.testing.assert_allclose(rest.sum() / its.sum(), 3, rtol=1e-6)
@@ -255,7 +255,7 @@ def test_strokes_over_what_was_asked_of_all_count_more_than_it(page: Any):
 def test_strokes_before_all_is_asked_stay_accents(page: Any):
     """The rest had counted three times what they did, as it was held; so it does now."""
     path = stroke("rgb: [1, 1, 1], size: 16", place(30, 30), place(50, 30))
-    all_ = "hand.askFor(canvas, { stops: -1, mired: 0, object: null });"
+    all_ = "hand.adjustArea(canvas, { stops: -1, mired: 0, object: null });"
     before = painted(page, path, light=0.5)[1]
     image, importance = painted(page, "{" + path + "}" + all_, light=0.5)
     accent = before == 1
@@ -299,7 +299,7 @@ def test_a_stroke_may_leave_the_picture_on_any_side(page: Any):
                 f"""async ([H, W]) => {{
                     const hand = await import("/engine/stroke.js");
                     const canvas = bench.plain(H, W, 0, null);
-                    const use = {{ ...hand.FIRST, size: 20 }};
+                    const use = {{ ...hand.DEFAULT_TOOL, size: 20 }};
                     const stroke = new hand.Stroke(canvas, use, {begin}, 1);
                     return [...stroke.begin(), ...stroke.move([{to}]), canvas.end()];
                 }}""",

@@ -132,8 +132,8 @@ def test_hints_are_of_the_tool_and_of_fingers(opened: Any) -> None:
         ("a", "up brighter"),
         ("g", "an object in this picture"),
         ("l", "drag over this picture"),
-        ("w", "where it has to fit"),
-        ("i", "Take light"),
+        ("w", "Drag over it"),
+        ("i", "Pick light"),
     ):
         painter.page.keyboard.press(key)
         painter.still()
@@ -143,7 +143,7 @@ def test_hints_are_of_the_tool_and_of_fingers(opened: Any) -> None:
         "first", viewport={"width": 1024, "height": 768}, has_touch=True, is_mobile=True
     )
     status = tablet.page.locator("#lp-status")
-    for key, words in (("b", "Two fingers move and zoom"), ("g", "Tap on"), ("i", "Tap on")):
+    for key, words in (("b", "Two fingers pan and zoom"), ("g", "Tap an"), ("i", "Tap either")):
         tablet.page.keyboard.press(key)
         tablet.still()
         assert words in status.text_content()

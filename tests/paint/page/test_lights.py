@@ -209,7 +209,7 @@ def test_what_a_light_may_do(painter: Painter) -> None:
     painter.page.evaluate("() => painter.session.constrainLight(0, { color: '3200K' })")
     colour = painter.page.get_by_role("combobox", name="Colour", exact=True)
     colour.select_option("any")
-    panel.get_by_text("lights keep the colours").wait_for()
+    panel.get_by_text("lights keep their present colours").wait_for()
     assert colour.count() == 0
     assert group.locator(".light").count() == 2
     group.get_by_role("button", name="key and cove, tied").first.click()  # it folds
@@ -494,7 +494,7 @@ def test_limits_of_a_lights_file_are_shown_in_one_unit(
     now = 0.2126 * red + 0.7152 * green + 0.0722 * blue
     is_share = panel.get_by_role("combobox", name="Unit").input_value() == "share"
     assert is_share == all(isinstance(x, str) for x in limits.values())
-    fields = [panel.get_by_role("textbox", name=f"At {end}") for end in ("least", "most")]
+    fields = [panel.get_by_role("textbox", name=name) for name in ("Min", "Max")]
     assert fields[0].input_value() == shown[0]
     most = shown[1] * (now if isinstance(limits["max"], str) and not is_share else 1)
     assert float(fields[1].input_value()) == pytest.approx(most, rel=1e-3)

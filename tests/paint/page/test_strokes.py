@@ -18,10 +18,10 @@ def told(page: Any) -> Any:
         return page.evaluate(
             f"""async () => {{
                 const {{ SlowHost, settle }} = await import("/fake_host.js");
-                const {{ Strokes }} = await import("/engine/stroke_sender.js");
+                const {{ StrokeSender }} = await import("/engine/stroke_sender.js");
                 const canvas = bench.plain(20, 30, 0);
                 const host = new SlowHost();
-                const strokes = new Strokes(
+                const strokes = new StrokeSender(
                     host, () => host.refused = true, (...said) => host.lost = said);
                 strokes.paintOn(canvas, 0);
                 {script}

@@ -112,6 +112,6 @@ function CopyButton({ text, app, label, tip }) {
       app.session.toast('This browser does not let the page copy. Select the text instead.');
     }
   };
-  return html`<${Button} label=${label && (isDone ? 'CommandLine' : label)} tip=${isDone && tip ? 'CommandLine' : tip}
+  return html`<${Button} label=${label && (isDone ? 'Copied' : label)} tip=${isDone && tip ? 'Copied' : tip}
     icon=${isDone ? 'check' : 'copy'} act=${copy} />`;
 }

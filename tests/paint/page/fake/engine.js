@@ -29,7 +29,7 @@ export class FakeEngine {
   }
   close() {}
   setTool(settings) {
-    this.hand = settings;
+    this.tool = settings;
   }
   resize(width, height) {
     this.size = [width, height];
@@ -155,7 +155,7 @@ export class FakeEngine {
   }
 
   begin(point) {
-    this.calls.push(['begin', this.hand.tool, point]);
+    this.calls.push(['begin', this.tool.tool, point]);
     this.strokes += 1;
     this.drawn = 0;
     this.before = this.image.slice();
@@ -167,7 +167,7 @@ export class FakeEngine {
     if (!this.before) return;
     this.calls.push(['move', points.length]);
     const last = points.at(-1);
-    if (this.hand.tool === 'adjust') {
+    if (this.tool.tool === 'adjust') {
       return this.tell('asking', {
         stops: (this.started.y - last.y) / 30,
         mired: last.x - this.started.x,
@@ -180,7 +180,7 @@ export class FakeEngine {
 
   stamp({ x, y, pressure }) {
     const { w, h, surfaces } = this.room;
-    const { size, hardness, flow, rgb, tool, as } = this.hand;
+    const { size, hardness, flow, rgb, tool, as } = this.tool;
     const r = size / 2;
     for (let j = Math.max(0, Math.floor(y - r)); j < Math.min(h, y + r); j += 1) {
       for (let i = Math.max(0, Math.floor(x - r)); i < Math.min(w, x + r); i += 1) {
@@ -211,7 +211,7 @@ export class FakeEngine {
         stroke: this.strokes,
         region: [0, this.room.h, 0, this.room.w],
         done,
-        label: this.hand.tool,
+        label: this.tool.tool,
       },
       { image: { data: this.image, shape: [this.room.h, this.room.w, 3] } },
     );
