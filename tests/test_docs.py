@@ -121,7 +121,7 @@ def test_keys_of_the_painter_are_those_of_its_page():
         r"label: '(\w+)',\s*icon: '\w+',\s*keys: '(\w)'", (page / "tools.js").read_text()
     )
     others = re.findall(
-        r"shown: \[((?:'[^']*'(?:, )?)+)\],\s*does: '([^']*)'", (page / "keys.js").read_text()
+        r"shown: \[((?:'[^']*'(?:, )?)+)\],\s*does: '([^']*)'", (page / "shortcuts.js").read_text()
     )
     keys = [*((f"'{key}'", label) for label, key in tools), *others]
     assert len(keys) > 30

@@ -422,7 +422,7 @@ def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
 
 
 def test_a_setting_is_undone_by_the_name_that_the_page_has_for_it():
-    page = REPOSITORY / "lightpaint" / "paint" / "page" / "ui" / "settings.js"
+    page = REPOSITORY / "lightpaint" / "paint" / "page" / "ui" / "settings_panel.js"
     shown = re.findall(r'<\$\{Row\} title="([^"]+)"', page.read_text("utf-8"))
     assert list(TITLES.values()) == shown
     assert set(TITLES) == {*FIT_KEYS, *ALL_LIGHTS_KEYS}
