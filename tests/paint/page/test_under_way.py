@@ -26,7 +26,7 @@ def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Pa
     page.keyboard.press("Escape")
     chip = page.locator(".working")
     chip.get_by_text("Exporting files: 25 %").wait_for()
-    page.get_by_role("button", name="Stop: writing files").click()
+    page.get_by_role("button", name="Stop: exporting files").click()
     assert painter.said("export")[-1] == {"kind": "export", "what": [], "run": False}
     painter.tell(
         kind="exported", files=["/shows/gallery-evening/lighting.json"], command="", is_stopped=True
@@ -105,7 +105,7 @@ def test_until_a_look_is_there_no_picture_is_called_its_own(painter: Painter, pi
     )
     tag = painter.page.locator(".tag", has_text=picture)
     painter.button("Load Look 1").click()
-    tag.get_by_text(f"{picture}: Look 1 is coming …").wait_for()
+    tag.get_by_text(f"{picture}: loading Look 1 …").wait_for()
     painter.page.evaluate("() => window.go()")
     painter.still()
     assert tag.inner_text() == picture

@@ -57,7 +57,7 @@ def cut_off(painter: Painter, where: str = ".lightpaint") -> list[str]:
 def how_true(painter: Painter) -> None:
     painter.button("Analysis").click()
     painter.button("Why not closer?").click()
-    painter.page.get_by_text("Of the difference").wait_for()
+    painter.page.get_by_text("Of the difference (large").wait_for()
 
 
 def verified(painter: Painter) -> None:
@@ -70,7 +70,7 @@ def numbers(painter: Painter) -> None:
     painter.page.keyboard.press("a")
     painter.button("By numbers", exact=True).click()
     objects = painter.ui("state")["objects"]
-    painter.choose("Where", max(objects, key=len))
+    painter.choose("Area", max(objects, key=len))
 
 
 def importance(painter: Painter) -> None:
