@@ -58,7 +58,7 @@ class Fox:
 
     def look(self, script: str) -> Any:
         """What a script finds in the page, None while there is none."""
-        names = f"const {{ engine }} = {PAINTER}; const {{ work, screen }} = engine;"
+        names = f"const {{ engine }} = {PAINTER}; const {{ mirror, screen }} = engine;"
         found = self.ask(
             "script.evaluate",
             expression=f"JSON.stringify((() => {{ {names} {script} }})() ?? null)",
@@ -181,7 +181,7 @@ def test_what_is_painted_is_answered_and_shown(fox: Fox, make_basis: Any, tmp_pa
         code = to_8_bit(studio.session.transform.encode(light))[0].astype(int)
 
         def is_answered() -> bool:
-            shown = fox.look("return Array.from(work.weights)")
+            shown = fox.look("return Array.from(mirror.weights)")
             is_exact = "headline" in studio.state().fields["answer"]
             return is_exact and shown == studio.session.weights.ravel().tolist()
 

@@ -91,7 +91,7 @@ class Person:
 
     def look(self, script: str, given: Any = None) -> Any:
         """What a script finds in the page."""
-        names = f"const {{ host, engine }} = {PAINTER}; const {{ work, screen }} = engine;"
+        names = f"const {{ host, engine }} = {PAINTER}; const {{ mirror, screen }} = engine;"
         return self.page.evaluate(f"(given) => {{ {names} {script} }}", given)
 
     def ready(self) -> "Person":
@@ -109,7 +109,7 @@ class Person:
         """Wait until these steps are done, and the exact answer to them is on screen."""
         studio = self.served.studio
         until(lambda: self.served.steps == list(steps), f"not {steps}")
-        at_rest = "return !work.strokes.isPending && !screen.isLive && !screen.frame"
+        at_rest = "return !mirror.strokes.isPending && !screen.isLive && !screen.frame"
         until(lambda: self.look(at_rest), "strokes are not answered")
 
         def is_exact() -> bool:
@@ -119,7 +119,7 @@ class Person:
                 weights = session.weights.tolist()
             if session.is_painted and "headline" not in known:
                 return False
-            shown = self.look("return Array.from(work.weights)")
+            shown = self.look("return Array.from(mirror.weights)")
             return bool(shown == [x for rgb in weights for x in rgb])
 
         until(is_exact, "there is no exact answer")
@@ -266,9 +266,9 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     me = opened(served, view).ready()
     assert me.look("return screen.view.name") == view
     before, far, now = me.seen(30, 10), me.seen(90, 50), me.seen(30, 10, 1)
-    me.look("work.canvas.importance[5] = 2.5")
+    me.look("mirror.canvas.importance[5] = 2.5")
     assert me.look("return engine.greatest()") == 2.5
-    me.look("work.canvas.importance[5] = 0")
+    me.look("mirror.canvas.importance[5] = 0")
     assert me.look("return engine.greatest()") == 1
     me.press("0").stroke((20, 10), (40, 10)).still("brush")
     np.testing.assert_allclose(me.seen(30, 10), me.code(me.paint), atol=1)
@@ -289,7 +289,7 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     me.page.keyboard.press("v")
     box = me.page.locator(".wipe").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    me.drag((x, y), (x - 150, y)).still("brush", "fill", "ask")  # and the wipe has painted nothing
+    me.drag((x, y), (x - 150, y)).still("brush", "fill", "adjust")  # and the wipe has painted nothing
     assert me.look("return screen.panes().map((pane) => pane.kind)") == ["solution", "painting"]
     np.testing.assert_allclose(me.seen(5, 50, 1), me.code(me.paint), atol=1)
     np.testing.assert_allclose(me.seen(90, 50, 0), me.answered(90, 50), atol=1)
@@ -307,7 +307,7 @@ def fill_and_ask(me: Person) -> None:
     me.drag((x, y), (x, y + 160), hold=True)
     assert me.page.get_by_text("2.0 stops darker").is_visible()
     me.page.mouse.up()
-    me.still("brush", "fill", "ask")
+    me.still("brush", "fill", "adjust")
     np.testing.assert_allclose(me.seen(80, 15), me.code(light), atol=2)
 
 
@@ -371,7 +371,7 @@ def test_what_is_said_while_nothing_is_painted(served: Served, opened: Any) -> N
     slider = me.page.get_by_role("slider", name="light 1, stops from now", exact=True).first
     slider.press("ArrowRight")
     me.still("light 1")
-    until(lambda: "but for what you ask of them" in said.inner_text(), "it is said as before")
+    until(lambda: "except for your constraints" in said.inner_text(), "it is said as before")
 
 
 def test_a_pen_paints_with_its_pressure_and_fingers_paint_and_zoom(
@@ -544,11 +544,11 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
         me.stroke((10, 15), (20, 15))
         again = Served(subject, port=served.server.port)
         page.get_by_text("This page belongs to a painter that has ended").wait_for()
-        page.get_by_text("never heard, and lost: 2 strokes").wait_for()
+        page.get_by_text("2 strokes painted here could not be sent, and are lost").wait_for()
         # Nobody would hear more of them.
-        count = me.look("return work.strokes.count")
+        count = me.look("return mirror.strokes.count")
         me.stroke((10, 25), (20, 25))
-        assert me.look("return work.strokes.count") == count
+        assert me.look("return mirror.strokes.count") == count
         beside = context.new_page()
         beside.goto(again.server.url)
         # The new tab has the new key, and the old one does not take the session by it.
