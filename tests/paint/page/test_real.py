@@ -289,7 +289,8 @@ def test_what_is_painted_and_answered_is_on_the_screen(
     me.page.keyboard.press("v")
     box = me.page.locator(".wipe").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    me.drag((x, y), (x - 150, y)).still("brush", "fill", "adjust")  # and the wipe has painted nothing
+    # The wipe paints nothing.
+    me.drag((x, y), (x - 150, y)).still("brush", "fill", "adjust")
     assert me.look("return screen.panes().map((pane) => pane.kind)") == ["solution", "painting"]
     np.testing.assert_allclose(me.seen(5, 50, 1), me.code(me.paint), atol=1)
     np.testing.assert_allclose(me.seen(90, 50, 0), me.answered(90, 50), atol=1)
