@@ -54,6 +54,7 @@ def test_nothing_learned_is_an_even_choice() -> None:
 
 
 def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
+    use_variant()
     from lightpaint.basis.render.guide import EVEN_SHARE
 
     asked = np.full((2, 2), 1e6)
