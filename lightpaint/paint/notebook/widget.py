@@ -8,8 +8,7 @@ import asyncio
 import atexit
 import contextvars
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from inspect import signature
 from pathlib import Path
@@ -26,6 +25,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import error_text
 from lightpaint.paint.notebook import widget_arguments
+from lightpaint.paint.notebook.pending_values import PendingValues
 from lightpaint.paint.notebook.widget_files import widget_script, widget_style
 from lightpaint.paint.notebook.widget_views import WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
@@ -67,9 +67,6 @@ MIN_HEIGHT = 240
 
 #: Default layout: without a width, an HBox gives the painter none.
 DEFAULT_LAYOUT = {"width": "100%", "min_width": "320px"}
-
-#: Rounds in which callbacks may set what makes callbacks set something again.
-MAX_CALLBACK_ROUNDS = 20
 
 
 class Painter(anywidget.AnyWidget):  # type: ignore[misc]
@@ -135,9 +132,9 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         layout: Mapping[str, Any] | ipywidgets.Layout | None = None,
         **settings: Unpack[SettingsByName],
     ) -> None:
-        self._lock, self._ready, self._is_notifying = RLock(), Event(), False
+        self._lock, self._ready = RLock(), Event()
         self._is_closed = False
-        self._pending: list[tuple[str, Any]] = []  # what is to be set as soon as it can be
+        self._pending = PendingValues(self._lock, self._apply_late, self._warn)
         self._solved: tuple[int, Solution | None] | None = None
         self._loop = _running_loop()
         self._context = contextvars.copy_context()
@@ -269,8 +266,8 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             raise PaintError(f"painter.{name} cannot be set: it is closed; make another lp.Painter")
         with self._lock:  # another thread may be telling something now
             arguments = LOADERS[name](self._studio.session, value)
-            if self._is_notifying:
-                self._pending.append((name, value))
+            if self._pending.is_notifying:
+                self._pending.add(name, value)
             else:
                 self._apply(arguments)
 
@@ -284,19 +281,6 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         for message in self._studio.load(*arguments):
             self._views.send(message)
         self._sync_traits()
-
-    def _apply_pending(self) -> None:
-        """Apply what has been waiting, and then what callbacks have set meanwhile."""
-        for _ in range(MAX_CALLBACK_ROUNDS):
-            pending, self._pending = self._pending, []
-            for name, value in pending:
-                self._apply_late(name, value)
-        if self._pending:
-            self._pending = []
-            self._warn(
-                "callbacks of the painter set something again whenever they are told of what they "
-                "have set: the last of it was not set"
-            )
 
     def _apply_late(self, name: str, value: Any) -> None:
         """Apply what was set earlier; a failure is shown and ends nothing, since its cell has
@@ -354,22 +338,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
 
     def _sync_traits(self, new: dict[str, Any] | None = None) -> None:
         """Set the live traits to the session's values."""
-        with self._notifying():
+        with self._pending.notifying():
             for name, value in (new or self._current_values()).items():
                 if value is not getattr(self, name):
                     self.set_trait(name, value)
-
-    @contextmanager
-    def _notifying(self) -> Iterator[None]:
-        """Hold back what callbacks set until all observers have been called."""
-        with self._lock:  # two threads that tell would each take the other's callbacks for theirs
-            before, self._is_notifying = self._is_notifying, True
-            try:
-                yield
-                if not before:
-                    self._apply_pending()
-            finally:
-                self._is_notifying = before
 
     def _lighting(self) -> Lighting:
         """Return the exact answer, or the requested lighting where nothing is painted."""
@@ -411,7 +383,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         """
         with self._lock:
             if self._studio.store is None:
-                self._pending.append((name, value))
+                self._pending.add(name, value)
             else:
                 setattr(self, name, value)
 

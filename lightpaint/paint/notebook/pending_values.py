@@ -1,0 +1,56 @@
+"""Values that cells and callbacks set of a painter, and that wait until they can be set."""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any
+
+#: Rounds in which callbacks may set what makes callbacks set something again.
+MAX_CALLBACK_ROUNDS = 20
+
+
+class PendingValues:
+    """Values by the names of their traits, in the order in which they were set.
+
+    lock: held while observers are called: two threads that tell would each take the other's
+    callbacks for theirs. apply: sets a value, and raises nothing. warn: receives in one line what
+    was not set.
+    """
+
+    def __init__(
+        self,
+        lock: AbstractContextManager[Any],
+        apply: Callable[[str, Any], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._lock, self._apply, self._warn = lock, apply, warn
+        self._values: list[tuple[str, Any]] = []
+        self.is_notifying = False
+
+    def add(self, name: str, value: Any) -> None:
+        """Add a value, which is set after all observers have been called."""
+        self._values.append((name, value))
+
+    @contextmanager
+    def notifying(self) -> Iterator[None]:
+        """Hold back what callbacks set until all observers have been called."""
+        with self._lock:
+            before, self.is_notifying = self.is_notifying, True
+            try:
+                yield
+                if not before:
+                    self._apply_all()
+            finally:
+                self.is_notifying = before
+
+    def _apply_all(self) -> None:
+        """Apply what has been waiting, and then what callbacks have set meanwhile."""
+        for _ in range(MAX_CALLBACK_ROUNDS):
+            values, self._values = self._values, []
+            for name, value in values:
+                self._apply(name, value)
+        if self._values:
+            self._values = []
+            self._warn(
+                "callbacks of the painter set something again whenever they are told of what they "
+                "have set: the last of it was not set"
+            )
