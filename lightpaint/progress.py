@@ -103,7 +103,7 @@ _CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: Non
 
 @contextmanager
 def cancellable(check: Callable[[], None]) -> Iterator[None]:
-    """Let the work within be cancelled: whatever it calls runs `check` now and then.
+    """Allow the work within to be cancelled: whatever it calls runs `check` now and then.
 
     check: raises the exception that ends the work, from any thread that takes part in it.
     """

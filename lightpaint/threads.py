@@ -104,7 +104,7 @@ def parallel_map(work: Callable[[Job], Result], jobs: Iterable[Job]) -> list[Res
 
 
 def limit_jobs(count: int | None) -> None:
-    """Let at most `count` jobs run at a time in this process; None for no limit."""
+    """Limit the jobs that run at a time in this process to `count`; None for no limit."""
     global _limit
     _limit = count
 

@@ -69,7 +69,7 @@ def one_of(words: Any) -> Check:
 
 
 def a(kind: type, about: str) -> Check:
-    """Anything of a type."""
+    """Expect anything of a type."""
     return lambda value: isinstance(value, kind), about
 
 

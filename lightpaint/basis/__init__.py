@@ -1,1 +1,1 @@
-"""What does each light do alone? A `Scene` becomes a `Basis`: one image per light."""
+"""The basis of a `Scene`: one image per light."""

@@ -32,7 +32,7 @@ LIGHT_GROUPS = "light groups of "
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a basis comes from: what makes two of them comparable, and one go on.
+    """The origin of a basis, which decides whether bases are comparable and samples can be added.
 
     halves: samples per pixel of each of the two halves; passes: how many passes made them.
     each_light: where lights have unequal numbers of samples, because an interrupt ended separate
@@ -66,7 +66,7 @@ class Origin:
 
     @property
     def is_light_groups(self) -> bool:
-        """Whether another renderer made it, of whose picture there is no template."""
+        """True if another renderer made it, so that its picture has no template."""
         return self.method.startswith(LIGHT_GROUPS)
 
 
@@ -193,7 +193,9 @@ class Basis(Shown):
         return self.lights.names
 
     def image(self, name: str) -> Floats:
-        """The image of the light called `name`, (h, w, 3). Raises BasisError if there is none."""
+        """Return the image of the light called `name`, (h, w, 3). Raises BasisError if there is
+        none.
+        """
         if name not in self.names:
             raise BasisError(f"no light {name!r} in the basis: it has {some_names(self.names)}")
         return self.planes.plane(self.names.index(name))
@@ -209,7 +211,7 @@ class Basis(Shown):
         return self.noise.array()
 
     def with_requests(self, requests: SceneRequests) -> "Basis":
-        """This basis, of whose lights that is asked."""
+        """Return this basis with other requests for its lights."""
         return (
             self
             if self.requests == requests
@@ -228,7 +230,7 @@ class Basis(Shown):
 
     @property
     def knows_noise(self) -> bool:
-        """Whether `half_differences` tell the noise: not where nobody knows of any samples."""
+        """True if `half_differences` estimate the noise: not if the samples are unknown."""
         return min(self.origin.halves) > 0 or bool(self.origin.each_light)
 
     @property
@@ -258,7 +260,7 @@ class Basis(Shown):
         return read_only(self._sums(np.ones(self.size[0] * self.size[1])))
 
     def _sums(self, counted: Doubles, *, is_squared: bool = False) -> Doubles:
-        """Σ_pixels counted · Φᵢ, or its square, (n, 3). counted: (pixels,)."""
+        """Return Σ_pixels counted · Φᵢ, or its square, (n, 3). counted: (pixels,)."""
         sums = np.zeros((len(self.lights), 3))
         # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
         # is as exact as the sum, and needs no copy of the basis.
@@ -270,7 +272,9 @@ class Basis(Shown):
         return sums
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """The image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the lights."""
+        """Return the image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the
+        lights.
+        """
         return self.planes.mix(weights)
 
 
@@ -287,7 +291,7 @@ def meter_exposure(image: Floats, *bases: Basis) -> float:
 
 
 def free_name(name: str, taken: Collection[str]) -> str:
-    """`name`, with underscores added while another has it."""
+    """Return `name`, with underscores added while another light has it."""
     while name in taken:
         name += "_"
     return name

@@ -37,7 +37,7 @@ UNUSED_S = 30 * 86400.0
 
 @dataclass(frozen=True)
 class Entry:
-    """One cached basis.
+    """A cached basis.
 
     size: in bytes, with what is kept beside it. image_size: (height, width), lights: how many.
     origin and these are None if the file cannot be read. identities: of its planes, where known.
@@ -52,13 +52,13 @@ class Entry:
 
 
 def find(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> Basis | None:
-    """The basis kept for that, or None: also of a damaged one, whose place the next one takes."""
+    """Return the cached basis for these arguments; None if missing or damaged."""
     path = _path(scene_identity, sensor, seed, size)
     return _read(path) if is_own(path) else None
 
 
 def read(entry: Entry) -> Basis | None:
-    """The basis of an entry, or None if it is damaged, or gone since it was listed."""
+    """Return the basis of an entry, or None if it is damaged, or deleted since it was listed."""
     return _read(entry.path)
 
 
@@ -75,14 +75,14 @@ def _read(path: Path) -> Basis | None:
 
 
 def spp_of(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> int:
-    """Samples per pixel of the basis kept for that; 0 if there is none."""
+    """Return the samples per pixel of the cached basis for these arguments; 0 if there is none."""
     path = _path(scene_identity, sensor, seed, size)
     kept = _entry(path).origin if is_own(path) else None
     return 0 if kept is None else kept.spp
 
 
 def any_of(scene_identity: str, sensor: str, *, samples: int, largest: int) -> Basis | None:
-    """A basis of any size and seed that is kept for that, the one with most samples; or None.
+    """Return the cached basis of any size and seed with the most samples; None if there is none.
 
     samples: of all pixels together, that it has at least. largest: bytes of its file, at most.
     """
@@ -116,13 +116,13 @@ def keep(basis: Basis) -> bool:
 
 
 def kept_at(basis: Basis) -> Path | None:
-    """The file in which just `basis` is kept; None where it is not, or has more samples there."""
+    """Return the file that holds just `basis`; None if it is not, or has more samples there."""
     path = _path_of(basis)
     return path if is_own(path) and _entry(path).origin == basis.origin else None
 
 
 def place_beside(basis: Basis, ending: str) -> Path:
-    """Where something is kept that was made of `basis`, whether that is kept itself or not.
+    """Return the place for data derived from `basis`, whether that is cached or not.
 
     ending: CLEAN or KNOWN, what stands before it included.
     """
@@ -130,7 +130,7 @@ def place_beside(basis: Basis, ending: str) -> Path:
 
 
 def beside(path: Path) -> list[Path]:
-    """What is kept beside the basis at `path`, and nothing else that lies there."""
+    """Return the data derived from the basis at `path`."""
     name = path.name.removesuffix(SUFFIX)
     return [other for other, its in _companions() if its == name]
 
@@ -149,13 +149,13 @@ def sweep(unused_s: float = 0.0) -> int:
 
 
 def _companions() -> list[tuple[Path, str]]:
-    """What was put beside bases, and the name that each basis has before its ending."""
+    """Return data derived from bases, with the stem of each basis."""
     found = ((path, COMPANION_NAME.fullmatch(path.name)) for path in folder().glob("*"))
     return [(path, match[1]) for path, match in found if match is not None and is_own(path)]
 
 
 def is_kept(basis: Basis) -> bool:
-    """Whether `basis` is kept, with all its samples, or one of the same with more."""
+    """Return True if `basis`, or the same with more samples, is in the cache."""
     path = _path_of(basis)
     kept = _entry(path).origin if is_own(path) else None
     return kept is not None and (kept == basis.origin or kept.spp > basis.origin.spp)
@@ -179,7 +179,7 @@ def _prune(path: Path) -> None:
 
 
 def _is_leftover(path: Path) -> bool:
-    """Whether it is a folder in which just one file of the cache was being written."""
+    """Return True for a folder in which a single file of the cache was being written."""
     name = LEFTOVER_NAME.fullmatch(path.name)
     if name is None or not path.is_dir() or path.is_symlink():
         return False
@@ -187,14 +187,14 @@ def _is_leftover(path: Path) -> bool:
 
 
 def entries() -> list[Entry]:
-    """What is kept, the longest unused first."""
+    """Return all entries of the cache, the longest unused first."""
     there = [path for path in folder().glob(f"*{SUFFIX}") if BASIS_NAME.fullmatch(path.name)]
     files = sorted(filter(is_own, there), key=lambda path: path.stat().st_mtime)
     return [_entry(path) for path in files]
 
 
 def named(pattern: str) -> list[Entry]:
-    """What is kept of a scene, or in a file, of that name; `*` stands for anything.
+    """Return the entries of a scene, or of a file, of that name; `*` matches anything.
 
     A scene goes by the name of its file, with or without its ending.
     """

@@ -91,7 +91,7 @@ def is_believed(its: os.stat_result) -> bool:
 
 
 def _others(path: Path) -> list[str]:
-    """Some names in the folder that are not of our kinds; none if it is ours, new or hidden."""
+    """Return some foreign names in the folder; none if it is ours, new or hidden."""
     with suppress(OSError):
         if "created by lightpaint" in (path / TAG).read_text("utf-8", "replace")[:1000]:
             return []

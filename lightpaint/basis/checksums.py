@@ -26,7 +26,7 @@ Channels = Mapping[str, npt.NDArray[Any]]
 
 @dataclass(frozen=True)
 class Checksums:
-    """Of what was written. lights: by name, in the order of the lights."""
+    """Checksums of what was written. lights: by name, in the order of the lights."""
 
     lights: Mapping[str, str]
     origin: str
@@ -34,16 +34,16 @@ class Checksums:
     learned: str = ""
 
     def text(self) -> str:
-        """As it stands in the header."""
+        """Return the text for the header."""
         return json.dumps(vars(self), ensure_ascii=False)
 
     @classmethod
     def of_text(cls, text: str) -> "Checksums":
-        """From what `text` gave. Raises ValueError for anything else."""
+        """Read what `text` returned. Raises ValueError for anything else."""
         return read_record(cls, strict_json(text))
 
     def in_order(self, names: Sequence[str]) -> list[int]:
-        """Which of `names` come first, second, … as the lights were written.
+        """Return the indices of `names` in the order in which the lights were written.
 
         Raises BasisError if a light is gone, or one is there that was not written with them.
         """
@@ -61,7 +61,7 @@ class Checksums:
 
 
 def checksum(text: str, channels: Channels) -> str:
-    """Eight hexadecimal digits of a text and of pixels, their sizes, types and names."""
+    """Return eight hexadecimal digits for a text and pixels, their sizes, types and names."""
     crc = zlib.crc32(text.encode())
     for name in sorted(channels):
         pixels = np.ascontiguousarray(channels[name])

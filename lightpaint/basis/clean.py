@@ -55,7 +55,7 @@ Halves = npt.NDArray[np.float16]
 
 @dataclass(frozen=True)
 class CleanPlanes:
-    """What each light does, for eyes.
+    """Denoised planes, for display.
 
     halves: (n, h, w, 3) float16, linear, at unit emission over `scales`. scales: (n,), powers of 2.
     present: (h, w, 3) float32, the scene as it is: their sum, or the sum denoised where that came
@@ -68,26 +68,26 @@ class CleanPlanes:
 
     @classmethod
     def of(cls, basis: Basis, halves: Halves, scales: Doubles) -> "CleanPlanes":
-        """With what their sum shows of the scene as it is."""
+        """Return the planes with their sum for the present scene."""
         return cls(halves, scales, _mixed(halves, scales, basis.present_weights))
 
     def mix(self, weights: Doubles) -> Floats:
-        """Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
+        """Return Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
         return _mixed(self.halves, self.scales, weights)
 
     def scaled_as(self, basis: Basis) -> "CleanPlanes":
-        """The same light, by the scales of the planes of another basis of the same lights."""
+        """Return the same light, in the scales of another basis of the same lights."""
         scales = np.array([scale_of(plane) for plane in basis.planes])
         halves = np.stack([as_halves(self.plane(k), x) for k, x in enumerate(scales)])
         return CleanPlanes(halves, scales, self.present)
 
     def plane(self, k: int) -> Floats:
-        """That of light k at unit emission, (h, w, 3) float32."""
+        """Return the plane of light k at unit emission, (h, w, 3) float32."""
         return np.asarray(self.halves[k] * np.float32(self.scales[k]), np.float32)
 
 
 class RoughPlanes:
-    """What each light does without most of the grain: at once, where denoising takes seconds.
+    """Planes without most of the noise, available at once where denoising takes seconds.
 
     It is the clean picture of the scene as it is, times the share that the light has in it, which
     is taken of means over some pixels. So they add up to that picture, and shadows are soft.
@@ -99,7 +99,9 @@ class RoughPlanes:
         self.basis, self.present = basis, present
 
     def plane(self, k: int) -> Floats:
-        """That of light k at unit emission, (h, w, 3) float32; 0 where the scene is black."""
+        """Return the plane of light k at unit emission, (h, w, 3) float32; 0 where the scene is
+        black.
+        """
         lit, total = self._mean(self.basis.planes.plane(k)), self._total
         share = np.divide(lit, total, out=np.zeros_like(lit), where=total > 0)
         return self.present * resampled(share, self.basis.size)
@@ -114,20 +116,20 @@ class RoughPlanes:
 
 
 def scale_of(plane: Floats) -> float:
-    """What a plane is divided by to be half floats: a power of two."""
+    """Return the power of two that a plane is divided by to become half floats."""
     brightest = float(plane.max(initial=0))
     return float(2.0 ** np.ceil(np.log2(brightest / BRIGHTEST))) if brightest > 0 else 1.0
 
 
 def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
-    """Light as half floats, what they cannot hold clipped."""
+    """Return light as half floats, clipped to their range."""
     return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
 
 
 def clean_planes(
     basis: Basis, *, most: int = MOST_WANTED, progress: Callable[[int, int], None] | None = None
 ) -> CleanPlanes | None:
-    """Those that are kept, or else made now, and kept.
+    """Return the denoised planes, from the cache or computed and cached now.
 
     most: pixels of all planes up to which they are made. progress: hears how many are, of how many.
     None where there are none, and sums of so few pixels are denoised sooner.
@@ -148,14 +150,14 @@ def clean_planes(
 
 
 def clean_plane(basis: Basis, k: int) -> tuple[Halves, float]:
-    """Of light k what `CleanPlanes` holds."""
+    """Return the denoised plane of light k, as in `CleanPlanes`."""
     plane = basis.planes.plane(k)
     scale = scale_of(plane)
     return as_halves(denoised(plane, basis.features), scale), scale
 
 
 def kept_planes(basis: Basis) -> CleanPlanes | None:
-    """Those that are kept of just these pixels; None for none, and for what is damaged."""
+    """Return the cached denoised planes of just these pixels; None if missing or damaged."""
     with suppress(*_DAMAGES, LightpaintError):
         path = cache.place_beside(basis, CLEAN)
         if not is_own(path):
@@ -200,7 +202,7 @@ def _shape(basis: Basis) -> tuple[int, int, int, int]:
 
 
 def _made_of(basis: Basis) -> str:
-    """What decides how they come out."""
+    """Return everything that the denoised planes depend on."""
     others: list[Floats] = [basis.present_weights]
     if basis.features is not None:
         others += [basis.features.albedo, basis.features.normal]

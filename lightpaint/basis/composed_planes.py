@@ -38,12 +38,12 @@ class ComposedPlanes(RowPlanes):
         return self._size
 
     def plane(self, i: int) -> Floats:
-        """That of light i, (h, w, 3)."""
+        """Return the plane of light i, (h, w, 3)."""
         pick = self._picks[i]
         return np.zeros((*self._size, 3), np.float32) if pick is None else pick[0].plane(pick[1])
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Some rows of all, (n, bottom - top, w, 3)."""
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self._size[0])
         made = np.zeros((self.count, max(bottom - top, 0), self._size[1], 3), np.float32)
         sources = {id(pick[0]): pick[0] for pick in self._picks if pick is not None}

@@ -180,7 +180,7 @@ def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
 
 
 def _of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
-    """Raises BasisError, without naming the file, or one of _DAMAGES."""
+    """Return the basis of EXR parts. Raises BasisError or one of _DAMAGES."""
     lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
     scales = [scales_of(p.attributes) for p in lit]
@@ -274,9 +274,7 @@ def _assembled(
 
 
 def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
-    """Origin, (height, width) and identity of each light of the basis at `path`, without its
-    pixels.
-    """
+    """Return origin, (height, width) and light identities of the basis at `path`, no pixels."""
     file_length(path, "basis", BasisError, limit=MAX_BYTES)
     try:
         headers, size = read_headers(path)
@@ -290,5 +288,5 @@ def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
 
 
 def is_basis_file(path: Path) -> bool:
-    """Whether the name says so: a basis is an EXR, a scene is XML."""
+    """Return True if the name is that of a basis: a basis is an EXR, a scene is XML."""
     return path.suffix.lower() == ".exr"

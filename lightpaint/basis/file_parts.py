@@ -114,7 +114,7 @@ def other_parts(basis: Basis) -> Iterator[ExrPart]:
 
 
 def learned_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
-    """The table of what was learned; None for one that is not as it was, which nothing needs."""
+    """Return the learned table; None if it is missing or damaged, since nothing needs it."""
     for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
         if checksums is not None and checksum("", channels) != checksums.learned:
             return None
@@ -123,14 +123,14 @@ def learned_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats
 
 
 def _feature_channels(features: Features) -> Channels:
-    """In half floats, which is what they were rendered to."""
+    """Return the features as half floats, to which they were rounded when rendered."""
     albedo = rgb_channels(features.albedo, "albedo")
     normal = {f"normal.{c}": features.normal[..., k] for k, c in enumerate("XYZ")}
     return {name: plane.astype(np.float16) for name, plane in (albedo | normal).items()}
 
 
 def features_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | None:
-    """Albedo and normals; None if there are none or not as they were, which nothing needs."""
+    """Return albedo and normals; None if missing or damaged, since nothing needs them."""
     for part in (p.in_display_window() for p in others if FEATURES_KEY in p.attributes):
         channels = part.channels
         if checksum("", channels) != part.attributes[FEATURES_KEY] or part.size != size:
@@ -141,7 +141,7 @@ def features_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | 
 
 
 def objects_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Objects | None:
-    """Whose surfaces are seen; None if nothing says so or not as it was, which nothing needs."""
+    """Return the map of objects; None if missing or damaged, since nothing needs it."""
     for part in (p.in_display_window() for p in others if OBJECTS_KEY in p.attributes):
         named = part.attributes.get(NAMES_KEY, "")
         if checksum(named, part.channels) != part.attributes[OBJECTS_KEY] or part.size != size:

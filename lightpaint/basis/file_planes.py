@@ -29,7 +29,7 @@ class RowPlanes(PlanesBase):
     """
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Some rows of all, (n, bottom - top, w, 3)."""
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
         raise NotImplementedError
 
     @cached_property
@@ -39,12 +39,12 @@ class RowPlanes(PlanesBase):
         return _Strips(step, lambda k: self.rows(k * step, min((k + 1) * step, height)))
 
     def strips(self) -> Iterator[Floats]:
-        """All rows, a few after the other."""
+        """Yield all rows, a few at a time."""
         height, step = self.size[0], self._strips.step
         return (self.rows(top, min(top + step, height)) for top in range(0, height, step))
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Some pixels of all, (n, p, 3)."""
+        """Return some pixels of all planes, (n, p, 3)."""
         height, width = self.size
         length = self._strips.step * width
         if isinstance(where, slice):
@@ -64,11 +64,11 @@ class RowPlanes(PlanesBase):
         return made
 
     def _strip(self, k: int) -> Floats:
-        """The pixels of a strip, (n, p, 3)."""
+        """Return the pixels of a strip, (n, p, 3)."""
         return self._strips[k].reshape(self.count, -1, 3)
 
     def picked(self, where: slice | Indices) -> Planes:
-        """The same pixels as planes of one row; kept in memory where they are few."""
+        """Return the same pixels as planes of a single row; kept in memory where they are few."""
         height, width = self.size
         if isinstance(where, slice):
             where = np.arange(height * width)[where]
@@ -77,15 +77,15 @@ class RowPlanes(PlanesBase):
         return PickedPlanes(self, where)
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Σ w_i Φ_i, (h, w, 3)."""
+        """Return Σ w_i Φ_i, (h, w, 3)."""
         return np.concatenate([mix(strip, weights) for strip in self.strips()])
 
     def replaced(self, planes: Mapping[int, Floats]) -> Planes:
-        """These planes with others, (h, w, 3), for some of the lights."""
+        """Return these planes with others, (h, w, 3), for some of the lights."""
         return ReplacedPlanes(self, planes)
 
     def array(self) -> Floats:
-        """All of them, (n, h, w, 3): as much memory as that takes."""
+        """Return all planes, (n, h, w, 3): as much memory as that takes."""
         return np.ascontiguousarray(self.rows(0, self.size[0]))
 
 
@@ -145,14 +145,14 @@ class FilePlanes(RowPlanes):
         return self._parts[0].size
 
     def plane(self, i: int) -> Floats:
-        """That of light i, (h, w, 3)."""
+        """Return the plane of light i, (h, w, 3)."""
         height, width = self.size
         made = np.empty((height, width, 3), np.float32)
         self._read(i, 0, height, made.transpose(2, 0, 1))
         return made
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Some rows of all, (n, bottom - top, w, 3)."""
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self.size[0])
         # Channel by channel, as they are stored and as sums go over them.
         made = np.empty((self.count, 3, max(bottom - top, 0), self.size[1]), np.float32)
@@ -168,7 +168,7 @@ class FilePlanes(RowPlanes):
 
 
 class PickedPlanes(RowPlanes):
-    """Some pixels of other planes, as one row, that are read when they are asked for."""
+    """Planes of selected pixels of other planes, as a single row, read on request."""
 
     def __init__(self, whole: RowPlanes, where: Indices) -> None:
         self._whole, self._where = whole, where
@@ -184,19 +184,19 @@ class PickedPlanes(RowPlanes):
         return 1, len(self._where)
 
     def plane(self, i: int) -> Floats:
-        """That of light i, (1, p, 3)."""
+        """Return the plane of light i, (1, p, 3)."""
         return self._whole.plane(i).reshape(-1, 3)[self._where][None]
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """The one row of all, (n, 1, p, 3), if it is asked for."""
+        """Return the single row of all planes, (n, 1, p, 3), if it is asked for."""
         return self.pixels(slice(0, len(self._where)))[:, None][:, top:bottom]
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Some of the pixels, (n, p, 3)."""
+        """Return some of the pixels, (n, p, 3)."""
         return self._whole.pixels(self._where[where])
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Σ w_i Φ_i, (1, p, 3)."""
+        """Return Σ w_i Φ_i, (1, p, 3)."""
         return self._whole.mix(weights).reshape(-1, 3)[self._where][None]
 
 
@@ -217,11 +217,11 @@ class ReplacedPlanes(RowPlanes):
         return self._whole.size
 
     def plane(self, i: int) -> Floats:
-        """That of light i, (h, w, 3)."""
+        """Return the plane of light i, (h, w, 3)."""
         return self._planes[i] if i in self._planes else self._whole.plane(i)
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Some rows of all, (n, bottom - top, w, 3)."""
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
         made = self._whole.rows(top, bottom)
         for k, plane in self._planes.items():
             made[k] = plane[top:bottom]

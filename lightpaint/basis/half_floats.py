@@ -26,9 +26,7 @@ BRIGHTEST = 14
 
 @dataclass(frozen=True)
 class PlaneEncoding:
-    """How a plane is stored. kind: type of its numbers. scale: what they are to be multiplied by, a
-    power of two.
-    """
+    """The storage of a plane. kind: type of its numbers. scale: factor for them, a power of two."""
 
     kind: np.dtype[Any] = FLOAT
     scale: float = 1.0

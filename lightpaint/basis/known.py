@@ -1,4 +1,4 @@
-"""What is known of a scene from an earlier run, as long as nothing is another that it depends on.
+"""Facts about a scene from an earlier run, valid while everything they depend on is unchanged.
 
 Loading a scene takes seconds, of which a basis that is kept needs nothing but to be found: the
 scene's identity. So that is kept beside the basis, with what else a painter has to know, under all
@@ -49,7 +49,7 @@ OTHERS = ("mitsuba", "drjit")
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of a scene without loading it.
+    """Facts about a scene that are known without loading it.
 
     identity, sensor, size: by which its basis is kept. spp: samples that it asks for. path: as
     `Scene.path`. lights: as its basis has them. remarks: what was
@@ -66,7 +66,7 @@ class Known:
 
 
 def key_of(asking: Mapping[str, Any]) -> str:
-    """A name for all that is neither in a scene nor in its files.
+    """Return a key for everything that is neither in a scene nor in its files.
 
     asking: all that decides how it is loaded and on which film, as plain values.
     """
@@ -76,7 +76,7 @@ def key_of(asking: Mapping[str, Any]) -> str:
 
 
 def recall(key: str) -> Known | None:
-    """What is known of the scene that is asked for so, or None. key: as of `key_of`."""
+    """Return the known facts of a scene, or None. key: as in `key_of`."""
     if "mitsuba" in sys.modules:  # where somebody else may have told it to look for files
         return None
     with suppress(OSError, LightpaintError, LookupError, TypeError, ValueError):
@@ -145,7 +145,7 @@ def _is_as_it_was(places: Mapping[str, Any], texts: Mapping[str, str]) -> bool:
 
 
 def _stamp(path: Path) -> list[int] | None:
-    """What changes when a file does; None where there is none."""
+    """Return a value that changes when the file does; None if it does not exist."""
     try:
         its = path.stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -154,7 +154,7 @@ def _stamp(path: Path) -> list[int] | None:
 
 
 def _is_new(stamp: list[int] | None, began_s: float) -> bool:
-    """Whether a file may have been written since it was read, without that being seen."""
+    """Return True if a file may have been written since it was read, without a visible change."""
     return stamp is not None and max(stamp[1], stamp[2]) > 1e9 * (began_s - COARSE_S)
 
 
@@ -163,7 +163,7 @@ def _digest(path: Path) -> str:
 
 
 def _reads_more(path: Path) -> bool:
-    """Whether the XML at `path` has its parser look into more files or folders.
+    """Return True if the XML at `path` makes its parser read more files or folders.
 
     Raises ValueError for what is not read here, as in UTF-16.
     """
@@ -176,7 +176,7 @@ def _reads_more(path: Path) -> bool:
 
 @cache
 def _code() -> str:
-    """Which version it is of all that reads scenes, by its files."""
+    """Return the version of the code that reads scenes, from its files."""
     said = [__version__, sys.version, *(list(_files_of(name)) for name in OTHERS)]
     package = Path(__file__).parents[1]
     said += [list(_files_in(package / folder)) for folder in OURS]
@@ -190,7 +190,7 @@ def _files_of(package: str) -> Iterator[tuple[str, int, int]]:
 
 
 def _files_in(folder: Path) -> Iterator[tuple[str, int, int]]:
-    """Those of a folder, by name, size and time."""
+    """Return the files of a folder, by name, size and time."""
     for entry in sorted(os.scandir(folder), key=lambda entry: entry.path):
         if entry.is_file():
             its = entry.stat()

@@ -23,7 +23,7 @@ FEW_LIGHTS = 256
 
 
 class Planes(Protocol):
-    """One picture (h, w, 3) for each of n lights, float32 whatever is stored.
+    """The planes of n lights, (h, w, 3) each, float32 whatever is stored.
 
     What is returned is to look at only: it may be the very memory that the planes are kept in.
     """
@@ -37,35 +37,35 @@ class Planes(Protocol):
         """(height, width) in pixels."""
 
     def __iter__(self) -> Iterator[Floats]:
-        """The planes, (h, w, 3) each, one after the other."""
+        """Yield the planes, (h, w, 3) each."""
 
     def plane(self, i: int) -> Floats:
-        """That of light i, (h, w, 3)."""
+        """Return the plane of light i, (h, w, 3)."""
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Some rows of all, (n, bottom - top, w, 3)."""
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Some pixels of all, (n, p, 3), counted along the rows."""
+        """Return some pixels of all planes, (n, p, 3), counted along the rows."""
 
     def picked(self, where: slice | Indices) -> "Planes":
-        """The same pixels as planes of one row, (1, p, 3) each."""
+        """Return the same pixels as planes of a single row, (1, p, 3) each."""
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Σ w_i Φ_i, (h, w, 3). weights: (n, 3), one per light and channel."""
+        """Return Σ w_i Φ_i, (h, w, 3). weights: (n, 3), one per light and channel."""
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
-        """M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of all pixels, in one walk.
+        """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,) of all pixels, in one walk.
 
         weight: (h, w), (h, w, 1) or, where it differs between channels, (h, w, 3), >= 0. image: Ψ,
         (h, w, 3).
         """
 
     def replaced(self, planes: Mapping[int, Floats]) -> "Planes":
-        """These planes with others, (h, w, 3), for some of the lights."""
+        """Return these planes with others, (h, w, 3), for some of the lights."""
 
     def array(self) -> Floats:
-        """All of them, (n, h, w, 3): for people in Python, and for what is small."""
+        """Return all planes, (n, h, w, 3): for people in Python, and for what is small."""
 
 
 class PlanesBase:
@@ -82,11 +82,11 @@ class PlanesBase:
         raise NotImplementedError
 
     def plane(self, i: int) -> Floats:
-        """That of light i, (h, w, 3)."""
+        """Return the plane of light i, (h, w, 3)."""
         raise NotImplementedError
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Some pixels of all, (n, p, 3)."""
+        """Return some pixels of all planes, (n, p, 3)."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -97,7 +97,7 @@ class PlanesBase:
         return (self.plane(k) for k in range(self.count))
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
-        """M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels that count."""
+        """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels that count."""
         n, (height, width) = self.count, self.size
         # Pixels without weight contribute nothing and need not be read.
         apart = weight.shape[2:] == (3,)
@@ -138,34 +138,34 @@ class MemoryPlanes(PlanesBase):
         return self._images.shape[1], self._images.shape[2]
 
     def plane(self, i: int) -> Floats:
-        """That of light i, (h, w, 3)."""
+        """Return the plane of light i, (h, w, 3)."""
         return np.asarray(self._images[i])
 
     def rows(self, top: int, bottom: int) -> Floats:
-        """Some rows of all, (n, bottom - top, w, 3)."""
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
         return self._images[:, top:bottom]
 
     def pixels(self, where: slice | Indices) -> Floats:
-        """Some pixels of all, (n, p, 3)."""
+        """Return some pixels of all planes, (n, p, 3)."""
         return self._images.reshape(len(self._images), -1, 3)[:, where]
 
     def picked(self, where: slice | Indices) -> "MemoryPlanes":
-        """The same pixels as planes of one row."""
+        """Return the same pixels as planes of a single row."""
         return MemoryPlanes(self.pixels(where)[:, None])
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
-        """Σ w_i Φ_i, (h, w, 3)."""
+        """Return Σ w_i Φ_i, (h, w, 3)."""
         return mix(self._images, weights)
 
     def replaced(self, planes: Mapping[int, Floats]) -> "MemoryPlanes":
-        """These planes with others for some of the lights."""
+        """Return these planes with others for some of the lights."""
         images = self._images.copy()
         for k, plane in planes.items():
             images[k] = plane
         return MemoryPlanes(images)
 
     def array(self) -> Floats:
-        """All of them, (n, h, w, 3), which are not copied."""
+        """Return all planes, (n, h, w, 3), which are not copied."""
         return self._images
 
 
@@ -200,7 +200,7 @@ def run_of(pixels: Indices) -> slice | Indices:
 
 
 def mix(images: Floats, weights: Doubles) -> npt.NDArray[np.float32]:
-    """Σ w_i Φ_i in float32, without a copy of the images.
+    """Return Σ w_i Φ_i in float32, without a copy of the images.
 
     images: (n, h, w, 3) float32; weights: (n, 3), one per light and channel. Returns (h, w, 3).
     """

@@ -1,4 +1,4 @@
-"""One picture at two sizes: a pixel of the smaller image is a block of pixels of the larger.
+"""Images at two sizes: a pixel of the smaller one is a block of pixels of the larger.
 
 Blocks are squares that start at the top left corner. A remainder at the right and at the bottom,
 always narrower than a block, belongs to none. So the two sizes alone determine the blocks.

@@ -163,7 +163,7 @@ def error_text(error: Exception, *, at_length: bool = True) -> str:
 
 
 def lower_priority() -> None:
-    """Let this thread, and those that it starts, leave the processors to more urgent ones."""
+    """Make this thread, and those that it starts, leave the processors to more urgent ones."""
     if sys.platform == "linux":
         with suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, get_native_id(), NICENESS)

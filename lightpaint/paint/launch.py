@@ -99,7 +99,7 @@ def _serve_session(
 
 @contextmanager
 def low_latency() -> Iterator[None]:
-    """Let strokes wait for nothing but their own work, in a process that does nothing else.
+    """Make strokes wait for nothing but their own work, in a process that does nothing else.
 
     The garbage collector leaves alone what is imported by now, and a thread that holds the
     interpreter for long lets go of it ten times as soon.

@@ -1,4 +1,4 @@
-"""Which page has a session: one at a time, in whatever way pages are connected."""
+"""The owner of a session: a single page at a time, however pages are connected."""
 
 from collections.abc import Callable
 from operator import eq

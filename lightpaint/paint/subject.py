@@ -1,4 +1,4 @@
-"""What is painted: a scene, a saved basis, or light groups, and how its basis is obtained."""
+"""The subject of a painting: a scene, a saved basis, or light groups, and its basis."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,7 +26,7 @@ PREVIEW_SPP = (2, 8, 32, 128)
 
 @dataclass(frozen=True)
 class Subject:
-    """One view to be painted, alone or among others.
+    """A view to paint, alone or among others.
 
     source: the path that was given, for people and for commands. scene: on the film of the basis,
     or a lazy one; None without a renderer. basis: given already, as for light groups. settings,

@@ -1,4 +1,4 @@
-"""From what somebody names, or has in memory, to what is painted: checked before it is rendered."""
+"""Making subjects from what the user names, or has in memory; they are checked before rendering."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

@@ -68,7 +68,7 @@ RESULTS = (
 @keywords()
 @dataclass(frozen=True)
 class Look:
-    """One painting and its answer.
+    """A painting and its answer.
 
     Attributes:
         target: The painting, at the size of the basis. basis: The basis it was solved with.
@@ -103,12 +103,12 @@ class Look:
 
     @property
     def verdict(self) -> str:
-        """How close the lights come to the painting, in sentences."""
+        """Sentences on how close the lights come to the painting."""
         return verdict(self.solution, self.predicted, self.verification, seen=self.analysis.seen)
 
     @property
     def uncertainty(self) -> Uncertainty | None:
-        """How certain the lights are; None if the noise is unknown."""
+        """Uncertainty of the lights; None if the noise is unknown."""
         return self.analysis.uncertainty
 
     @property

@@ -102,7 +102,7 @@ class Scene(Shown):
 
     @property
     def identity(self) -> str:
-        """What makes two bases of this scene the same: `content`, and how emitters are tied."""
+        """Identity of the basis of this scene: `content`, and how emitters are tied."""
         # Of a scene whose emitters are all adjusted one by one it is the content alone.
         if all(x.member_names == (x.name,) and not x.is_fixed for x in self.lights):
             return self.content
@@ -122,7 +122,7 @@ class Scene(Shown):
     def with_lights(
         self, members: Mapping[str, Sequence[str]], fixed: Collection[str] = ()
     ) -> "Scene":
-        """This scene with its emitters tied to other lights.
+        """Return this scene with its emitters tied to other lights.
 
         members: name of a light → names of its emitters; fixed: lights that stay as they are.
         Raises SceneError unless every emitter of the scene, and no other, is named once.
@@ -153,11 +153,11 @@ class Scene(Shown):
         return height, width
 
     def light(self, name: str) -> Light:
-        """The light called `name`. Raises SceneError if there is none."""
+        """Return the light called `name`. Raises SceneError if there is none."""
         return light_named(name, self.lights, scene=str(self.path))
 
     def reduced(self, resolution: str) -> "Scene":
-        """This scene on a smaller film: each pixel is the mean of a square block of pixels.
+        """Return this scene on a smaller film: each pixel is the mean of a square block of pixels.
 
         resolution: `1/4`, or `320x180`. What makes no whole block at the right and at the bottom
         is left out. Raises SceneError, with sizes that would do, for sizes that no blocks have.
@@ -165,15 +165,15 @@ class Scene(Shown):
         return replace(self, film=reduced(self.film, reduction(self.film, resolution)))
 
     def camera(self, loaded: Any) -> Any:
-        """The sensor this scene is seen through, in what `load` returned."""
+        """Return the sensor of this scene, in what `load` returned."""
         return camera_named(loaded, self.sensor_names[self.sensor])
 
     def eye(self, loaded: Any) -> Any:
-        """Where that sensor stands, as an `mi.Point3f`."""
+        """Return the position of that sensor, as an `mi.Point3f`."""
         return self.camera(loaded).world_transform().translation()
 
     def lit_by_points(self, positions: Sequence[Position]) -> "Scene":
-        """This scene under point lights alone, one at each of `positions`, in their order.
+        """Return this scene under point lights alone, one at each of `positions`, in their order.
 
         Its own emitters stay where they are, black: what blocks or reflects light still does.
         They are the last light, which is fixed.
@@ -201,7 +201,7 @@ class Scene(Shown):
         )
 
     def only(self, names: Collection[str]) -> "Scene":
-        """This scene with the lights `names` alone.
+        """Return this scene with the lights `names` alone.
 
         The other emitters stay where they are, black and in no light, and are asked for no light:
         what blocks or reflects light still does. Raises SceneError for a light that is not there.
@@ -246,18 +246,18 @@ class Scene(Shown):
 
     @property
     def places(self) -> frozenset[Path]:
-        """Where its files are, and where another one would make it another scene."""
+        """Places of its files, and of files that would change the scene if they existed."""
         beside = self.lights_file or lights_file_beside(self.path)
         return frozenset({*self._parsed.places(), beside})
 
     def moved(self, old: Path, new: Path) -> "Scene":
-        """This scene, when the folder `old`, in which its XML lies, has been moved to `new`."""
+        """Return this scene after the folder `old`, which contains its XML, has moved to `new`."""
         parsed = self._parsed.moved(old, new)
         return replace(self, path=parsed.path, files=parsed.files, _parsed=parsed)
 
     @MITSUBA.taken()
     def load(self, emission: Mapping[str, RGB] | None = None) -> Any:
-        """The `mi.Scene`, its lights set to `emission` (those not named stay as they are).
+        """Load the `mi.Scene`, its lights set to `emission` (those not named stay as they are).
 
         The film is replaced by a box-filtered RGB float32 one of the same size, for basis
         and verification alike. A light set to black is never sampled. Drop the scene, and
@@ -271,7 +271,7 @@ class Scene(Shown):
     def while_loaded(
         self, work: Callable[[Any], _Made], emission: Mapping[str, RGB] | None = None
     ) -> _Made:
-        """What `work` makes of what `load` returns, which is let go of afterwards."""
+        """Return the result of `work` on the loaded scene, which is released afterwards."""
         loaded = self.load(emission)
         try:
             with render_errors(self.path):
@@ -282,16 +282,16 @@ class Scene(Shown):
 
     @cached_property
     def shape_names(self) -> tuple[str, ...]:
-        """What the shapes are called, in the order of a loaded scene's."""
+        """Names of the shapes, in the order of a loaded scene's."""
         return shape_names(self._parsed)
 
     @property
     def replaced_integrators(self) -> tuple[tuple[Path, int], ...]:
-        """Where those stand that `instead` replaces: file, and byte offset of the element."""
+        """Integrators that `instead` replaces: file, and byte offset of the element."""
         return tuple((self.files[file], offset) for file, offset in self._parsed.replaced)
 
     def emitted_image(self, emitter: Emitter) -> Floats:
-        """The image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
+        """Return the image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
         import mitsuba as mi
 
         assert emitter.kind is not None
@@ -382,7 +382,7 @@ def load_scene(
 
 
 def _look_at(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
-    """What only the loaded scene tells, and the parsed one, as fields of a `Scene`."""
+    """Return the facts that only the loaded and the parsed scene tell, as fields of a `Scene`."""
     loaded, hasher = parsed.instantiate({}), SceneHasher(parsed)
     camera = camera_named(loaded, parsed.sensor_names[sensor])
     emitters, film = find_emitters(parsed, loaded, hasher), Film.of(camera, sensor)

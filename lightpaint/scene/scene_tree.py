@@ -89,7 +89,9 @@ class ParsedScene:
     def _replace_integrator(
         self, instead: IntegratorChoice | None
     ) -> tuple[IntegratorChoice | None, tuple[tuple[int, int], ...]]:
-        """The one that is put in, and where what it replaces stands: index of file, byte offset."""
+        """Replace the integrator; return it, and the places of the replaced: file index, byte
+        offset.
+        """
         if instead is None:
             return None, ()
         nodes = [self.state.nodes[k] for k in integrator_nodes(self.state)]
@@ -101,7 +103,7 @@ class ParsedScene:
         return [k for k, node in enumerate(self.state.nodes) if node.type == kind]
 
     def children_of(self, parent: int, kind: Any = None) -> list[int]:
-        """Nodes that stand in that one, or are referred to by it; kind: only those of it."""
+        """Return the nodes inside a node, or referred to by it. kind: only those of this kind."""
         import mitsuba as mi
 
         props = self.state.nodes[parent].props
@@ -110,7 +112,7 @@ class ParsedScene:
         return [c for c in children if kind is None or self.state.nodes[c].type == kind]
 
     def _name_lights(self) -> dict[int, str]:
-        """Names by node: emitter id, else the id of its shape, else `<plugin>_<k>`."""
+        """Return names by node: emitter id, else the id of its shape, else `<plugin>_<k>`."""
         names: dict[int, str] = {}
         taken: set[str] = set()
         count: dict[str, int] = {}
@@ -159,7 +161,7 @@ class ParsedScene:
         return scene
 
     def darkened(self, dark: Mapping[int, EmitterSetting]) -> "ParsedScene":
-        """This scene with the settings `dark` made, by the nodes of emitters."""
+        """Return this scene with the settings `dark` made, by the nodes of emitters."""
         import mitsuba as mi
 
         other = copy(self)
@@ -171,7 +173,7 @@ class ParsedScene:
     def lit_by_points(
         self, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
     ) -> "ParsedScene":
-        """This scene with point lights of intensity 1 added, and the settings `dark` made.
+        """Return this scene with point lights of intensity 1 added, and the settings `dark` made.
 
         positions: by the names of the new lights, which no other has. The nodes of these come
         last, in that order.
@@ -194,7 +196,7 @@ class ParsedScene:
         return other
 
     def moved(self, old: Path, new: Path) -> "ParsedScene":
-        """This scene, all of whose files in the folder `old` are about to be moved to `new`."""
+        """Return this scene, whose files in the folder `old` are about to move to `new`."""
         import mitsuba as mi
 
         other = copy(self)
@@ -207,7 +209,7 @@ class ParsedScene:
         return other
 
     def image_file(self, node: int, parameter: str) -> tuple[Path, bool]:
-        """(file, whether its values are linear as they stand) of the image that emitter emits."""
+        """Return the file of an emitter's image, and whether its values are linear as stored."""
         texture = child_named(self.state, node, parameter)
         props = self.state.nodes[node if texture is None else texture].props
         if "filename" not in props:
@@ -216,7 +218,7 @@ class ParsedScene:
         return path, bool(props.get("raw", False))
 
     def integrator(self) -> Integrator:
-        """What renders it."""
+        """Return the scene's integrator."""
         return read_integrator(self.state, self.path)
 
     def has_media(self) -> bool:
@@ -241,14 +243,14 @@ class ParsedScene:
         return digest.hexdigest()[:32]
 
     def assets(self) -> Iterator[Path]:
-        """Files that plugins read: meshes, textures, tables."""
+        """Return files that plugins read: meshes, textures, tables."""
         for name in self._asset_names():
             path = Path(str(self.resolver.resolve(name)))
             if path.is_file():
                 yield path
 
     def _asset_names(self) -> Iterator[str]:
-        """As they stand in the scene."""
+        """Return the names of assets as in the scene."""
         import mitsuba as mi
 
         for node in self.state.nodes:
@@ -257,7 +259,7 @@ class ParsedScene:
                     yield str(node.props[key])
 
     def places(self) -> set[Path]:
-        """Everywhere that its files are, or would be found if there were any.
+        """Return the places of its files, and of files that would be found if they existed.
 
         More than Mitsuba looks at: wherever it looks for one file it may look for each of them.
         """
@@ -270,7 +272,7 @@ class ParsedScene:
 
     @contextmanager
     def _resolving(self) -> Iterator[None]:
-        """Let relative paths be found beside the scene's files meanwhile."""
+        """Make relative paths resolve beside the scene's files within the block."""
         import mitsuba as mi
 
         before = mi.file_resolver()
@@ -282,7 +284,7 @@ class ParsedScene:
 
 
 def moved(path: Path, old: Path, new: Path) -> Path:
-    """Where `path` leads when the folder `old` has been moved to `new`, by a way that lasts."""
+    """Return the path of `path` after the folder `old` has moved to `new`, by a lasting route."""
     if ".." not in path.parts and path.is_relative_to(old):
         return new / path.relative_to(old)
     real, gone = Path(os.path.realpath(path)), Path(os.path.realpath(old))

@@ -1,4 +1,4 @@
-"""Whether light groups are all of the picture: their sum, held against the beauty."""
+"""Comparison of the sum of light groups with the beauty: do they make up the whole picture?"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ def spoken_sum(
     exceeding: float,
     name: str,
 ) -> tuple[str, bool]:
-    """A sentence on the sum of the groups, and whether what they lack is more than rounding.
+    """Return a sentence on the sum of the groups, and whether more than rounding is missing.
 
     name: of the light that is what they lack. All of it is in the primaries of the file: in
     others, light of a wide gamut is negative.
@@ -59,7 +59,7 @@ def spoken_sum(
 
 
 def shares(rest: Floats, whole: Floats) -> tuple[float, float]:
-    """Luminance that is missing, and that is too much, over that of the beauty."""
+    """Return the luminance that is missing, and that is too much, relative to the beauty."""
     total = float((np.abs(whole) @ LUMINANCE).sum())
     if total == 0:
         return 0.0, float(bool(rest.any()))
@@ -68,7 +68,7 @@ def shares(rest: Floats, whole: Floats) -> tuple[float, float]:
 
 
 def rounding(layers: Sequence[RenderLayer]) -> Floats:
-    """By how much the sum of the layers may be off its true value for rounding, (h, w, 3)."""
+    """Return the largest rounding error of the sum of the layers, (h, w, 3)."""
     bound: Floats = np.zeros(layers[0].image.shape)
     for layer in layers:
         bound += _rounded(layer.image, is_half=layer.is_half)
@@ -93,7 +93,7 @@ class LayerSum:
 
     @staticmethod
     def of(layers: Sequence[RenderLayer]) -> "LayerSum":
-        """The sum of at least one layer."""
+        """Return the sum of at least one layer."""
         total: Floats = np.zeros(layers[0].image.shape)
         with np.errstate(invalid="ignore"):
             for layer in layers:
@@ -101,22 +101,22 @@ class LayerSum:
         return LayerSum(total, rounding(layers))
 
     def and_also(self, layer: RenderLayer) -> "LayerSum":
-        """With one more."""
+        """Return the sum with one more layer."""
         with np.errstate(invalid="ignore"):
             total = self.total + layer.image
         return LayerSum(total, self.bound + rounding([layer]))
 
     def without(self, layer: RenderLayer) -> "LayerSum":
-        """Less one that is among what was added up."""
+        """Return the sum without one of its layers."""
         with np.errstate(invalid="ignore"):
             return LayerSum(self.total - layer.image, self.bound)
 
     def lacks(self, beauty: RenderLayer) -> float:
-        """Σ |beauty − total|, where both are finite."""
+        """Return Σ |beauty − total|, where both are finite."""
         return float(_off(beauty.image, self.total).sum())
 
     def is_of(self, beauty: RenderLayer, *, less_itself: bool = False) -> bool:
-        """Whether the sum is just that picture, which then is not black.
+        """Return True if the sum is just that picture, and the picture is not black.
 
         less_itself: whether the picture is among what was added up, and is to be taken out again.
         """
@@ -131,7 +131,7 @@ class LayerSum:
         )
 
     def _excess(self, beauty: RenderLayer, where: tuple[slice, ...], *, less_itself: bool) -> float:
-        """By how much more they are apart than rounding makes them, summed over these pixels."""
+        """Return their difference beyond rounding, summed over these pixels."""
         image, bound = beauty.image[where], self.bound[where]
         if less_itself:
             # x − (total − x); the bound is that of the same layers.
@@ -143,7 +143,7 @@ class LayerSum:
 
 
 def _off(picture: Floats, total: Floats) -> Floats:
-    """|picture − total|, (h, w, 3) float64, 0 where one is not finite."""
+    """Return |picture − total|, (h, w, 3) float64, 0 if either is not finite."""
     with np.errstate(invalid="ignore"):
         return np.asarray(np.nan_to_num(np.abs(picture - total), nan=0, posinf=0, neginf=0))
 
@@ -151,7 +151,7 @@ def _off(picture: Floats, total: Floats) -> Floats:
 def beauty_by_sum(
     others: Sequence[RenderLayer], lights: Sequence[RenderLayer]
 ) -> RenderLayer | None:
-    """The layer that the lights add up to, where it has a name that nobody knows."""
+    """Return the layer of unknown name that is the sum of the lights."""
     if not others or not lights:
         return None
     added = LayerSum.of(lights)
@@ -159,7 +159,7 @@ def beauty_by_sum(
 
 
 def beauty_among(layers: Sequence[RenderLayer]) -> RenderLayer | None:
-    """The one of the layers that the others add up to."""
+    """Return the layer that is the sum of the others."""
     added = LayerSum.of(layers)
     return next((layer for layer in layers if added.is_of(layer, less_itself=True)), None)
 
@@ -167,7 +167,7 @@ def beauty_among(layers: Sequence[RenderLayer]) -> RenderLayer | None:
 def stranger_among(
     layers: Sequence[RenderLayer], beauty: RenderLayer | None
 ) -> tuple[RenderLayer, RenderLayer] | None:
-    """The one layer without which the others add up to the picture, and that picture.
+    """Return the layer without which the others add up to the picture, and that picture.
 
     beauty: the picture; without one it is sought among the layers. None where all of them are
     needed, where no single one is in the way, and where they are too many to try.
@@ -188,7 +188,7 @@ def stranger_among(
 
 
 def _strangers(layers: Sequence[RenderLayer], beauty: RenderLayer | None) -> list[int]:
-    """Places of those without which the others may add up to the picture."""
+    """Return indices of layers without which the others may add up to the picture."""
     added = LayerSum.of(layers)
     found = []
     for k, layer in enumerate(layers):
@@ -207,5 +207,5 @@ def _coarse(layer: RenderLayer) -> RenderLayer:
 
 
 def spoken_share(share: float) -> str:
-    """`0.4 %`, `25 %`."""
+    """Return a share in words: `0.4 %`, `25 %`."""
     return f"{100 * share:.2g} %" if share < 0.0995 else f"{100 * share:.0f} %"

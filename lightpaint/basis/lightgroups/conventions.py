@@ -1,4 +1,4 @@
-"""How renderers name the layers of their light groups, and the picture that these add up to."""
+"""Naming conventions of renderers, for light groups and for the picture that they add up to."""
 
 import re
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ JOINTS = " ._-"
 
 @dataclass(frozen=True)
 class Convention:
-    """How one family of renderers names its light groups.
+    """The naming convention of a family of renderers.
 
     layer: fits the whole name of a layer; its group `name` is the light, `view` the view layer,
     `prefix` what tells apart lights of one name.
@@ -77,12 +77,12 @@ CONVENTIONS = (
 
 
 def is_known(name: str) -> bool:
-    """Whether a known renderer calls a light group so."""
+    """Return True if a known renderer gives a light group this name."""
     return any(convention.layer.fullmatch(name) for convention in CONVENTIONS)
 
 
 def beauty_among(names: Iterable[str], *, first: str = "") -> str | None:
-    """The one of `names` that is the whole picture: `first`, else by BEAUTIES; None if none is."""
+    """Return the name of the whole picture: `first`, else one of BEAUTIES; None if none is."""
     by_folded: dict[str, str] = {}
     for name in names:
         by_folded.setdefault(name.casefold(), name)

@@ -1,4 +1,4 @@
-"""Which files of a folder may hold light groups: not hidden ones, not paintings, not results.
+"""The files of a folder that may hold light groups: not hidden ones, paintings or results.
 
 A painting and what lightpaint has made often lie beside a render. Either would be one more light,
 and one that meets the painting best. A file is left out only for what is certain, and never
@@ -21,7 +21,7 @@ MAX_FILES = 1000
 
 
 def is_light_groups(path: Path) -> bool:
-    """Whether `path` is a folder with an EXR, or an EXR that is no basis of lightpaint's own."""
+    """Return True for a folder with an EXR, or an EXR that is not lightpaint's own basis."""
     path = Path(path)
     if path.is_dir():
         return bool(_named_exr(_visible(path)))
@@ -32,7 +32,7 @@ def is_light_groups(path: Path) -> bool:
 
 
 def is_exr(path: Path) -> bool:
-    """Whether `path` is an OpenEXR file by how it begins, whatever its name. May raise ImageError.
+    """Return True if `path` begins like OpenEXR, whatever its name. May raise ImageError.
 
     What is no file is none.
     """
@@ -40,12 +40,12 @@ def is_exr(path: Path) -> bool:
 
 
 def is_own_basis(path: Path) -> bool:
-    """Whether an EXR is a basis of lightpaint's own. Raises ImageError if it cannot be read."""
+    """Return True if an EXR is lightpaint's own basis. Raises ImageError if it is unreadable."""
     return any(FORMAT_KEY in header for header in read_headers(path)[0])
 
 
 def files_in(folder: Path, leave_out: Iterable[str | Path] = ()) -> tuple[list[Path], list[str]]:
-    """The files of a folder that may hold light groups, by name, and a sentence on the others.
+    """Return files of a folder that may hold light groups, by name, and a sentence on the others.
 
     leave_out: files that are none, like the painting. Raises BasisError if none is left, if there
     are too many, and if the folder cannot be looked into.
@@ -69,7 +69,7 @@ def files_in(folder: Path, leave_out: Iterable[str | Path] = ()) -> tuple[list[P
 
 
 def _visible(folder: Path) -> list[Path]:
-    """Files that somebody has put there: systems keep notes of their own in hidden ones."""
+    """Return files that are not hidden: systems keep notes of their own in hidden ones."""
     try:
         return sorted(f for f in folder.iterdir() if not f.name.startswith(".") and f.is_file())
     except OSError as error:
@@ -81,7 +81,7 @@ def _named_exr(files: Iterable[Path]) -> list[Path]:
 
 
 def _is_readable(file: Path) -> bool:
-    """Whether a file of another name is an EXR."""
+    """Return True if a file of another suffix is an EXR."""
     try:
         return is_exr(file)
     except ImageError:
@@ -89,7 +89,7 @@ def _is_readable(file: Path) -> bool:
 
 
 def _why_no_light(file: Path, others: Sequence[Path]) -> str:
-    """Why a file is no render of a light, in few words; "" where nothing says so."""
+    """Return why a file is not the render of a light, in few words; "" if it may be one."""
     if any(_is_same(file, other) for other in others):
         return "painting or mask"
     try:
@@ -114,7 +114,7 @@ def _is_same(file: Path, other: Path) -> bool:
 
 
 def _spoken(why: dict[Path, str]) -> str:
-    """`a.exr, b.exr (made by lightpaint); c.exr (painting or mask)`"""
+    """Return files with reasons: `a.exr, b.exr (made by lightpaint); c.exr (painting or mask)`."""
     told = []
     for reason in dict.fromkeys(why.values()):
         names = [file.name for file, its in why.items() if its == reason]

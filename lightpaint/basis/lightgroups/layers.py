@@ -48,11 +48,11 @@ class RenderLayer:
 
     @property
     def is_half(self) -> bool:
-        """Whether the file has it in float16."""
+        """True if the file has it in float16."""
         return bool(self.image.dtype == np.float16)
 
     def in_rec709(self, image: Floats) -> Floats:
-        """An image of these primaries, (h, w, 3), as float32 in linear Rec.709."""
+        """Return an image of these primaries, (h, w, 3), as float32 in linear Rec.709."""
         if self.primaries is None:
             return image.astype(np.float32)
         return converted(image, to_rec709(self.primaries))
@@ -66,7 +66,7 @@ class RenderLayer:
 def read_layers(
     path: Path, *, leave_out: Iterable[str | Path] = ()
 ) -> tuple[list[RenderLayer], list[str]]:
-    """The RGB layers of the file or of the files in the folder at `path`, in their order.
+    """Return the RGB layers of the file, or of the folder's files, at `path`, in their order.
 
     In a folder a file of plain R, G, B is a layer of the file's name, without what all of these
     names share; `leave_out` and what else cannot be a light (folder.py) is passed by, which the
@@ -104,7 +104,7 @@ def read_layers(
 
 
 def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
-    """Of the files of a folder; one alone may have any layers and no name of its own."""
+    """Return the layers of a folder's files; a single file may have any layers."""
     if len(files) == 1:
         return _of_file(files[0])
     read = {file: _of_file(file) for file in files}
@@ -148,7 +148,7 @@ def _of_file(path: Path) -> list[RenderLayer]:
 
 
 def _primaries(path: Path, part: ExrPart) -> tuple[float, ...] | None:
-    """Those that the part declares, unless they are Rec.709's. Raises ImageError if unknown."""
+    """Return the declared primaries, None for Rec.709's. Raises ImageError if unknown."""
     try:
         return primaries_of(part)
     except ImageError as error:
@@ -156,7 +156,7 @@ def _primaries(path: Path, part: ExrPart) -> tuple[float, ...] | None:
 
 
 def _rgb(path: Path, pixels: Mapping[str, Floats], channels: tuple[str, str, str]) -> Floats:
-    """(h, w, 3), float16 where all are. Raises ImageError if they differ in size."""
+    """Return (h, w, 3), float16 if all channels are. Raises ImageError if they differ in size."""
     planes = [pixels[name] for name in channels]
     if len({plane.shape for plane in planes}) > 1:
         raise ImageError(f"{path}: channels {some_names(channels)} differ in size: export it again")

@@ -1,4 +1,4 @@
-"""Which layers of a file are its light groups, and which is the whole picture.
+"""The choice of a file's layers that are light groups, and of the whole picture.
 
 Works on names alone. A layer is known by its own name, `ViewLayer.Combined_key`. A pattern also
 finds it by the name of its part or file.
@@ -25,7 +25,7 @@ FILES = "one file per light"
 
 @dataclass(frozen=True)
 class Choice:
-    """Which layers are what.
+    """The roles of layers.
 
     lights: name of the light → name of its layer. beside: the same, of layers that may or may
     not be part of the sum. whole: the same, of the group whose name says that it is all of them,
@@ -72,14 +72,14 @@ def choose_layers(
 
 
 def choose_files(layers: Iterable[str]) -> Choice:
-    """Of files with one layer each, that no convention knows: all but the beauty are lights."""
+    """Choose among files with a single layer each: all but the beauty are lights."""
     names = list(layers)
     beauty = beauty_among(names)
     return Choice(FILES, {n: n for n in names if n != beauty}, beauty=beauty)
 
 
 def short_names(stems: Sequence[str]) -> dict[str, str]:
-    """Names without what they all begin or end with, up to a joint: `shot_key_v1` → `key`."""
+    """Return names without their common start and end, up to a joint: `shot_key_v1` → `key`."""
     if len(stems) < 2:
         return {stem: stem for stem in stems}
     head = _shared_head(stems)
@@ -93,7 +93,7 @@ def short_names(stems: Sequence[str]) -> dict[str, str]:
 
 
 def _shared_head(names: Sequence[str]) -> str:
-    """What all of them begin with."""
+    """Return the common start of all names."""
     low, high = min(names), max(names)
     same = next((k for k, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), len(low))
     return low[:same]
@@ -205,7 +205,7 @@ def _named(found: Sequence[tuple[str, str]], where: str) -> dict[str, str]:
 
 
 def _example(layers: Iterable[str]) -> str:
-    """A pattern that fits several of the layers, if there is one that does."""
+    """Return a pattern that fits several of the layers, if there is one."""
     names = [name for name in layers if beauty_among([name]) is None]
     heads: dict[str, int] = {}
     for name in names:

@@ -38,7 +38,7 @@ REST = "rest"
 @keywords()
 @dataclass(frozen=True)
 class LightGroups:
-    """What `read_light_groups` found.
+    """The light groups that `read_light_groups` returns.
 
     Attributes:
         basis: A light for each group, and `rest` last if something is missing.
@@ -74,18 +74,18 @@ class LightGroups:
 
     @property
     def has_rest(self) -> bool:
-        """Whether the last light of the basis is what the groups lack."""
+        """True if the last light of the basis is what the groups lack."""
         return len(self.basis.lights) > len(self.layers)
 
     @property
     def files(self) -> list[Path]:
-        """That they were read from."""
+        """Files that they were read from."""
         read = self.layers if self.beauty is None else (*self.layers, self.beauty)
         return list(dict.fromkeys(layer.file for layer in read))
 
     @property
     def is_half(self) -> bool:
-        """Whether the file holds no more than float16."""
+        """True if the file holds no more than float16."""
         return all(layer.is_half for layer in self.layers)
 
 
@@ -132,7 +132,10 @@ def _check_light(
 
 
 def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
-    """told: sentences that come before those of the roles."""
+    """Return the light groups in these layers.
+
+    told: sentences that come before those of the roles.
+    """
     names, lights, beauty = list(roles.lights), list(roles.lights.values()), roles.beauty
     if not lights:
         raise BasisError(f"{path} has no light group beside its beauty {beauty and beauty.name!r}")
@@ -172,7 +175,7 @@ def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
 
 @dataclass(frozen=True)
 class _Missing:
-    """What the groups lack of the beauty.
+    """The difference between the groups and the beauty.
 
     rest: (h, w, 3), None if it is no more than rounding. share, exceeding: of the beauty, None
     without one. told: that in words.
@@ -200,7 +203,7 @@ def _what_is_missing(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
 
 
 def _spoken_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
-    """Says so where the file holds nothing of a light, and what may be its own."""
+    """Return a sentence for a light that is black in the file, with its likely layer."""
     black = [name for name, layer in lights.items() if not layer.image.any()]
     if not black:
         return []
@@ -214,7 +217,7 @@ def _spoken_black(lights: Mapping[str, RenderLayer], missing: float | None) -> l
 
 
 def _basis(path: Path, roles: Roles, rest: Floats | None, holes: npt.NDArray[np.bool_]) -> Basis:
-    """In linear Rec.709; `rest`, if there is one, as a light that stays as it is."""
+    """Return the basis in linear Rec.709; `rest`, if there is one, is a light that is kept."""
     lights = roles.lights
     made = [_light(name, layer.name, "light group") for name, layer in lights.items()]
     height, width = holes.shape
@@ -242,7 +245,7 @@ def _light(name: str, layer: str, plugin: str, *, is_fixed: bool = False) -> Bas
 
 
 def _origin(path: Path, roles: Roles, images: Floats, names: Sequence[str]) -> Origin:
-    """Of samples nothing is known: no half has any, and so there are no error bars."""
+    """Return an origin without samples: their number is unknown, and so are error bars."""
     digest = hashlib.sha256(repr((names, images.shape)).encode())
     for image in images:
         digest.update(np.ascontiguousarray(image).data)

@@ -1,4 +1,4 @@
-"""What each layer is: a light, the whole picture, or neither. Names propose, the sum decides."""
+"""The role of each layer: a light, the whole picture, or neither. Names propose; sums decide."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -64,7 +64,7 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
 def _parted(
     lights: dict[str, RenderLayer], beauty: RenderLayer | None
 ) -> tuple[RenderLayer | None, list[str]]:
-    """Takes out of `lights`, files of any name, what is none; the picture, and what is to be said.
+    """Remove from `lights` what is not one; return the picture, and sentences on this.
 
     One may be the picture under a name of its own; and one that the others have no need of to add
     up to it is no light, whatever it shows.
@@ -88,13 +88,13 @@ def _drop(lights: dict[str, RenderLayer], layer: RenderLayer | None) -> None:
 
 
 def _is_light(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
-    """Whether a layer whose name says that it is all lights is one of them after all."""
+    """Return True if a layer that is named like the whole picture is a light after all."""
     alone = LayerSum.of([layer])
     return LayerSum.of(lights).and_also(layer).lacks(beauty) < alone.lacks(beauty)
 
 
 def _helps(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
-    """Whether the lights, if there are any, come closer to the beauty with that layer."""
+    """Return True if the lights, if there are any, come closer to the beauty with that layer."""
     if not lights:
         return True
     added = LayerSum.of(lights)

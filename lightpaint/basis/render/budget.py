@@ -1,4 +1,4 @@
-"""How long a basis is rendered, a number of samples or a time, and keeping it meanwhile."""
+"""The budget of a basis, a number of samples or a time, and saving it meanwhile."""
 
 import math
 import time
@@ -20,7 +20,7 @@ SHORTER = 4
 
 @dataclass(frozen=True)
 class Budget:
-    """What a basis may cost: `spp` samples per pixel in all, or `time_s` seconds from now.
+    """The budget of a basis: `spp` samples per pixel in all, or `time_s` seconds from now.
 
     A time is wall time from the first pass on. Compiling kernels counts, keeping what is done,
     and loading the scene where that is done for every light.
@@ -34,7 +34,7 @@ class Budget:
             raise SceneError(f"{self.time_s} seconds are no time to render: ask for more than 0")
 
     def met_by(self, spp: int) -> bool:
-        """Whether that many samples per pixel are enough. A time always asks for more."""
+        """Return True if that many samples per pixel are enough; a time always asks for more."""
         return self.time_s is None and spp >= self.spp
 
 
@@ -62,7 +62,7 @@ class Clock:
 def passes(
     pixels: int, budget: Budget, done: Sequence[int], progress: Progress
 ) -> Iterator[tuple[int, int]]:
-    """(half 0 or 1, samples per pixel) of one pass after another until `budget` is spent.
+    """Yield (half 0 or 1, samples per pixel) of one pass after another until `budget` is spent.
 
     done: samples per pixel of each half so far; the caller brings it up to date before the
     next pass. A time ends with the first pair of passes after it, the halves then equal.
@@ -84,7 +84,7 @@ def passes(
 def next_pair(
     pixels: int, done: tuple[int, int], pairs: int = 1, *, step: int = 1
 ) -> list[tuple[int, int]]:
-    """The passes that bring both halves `pairs` short passes beyond the fuller one of them.
+    """Return the passes that bring both halves `pairs` short passes beyond the fuller one.
 
     step: samples of a pixel come in multiples of this.
     """

@@ -46,7 +46,7 @@ class KeptPlane:
 
     @property
     def counts(self) -> Counts:
-        """How many samples it has."""
+        """Number of its samples."""
         return counts_of(self.basis)[self.index]
 
 

@@ -1,4 +1,4 @@
-"""Which emitter to sample from where, learned from earlier passes.
+"""Learned probabilities of sampling each emitter from each place.
 
 A path tracer that chooses emitters at random samples most of them in vain: a spot whose cone is
 elsewhere, a window behind a wall. Space is divided into cells, and each cell remembers what

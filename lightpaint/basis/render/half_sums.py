@@ -1,4 +1,4 @@
-"""What two halves of the samples have come to, kept on the device that renders.
+"""The sums of two halves of the samples, on the device that renders.
 
 Import it once a variant is set and not a scalar one: its arrays do not exist before.
 """
@@ -13,7 +13,7 @@ from lightpaint.basis.render.sums import halves_of, mean_and_half_difference
 
 
 class HalfSums:
-    """What two independent halves of the samples have come to, undivided, on the device.
+    """The undivided sums of two independent halves of the samples, on the device.
 
     planes: per half, n·h·w·3 values laid out (n, h, w, 3). seen: h·w counts of camera rays
     that saw an emitter. spp, passes: per half, samples per pixel and passes so far.
@@ -28,7 +28,7 @@ class HalfSums:
 
     @classmethod
     def of(cls, basis: Basis) -> "HalfSums":
-        """The sums that made `basis`, up to round-off."""
+        """Return the sums that made `basis`, up to round-off."""
         sums = cls(len(basis.lights), basis.size)
         sums.spp, sums.passes = list(basis.origin.halves), list(basis.origin.passes)
         sums.planes = [mi.Float(half.ravel()) for half in halves_of(basis)]
@@ -36,7 +36,7 @@ class HalfSums:
         return sums
 
     def mean_and_half_difference(self, *, is_last: bool) -> tuple[Floats, Floats]:
-        """Of all samples, and between the halves, as arrays of `shape`.
+        """Return the mean of all samples, and half the halves' difference, as arrays of `shape`.
 
         is_last: the sums are given up meanwhile, which saves as much memory again.
         """
@@ -48,5 +48,5 @@ class HalfSums:
         return mean_and_half_difference(halves, self.spp)
 
     def emitters_seen(self) -> Bools:
-        """(h, w), pixels in which any camera ray saw an emitter."""
+        """Return (h, w), pixels in which any camera ray saw an emitter."""
         return np.array(self.seen).reshape(self.shape[1:3]) > 0

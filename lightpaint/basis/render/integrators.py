@@ -1,4 +1,4 @@
-"""Which of Mitsuba's integrators the one pass stands for, and what it has to know of them.
+"""The integrators of Mitsuba that the one-pass renderer replaces, and their parameters.
 
 It traces the paths of `path`. Others estimate the same picture from other samples: then they have
 the same basis, but for noise.
@@ -18,7 +18,7 @@ HIDING_OTHERWISE = ("volpath", "prb_projective", "direct_projective")
 
 
 def why_not_one_pass(scene: Scene) -> str | None:
-    """What keeps `scene` from the one-pass basis, in a few words; None if nothing does."""
+    """Return why `scene` cannot use the one-pass renderer, in few words; None if it can."""
     variant = use_variant()
     if not variant.is_jit:
         return f"the variant is {variant.variant}"
@@ -39,7 +39,7 @@ def why_not_one_pass(scene: Scene) -> str | None:
 
 
 def remark_on_separate_renders(scene: Scene) -> str | None:
-    """What `scene` costs for want of one pass, and what to do; None if it costs nothing."""
+    """Return a remark on the cost of separate renders; None if there is none."""
     count = len(scene.lights)
     if (reason := why_not_one_pass(scene)) is None or count == 1:
         return None
@@ -54,12 +54,12 @@ def remark_on_separate_renders(scene: Scene) -> str | None:
 
 
 def depth_limit(integrator: Integrator) -> int:
-    """Longest path in vertices behind the camera. Mitsuba's −1 means none."""
+    """Return the longest path in vertices after the camera. Mitsuba's −1 means no limit."""
     return 2 if integrator.plugin in DIRECT else integrator.max_depth % 2**32
 
 
 def needs_a_bounce(scene: Scene) -> bool:
-    """Whether a path is black that met nothing but surfaces which let it pass.
+    """Return True if a path is black that met only surfaces which let it pass.
 
     `path` counts it as one that met nothing, and what it has gathered on masks as nothing,
     wherever no environment is to be seen behind.

@@ -40,7 +40,7 @@ def obtain_basis(
     render: Render = render_basis,
     report_reuse: ReuseReport = lambda count, of: None,
 ) -> Basis:
-    """The basis of `scene`: planes that earlier runs kept, with the samples that are missing.
+    """Return the basis of `scene`: cached planes, and missing samples rendered.
 
     A plane serves every scene of which it has the identity (`Scene.light_identities`): of one in
     which a lamp was moved, that lamp alone is rendered. Its samples follow the camera paths that

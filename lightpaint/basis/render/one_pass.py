@@ -50,7 +50,7 @@ class Tracer:
         self.streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(3)]
 
     def rehearse(self, spp: int) -> None:
-        """A pass that counts for what it learns alone: it is the noisiest, knowing nothing."""
+        """Render a pass only to learn from it: without guidance it is the noisiest."""
         nowhere = HalfSums(len(self.scene.lights), self.scene.size)
         self._trace(nowhere.planes[0], nowhere.seen, spp, Guided(self.streams[2], 0, self.guide))
 
@@ -71,7 +71,8 @@ class Tracer:
         sums.passes[half] += 1
 
     def part(self, half: int, rows: range, first: int, spp: int) -> tuple[Floats, Floats]:
-        """The sums of some samples of some rows, (n, rows, w, 3), and rays that saw an emitter.
+        """Return the sums of some samples of some rows, (n, rows, w, 3), and rays that saw an
+        emitter.
 
         first: samples of a pixel of that half that come before.
         """
@@ -84,7 +85,7 @@ class Tracer:
         return np.array(planes).reshape(n, *shape, 3), np.array(seen).reshape(shape)
 
     def close(self) -> None:
-        """Let go of the scene and all that refers to it."""
+        """Release the scene and all that refers to it."""
         del self.loaded, self.light_of, self.guide
 
     def _trace(
@@ -116,7 +117,7 @@ class Tracer:
 
 
 def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
-    """UInt32 array that maps the Dr.Jit instance id of an emitter to the plane of its light.
+    """Return a UInt32 array from the Dr.Jit instance id of an emitter to its light's plane.
 
     plane_of: index of the plane by the emitter's name.
     """
@@ -130,7 +131,7 @@ def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
 
 @dataclass(frozen=True)
 class Guided:
-    """How to draw numbers and emitters better than by chance.
+    """The guidance for drawing numbers and emitters.
 
     stream, first: the samples of a pixel are terms `first` … of the pixel's own sequence;
     passes that are averaged go on in one stream, passes that must be independent have two.

@@ -47,7 +47,7 @@ LESSON, LESSONS, PER_LESSON = 2**18, 4, 2**20
 
 @dataclass(frozen=True)
 class Part:
-    """Some samples of a basis.
+    """A part of the samples of a basis.
 
     half: 0 or 1. top, bottom: its rows, the last one not among them. first: samples of a pixel of
     that half that come before. spp: its own. light: index, where it is one light's alone; number:
@@ -64,12 +64,12 @@ class Part:
 
     @property
     def place(self) -> tuple[int, int, int]:
-        """What parts that are added to each other have in common."""
+        """Key that is equal for parts which are added to each other."""
         return self.half, self.top, -1 if self.light is None else self.light
 
 
 def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Part]:
-    """The parts that bring a basis of `scene` to `spp` samples per pixel, in their order.
+    """Return the parts that bring a basis of `scene` to `spp` samples per pixel, in order.
 
     start: what is there already, whose samples count.
     """
@@ -94,7 +94,7 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
 
 
 def _tiles(lights: int, height: int, width: int, spp: int) -> list[tuple[int, int]]:
-    """Rows of equal parts: so few that all samples of a half are one part, where there are enough.
+    """Return rows of equal parts, as few as possible.
 
     A part whose samples are split sends its images as often.
     """
@@ -105,7 +105,7 @@ def _tiles(lights: int, height: int, width: int, spp: int) -> list[tuple[int, in
 
 
 def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:
-    """The passes of each light, which are numbered from its first one on."""
+    """Return the passes of each light, numbered from its first one on."""
     height, _ = scene.size
     there = LightSums(len(scene.lights), (0, 0)) if start is None else LightSums.counted(start)
     parts = []
@@ -120,7 +120,7 @@ def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:
 
 @MITSUBA.taken()
 def lesson(scene: Scene, spp: int, seed: int) -> Floats | None:
-    """What parts of `scene` choose emitters by, the same each time; None where nothing is chosen.
+    """Return the learned probabilities of emitters for parts of `scene`; None if none are needed.
 
     spp: samples per pixel that the parts come to.
     """
@@ -159,7 +159,8 @@ class PartRenderer:
 
     @MITSUBA.taken()
     def render(self, part: Part) -> tuple[Floats, Floats]:
-        """The sums of its samples, (lights, rows, w, 3) float32, and rays that saw an emitter.
+        """Return the sums of its samples, (lights, rows, w, 3) float32, and rays that saw an
+        emitter.
 
         The lights are all of them, or its own alone.
         """
@@ -191,7 +192,7 @@ class PartRenderer:
         return image[None], np.zeros(self._scene.size, np.float32)
 
     def close(self) -> None:
-        """Let go of what is loaded."""
+        """Release what is loaded."""
         if self._tracer is not None:
             self._tracer.close()
         self._tracer = self._loaded = self._light = None
@@ -246,7 +247,7 @@ class PartSums:
         self._seen[part.top : part.bottom] += seen
 
     def basis(self, learned: Floats | None) -> Basis:
-        """The basis, once all parts are added; the sums are given up.
+        """Return the basis, once all parts are added; the sums are released.
 
         learned: what the parts chose by.
         """
@@ -280,7 +281,7 @@ class PartSums:
 
 
 def render_in_parts(scene: Scene, *, spp: int, seed: int = 0, start: Basis | None = None) -> Basis:
-    """All parts one after the other, here: what any other way of rendering them comes to."""
+    """Render all parts one after the other in this process, as the reference for other ways."""
     learned = None if start is None else start.learned
     if learned is None:
         learned = lesson(scene, spp, seed)

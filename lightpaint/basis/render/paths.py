@@ -20,7 +20,7 @@ from lightpaint.basis.render.sobol import APERTURE, FILM, TIME
 
 
 def camera_rays(sensor, sampler, numbers, pixel, width, height):
-    """One ray per sample, drawing random numbers as Mitsuba's SamplingIntegrator does.
+    """Return one ray per sample, with the random numbers of Mitsuba's SamplingIntegrator.
 
     width, height: pixels into which the film's crop window is divided, its own or larger ones.
     """
@@ -41,7 +41,7 @@ def camera_rays(sensor, sampler, numbers, pixel, width, height):
 
 
 def _first_hit(scene, ray, hide_emitters):
-    """What the camera sees along `ray`, through area lights where these are hidden."""
+    """Return what the camera sees along `ray`, through area lights if these are hidden."""
     pi = scene.ray_intersect_preliminary(ray, True)
     if not hide_emitters:
         return pi
@@ -53,7 +53,7 @@ def _first_hit(scene, ray, hide_emitters):
 
 
 class Planes:
-    """Where paths leave what they carry.
+    """The planes to which paths add their light.
 
     An object, and not arrays of the loop that traces: Dr.Jit refuses such an array once it
     finds that nothing can ever be added to it, as to `seen` where all lights are points.
@@ -161,7 +161,7 @@ def trace(
 
 @dr.syntax
 def _will_bounce(scene, sampler, numbers, ray, pi, active, max_depth, rr_depth):
-    """Which of the paths that are about to be followed meet more than what lets them pass.
+    """Return the paths to follow that meet more than surfaces which let them pass.
 
     Whether a path counts is known only after it has gathered light, from lights of any number, so
     it is looked ahead with the same numbers, as far as the first surface that does not let it pass.
@@ -197,7 +197,7 @@ def _will_bounce(scene, sampler, numbers, ray, pi, active, max_depth, rr_depth):
 
 
 def _pdf_of_choice(scene, guide, si, emitter, previous, previous_cell, active):
-    """Density with which next-event estimation at the previous vertex would have come here."""
+    """Return the density of next-event estimation at the previous vertex for this emitter."""
     ds = mi.DirectionSample3f(scene, si, previous)
     if guide is None:
         return scene.pdf_emitter_direction(previous, ds, active)
@@ -206,7 +206,7 @@ def _pdf_of_choice(scene, guide, si, emitter, previous, previous_cell, active):
 
 
 class _Asked(NamedTuple):
-    """What came of a question to an emitter. All are arrays, of a number for each path.
+    """The answer to an emitter query. All are arrays, of a number for each path.
 
     ds: the place on it, `ds.pdf` with the chance of the emitter in it. radiance: over that pdf,
     but for `chance`, the probability of the emitter where the guide has chosen it. lit: whether
@@ -239,7 +239,7 @@ def _ask_emitter(scene, sampler, numbers, guide, si, depth, active):
 
 
 def _numbers_of_surface(sampler, numbers, depth):
-    """What chooses a lobe of the surface, a direction, and whether the path survives."""
+    """Return the numbers that choose lobe, direction and survival at a surface."""
     if numbers is None:
         return sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
     lobe_and_fate = numbers.at_vertex(depth, 1)
@@ -247,7 +247,7 @@ def _numbers_of_surface(sampler, numbers, depth):
 
 
 def _roulette(throughput, eta, roulette, fate, active):
-    """Which paths go on; those that Russian roulette spares carry more in `throughput` for it.
+    """Return the paths that go on; survivors of Russian roulette gain `throughput`.
 
     It looks at the surfaces alone, never at emission: the paths, and with them every plane, stay
     the same whatever the lights do.
@@ -259,7 +259,7 @@ def _roulette(throughput, eta, roulette, fate, active):
 
 
 def _mis(pdf_a, pdf_b):
-    """Power heuristic."""
+    """Return the weight of the power heuristic."""
     a, b = dr.square(pdf_a), dr.square(pdf_b)
     w = a / (a + b)
     return dr.select(dr.isfinite(w), w, 0)

@@ -97,12 +97,12 @@ def render_basis(
 
 
 def goes_on(its: str, method: str) -> bool:
-    """Whether samples by `method` can be added to those of a basis by the method `its`."""
+    """Return True if samples by `method` can be added to those of a basis by the method `its`."""
     return (ONE_PASS if its == IN_PARTS else its) == method
 
 
 def with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
-    """`basis`, which knows what is seen: one kept by an earlier version may not."""
+    """Return `basis` with its features: one from an earlier version may lack them."""
     if basis.features is not None and basis.objects is not None:
         return basis
     features, objects = render_first_hits(scene, seed=seed)
@@ -110,7 +110,7 @@ def with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
 
 
 def memory_needed(scene: Scene) -> int:
-    """Bytes that a basis of `scene` takes at its peak, whatever the number of samples."""
+    """Return the peak memory of rendering a basis, in bytes, for any number of samples."""
     height, width = scene.size
     images = len(scene.lights) * height * width * 3 * 4
     # Sums of two halves, the images and half differences made of them, and a copy of both
@@ -130,7 +130,7 @@ def check_memory(scene: Scene) -> None:
 
 
 def _free_memory() -> int | None:
-    """Bytes that can be had without swapping, where the system tells (Linux)."""
+    """Return the bytes available without swapping, if the system tells (Linux)."""
     try:
         with open("/proc/meminfo", encoding="ascii") as lines:
             found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
@@ -140,7 +140,7 @@ def _free_memory() -> int | None:
 
 
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
-    """Whether `basis` was made of `scene` as it is, through its sensor and film, under `seed`."""
+    """Return True if `basis` was made of `scene` as it is, with its sensor, film and `seed`."""
     of = basis.origin
     mine = replace(
         origin_of(scene, seed, of.method, of.halves, of.passes),
@@ -153,7 +153,7 @@ def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
 def is_on_the_way(
     scene: Scene, basis: Basis, spp: int | None, *, is_in_parts: bool = False
 ) -> bool:
-    """Whether a render from nothing to `spp` samples per pixel comes by just those of `basis`.
+    """Return True if a render to `spp` samples per pixel passes through those of `basis`.
 
     So does one that an interrupt ended, and not one that was made for fewer samples: its passes
     end elsewhere. spp: the scene's own number if None. is_in_parts: whether it is rendered by
@@ -176,7 +176,7 @@ def is_on_the_way(
 
 
 def samples_for(scene: Scene, spp: int | None) -> int:
-    """Samples per pixel that a basis comes to for which `spp` are asked.
+    """Return the samples per pixel that a basis gets if `spp` are requested.
 
     One more where that makes the halves equal, and some where a pixel is a block of pixels that
     ordinary renders take one sample of each in.
@@ -185,7 +185,7 @@ def samples_for(scene: Scene, spp: int | None) -> int:
 
 
 def _plan(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
-    """The passes of all lights, or of each, up to `spp`, the scene's own number if None."""
+    """Return the passes of all lights, or of each, up to `spp`, by default the scene's own."""
     (height, width), spp = scene.size, scene.spp if spp is None else spp
     if method_of(scene) == ONE_PASS:
         return plan_passes(height * width, spp)
@@ -193,14 +193,14 @@ def _plan(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
 
 
 def method_of(scene: Scene) -> str:
-    """How a basis of `scene` is rendered: `ONE_PASS` or `SEPARATE`."""
+    """Return how a basis of `scene` is rendered: `ONE_PASS` or `SEPARATE`."""
     return ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
 
 
 def origin_of(
     scene: Scene, seed: int, method: str, halves: tuple[int, int], passes: tuple[int, int]
 ) -> Origin:
-    """What a basis of `scene` says of where it comes from."""
+    """Return the origin of a basis of `scene`."""
     return Origin(
         scene=scene.path.name,
         scene_identity=scene.identity,
@@ -243,7 +243,7 @@ def _render_together(
     keeper: Keeper,
     progress: Progress,
 ) -> Basis:
-    """All lights in one path-traced pass after another (see one_pass.py)."""
+    """Render all lights in one path-traced pass after another (see one_pass.py)."""
     from lightpaint.basis.render.half_sums import HalfSums
     from lightpaint.basis.render.one_pass import Tracer
 
@@ -302,7 +302,7 @@ def _render_one_by_one(
     keeper: Keeper,
     progress: Progress,
 ) -> Basis:
-    """One light after the other, by the scene's own integrator (see separate.py)."""
+    """Render one light after the other, by the scene's own integrator (see separate.py)."""
     sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
     seen = emitters_seen(scene) if start is None else start.emitters_seen
     nothing = origin_of(scene, seed, SEPARATE, (0, 0), (0, 0))

@@ -28,7 +28,7 @@ Plan = list[tuple[int, int]]
 
 
 class LightSums:
-    """What the two halves of each light's samples have come to, undivided.
+    """The undivided sums of the two halves of each light's samples.
 
     planes: (2, n, h, w, 3) float32. spp, passes: (n, 2), per light and half, so far.
     """
@@ -40,7 +40,7 @@ class LightSums:
 
     @classmethod
     def of(cls, basis: Basis) -> "LightSums":
-        """The sums that made `basis`, up to round-off."""
+        """Return the sums that made `basis`, up to round-off."""
         sums = cls.counted(basis)
         sums.planes = np.zeros((2, *basis.images.shape), np.float32)
         for k, (a, b) in enumerate(sums.spp.tolist()):
@@ -52,19 +52,19 @@ class LightSums:
 
     @classmethod
     def counted(cls, basis: Basis) -> "LightSums":
-        """How many samples and passes made `basis`, without their sums."""
+        """Return the samples and passes that made `basis`, without their sums."""
         origin, sums = basis.origin, cls(len(basis.lights), (0, 0))
         each = origin.each_light or ((*origin.halves, *origin.passes),) * len(basis.lights)
         sums.spp[:], sums.passes[:] = np.array(each)[:, :2], np.array(each)[:, 2:]
         return sums
 
     def done(self, light: int) -> tuple[int, int]:
-        """Samples per pixel of the two halves of that light."""
+        """Return the samples per pixel of the two halves of that light."""
         a, b = self.spp[light].tolist()
         return a, b
 
     def mean_and_half_difference(self) -> tuple[Floats, Floats]:
-        """Of all samples, and between the halves, (n, h, w, 3) float32; 0 where there are none."""
+        """Return mean and half difference, (n, h, w, 3) float32; 0 without samples."""
         means, half_differences = np.zeros_like(self.planes[0]), np.zeros_like(self.planes[0])
         for k, (a, b) in enumerate(self.spp.tolist()):
             sum_a, sum_b = self.planes[:, k]
@@ -74,7 +74,7 @@ class LightSums:
         return means, half_differences
 
     def counts(self) -> dict[str, Any]:
-        """The fields of an Origin that say how many samples there are."""
+        """Return the fields of an Origin that count samples."""
         # Of one half alone the noise is unknown: what counts is what both have.
         spp, passes = int(self.spp.min()), int(self.passes.min())
         each: tuple[tuple[int, ...], ...] = ()
@@ -120,7 +120,7 @@ def render_separately(
 
 
 def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> Plan:
-    """The passes that bring one light from `done` samples per pixel of each half to `spp` in all.
+    """Return the passes that bring one light from `done` samples per half to `spp` in all.
 
     On a film of blocks those are a little more: each pixel of a block takes one sample at least.
     """
@@ -132,7 +132,7 @@ def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> 
 def _turns(
     scene: Scene, budget: Budget, sums: LightSums, progress: Progress
 ) -> Iterator[tuple[int, Plan, Callable[[], None]]]:
-    """(light, its passes, what to call after each) in turn, until `budget` is spent."""
+    """Yield (light, its passes, what to call after each) in turn, until `budget` is spent."""
     height, width = scene.size
     pixels, lights = height * width, len(scene.lights)
     if budget.time_s is None:
@@ -188,7 +188,7 @@ def _add_pass(
 def light_pass(
     loaded: Any, scene: Scene, light: int, half: int, number: int, spp: int, seed: int
 ) -> Floats:
-    """The undivided sum of a pass, (h, w, 3). number: of those of that light and half."""
+    """Return the undivided sum of a pass, (h, w, 3). number: its index for that light and half."""
     # Each light has samples of its own.
     of_light = pass_seed(seed, Stream.BASIS, light)
     its = pass_seed(of_light, Stream.BASIS, 2 * number + half)
@@ -197,7 +197,7 @@ def light_pass(
 
 @MITSUBA.taken()
 def emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:
-    """(h, w), where light reaches the camera without a single bounce."""
+    """Return (h, w), pixels where light reaches the camera without a bounce."""
     import mitsuba as mi
 
     if scene.integrator.hide_emitters:

@@ -30,7 +30,7 @@ class SobolPairs:
         self._reversed_term = dr.brev(term)
 
     def pair(self, dimension):
-        """Two numbers in [0, 1) per path, evenly spread together over the terms."""
+        """Return two numbers in [0, 1) per path, evenly spread together over the terms."""
         seed = hashed(self._key + dimension * mi.UInt32(0x9E3779B9))
         # The terms are shuffled so that pairs of unlike dimensions do not go together. A
         # shuffled term, its bits reversed, is the first Sobol' dimension as it stands.
@@ -45,7 +45,7 @@ class SobolPairs:
         return mi.Point2f(_unit(x ^ shift_x), _unit(y ^ shift_y))
 
     def at_vertex(self, depth, which):
-        """Pair `which` (below PAIRS_PER_VERTEX) of the path vertex at `depth`."""
+        """Return pair `which` (below PAIRS_PER_VERTEX) of the path vertex at `depth`."""
         return self.pair(FIRST_VERTEX + which + depth * PAIRS_PER_VERTEX)
 
 
@@ -53,7 +53,7 @@ _BLOCKS = ((16, 0x0000FFFF), (8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), 
 
 
 def hashed(x):
-    """A UInt32 in which every bit depends on all bits of `x`."""
+    """Return a UInt32 in which every bit depends on all bits of `x`."""
     x = mi.UInt32(x)
     x ^= x >> 16
     x *= mi.UInt32(0x7FEB352D)
@@ -63,7 +63,7 @@ def hashed(x):
 
 
 def _scrambled(reversed_bits, seed):
-    """Owen-scramble numbers whose bits are in reversed order (Laine and Karras 2011)."""
+    """Scramble, as Owen does, numbers whose bits are in reversed order (Laine and Karras 2011)."""
     x = reversed_bits + seed
     for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
         x ^= x * mi.UInt32(factor)
@@ -71,5 +71,5 @@ def _scrambled(reversed_bits, seed):
 
 
 def _unit(x):
-    """The leading 24 bits as a number in [0, 1)."""
+    """Return the leading 24 bits as a number in [0, 1)."""
     return mi.Float(x >> 8) * (1 / 2**24)

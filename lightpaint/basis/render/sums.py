@@ -9,7 +9,7 @@ from lightpaint.basis.basis import Basis
 
 
 def halves_of(basis: Basis) -> list[Floats]:
-    """The undivided sums of both halves that made `basis`, up to round-off, (n, h, w, 3) each."""
+    """Return the undivided sums of both halves of `basis`, up to round-off, (n, h, w, 3) each."""
     a, b = basis.origin.halves
     # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
     half_a = basis.images + basis.half_differences * (2 * b / (a + b))
@@ -18,7 +18,7 @@ def halves_of(basis: Basis) -> list[Floats]:
 
 
 def mean_and_half_difference(halves: Sequence[Floats], spp: Sequence[int]) -> tuple[Floats, Floats]:
-    """Of all samples, and between the halves; what is given is overwritten.
+    """Return mean and half difference of undivided sums, which it overwrites.
 
     halves: two undivided sums, (n, h, w, 3). spp: samples per pixel of each.
     """

@@ -1,1 +1,1 @@
-"""From linear light to what a display is sent: exposure, view transforms, sRGB."""
+"""Display of linear light: exposure and view transforms."""

@@ -45,7 +45,7 @@ CHROMA_FILTER = (0.627123, -0.186077, 0.087929, -0.043159, 0.019597, -0.007540, 
 
 @dataclass(frozen=True)
 class ExrPart:
-    """One part of an EXR file.
+    """A part of an EXR file.
 
     channels: name → (height, width) array, float16 or float32 (uint32 when read so).
     attributes: text attributes of the header.

@@ -1,4 +1,4 @@
-"""Where the painter's page is served: a socket to listen on, and the address that opens it."""
+"""The address of the painter's page: a socket to listen on, and the URL that opens it."""
 
 import errno
 import ipaddress

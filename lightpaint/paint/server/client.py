@@ -1,4 +1,4 @@
-"""One client on its socket: queues of incoming and outgoing messages."""
+"""A client on its socket: queues of incoming and outgoing messages."""
 
 import asyncio
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Who may speak to the painter's server: a page that came from this launch, and nobody else.
+"""Access to the painter's server, only for a page that came from this launch.
 
 Any page that is open in a browser can send requests to servers of the same machine, by whatever
 name it likes. So the guard looks at the name that a request calls this server by (a foreign name

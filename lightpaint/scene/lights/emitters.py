@@ -35,7 +35,7 @@ _GENERATED_ID = re.compile(r"(__)?elm__\d+|_(unnamed|arg)_\d+")
 
 @dataclass(frozen=True)
 class Emitter:
-    """One emitter of a scene.
+    """An emitter of a scene.
 
     kind: its scaling; None if lightpaint cannot scale it. emission: present linear RGB emission in
     the unit of `kind`; 1 for a multiple. file, offset: position of its element's `<`: index into

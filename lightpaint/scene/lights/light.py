@@ -81,7 +81,7 @@ class Light:
         return total[0], total[1], total[2]
 
     def identity(self, unlit_content: str) -> str:
-        """Identity of its image at unit emission in a scene of that `unlit_content`.
+        """Return the identity of its image at unit emission, in a scene of that `unlit_content`.
 
         Equal for lights whose images are equal but for noise, whatever they are called and however
         bright they are; "" where a member stands in no file.

@@ -135,7 +135,7 @@ def _load_folder(folder: Path) -> frozenset[str]:
 
 @contextmanager
 def _resolving_only_in(*folders: Path) -> Iterator[None]:
-    """Let Mitsuba look for files in these folders alone within the block."""
+    """Make Mitsuba look for files in these folders alone within the block."""
     import mitsuba as mi
 
     before = mi.file_resolver()

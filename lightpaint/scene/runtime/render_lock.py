@@ -51,7 +51,7 @@ class Turns:
 
     @contextmanager
     def low_priority(self) -> Iterator[None]:
-        """Let other threads go before this one within the block."""
+        """Give other threads precedence over this one within the block."""
         before, self._own.is_low_priority = self._is_low_priority, True
         try:
             yield
@@ -81,7 +81,7 @@ class Turns:
                     self._call()
 
     def let_others(self) -> None:
-        """Between two pieces, let a low-priority thread wait until no other thread wants a turn."""
+        """Make a low-priority thread wait, between two pieces, until no other wants a turn."""
         if self._is_low_priority and self._waiting:
             with self.aside():
                 pass
