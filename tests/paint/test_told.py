@@ -37,7 +37,7 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             18.0,
             {"reasons": (HOLD,)},
             "A first step (10 %). Brighter light on the floor is missing: unpainted parts are "
-            "held near their present look. Paint more, or loosen the hold.",
+            "held near their present look. Paint more or loosen the hold.",
         ),
         (
             10.0,
@@ -62,13 +62,13 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
             {"reasons": (HOLD,)},
             "Farther from the paint than the present lighting, which undo brings back. Brighter "
             "light on the floor is missing: unpainted parts are held near their present look. "
-            "Paint more, or loosen the hold.",
+            "Paint more or loosen the hold.",
         ),
         (
             20.0,
             {"reasons": (HOLD,)},
             "No closer than the present lighting. Brighter light on the floor is missing: "
-            "unpainted parts are held near their present look. Paint more, or loosen the hold.",
+            "unpainted parts are held near their present look. Paint more or loosen the hold.",
         ),
         (
             14.0,

@@ -49,7 +49,7 @@ WORSE_TEXT = "Farther from the paint than the present lighting, which undo bring
 
 #: Advice on what keeps the lights from the paint; a page has a button for each.
 ADVICE_TEXTS: dict[str, str] = {
-    "hold": "Paint more, or loosen the hold.",
+    "hold": "Paint more or loosen the hold.",
     "colors": "The settings allow any colour.",
 }
 

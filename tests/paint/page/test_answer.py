@@ -469,7 +469,7 @@ def test_escape_gives_up_the_stroke_before_it_closes_anything(painter: Painter) 
 HELPS: list[tuple[dict[str, Any], str, str, dict[str, Any]]] = [
     (
         {"kind": "hold", "hold": 0.8, "closes": 0.35},
-        "Loosen hold: 35 % closer",
+        "Loosen: 35 % closer",
         "set",
         {"hold": 0.8},
     ),

@@ -30,7 +30,7 @@ const BUTTON_WORDS = {
 
 /** The same of all lights. @type {Record<string, string>} */
 const OF_ALL = {
-  hold: 'Loosen hold',
+  hold: 'Loosen',
   colors: 'Any colour',
   sparse: 'More lights',
   prefer_current: 'Let lights change',

@@ -28,7 +28,7 @@ const HOLDS = [
   { value: 'go', label: 'Ignore', tip: 'They may change freely: only the paint counts' },
 ];
 const PAINT_READINGS = [
-  { value: false, label: 'Sketch', tip: 'StrokeSender show what should change' },
+  { value: false, label: 'Sketch', tip: 'Strokes show what should change' },
   { value: true, label: 'Literal', tip: 'Each stroke is the exact light you want' },
 ];
 const MINOR_LIGHTS = [
@@ -88,7 +88,7 @@ export function SettingsPanel({ ui, app }) {
     <${Row} title="Read the paint as" says=${
       settings.literal
         ? 'Every stroke is exact: linear light, nothing held, any colour, unless set otherwise above'
-        : 'StrokeSender show what should change; the rest of the picture counts, too'
+        : 'Strokes show what should change; the rest of the picture counts, too'
     }>
       <${Choice} label="Read the paint as" value=${Boolean(settings.literal)} choices=${PAINT_READINGS}
         change=${set('literal')} /></${Row}>

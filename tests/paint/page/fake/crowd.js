@@ -13,7 +13,7 @@ const named = (k) =>
 
 export const HEADLINE =
   `About half way (46 %), and changes the annex by ΔE 12. Slightly brighter light on the ` +
-  `${OBJECT} is missing: unpainted parts are held near their present look. Paint more, or loosen the hold.`;
+  `${OBJECT} is missing: unpainted parts are held near their present look. Paint more or loosen the hold.`;
 
 export const LONGEST =
   `35 % of the way, at the cost of the ${OBJECT} (ΔE 49). Darker and bluer shade on the ${OBJECT} ` +
