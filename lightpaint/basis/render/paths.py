@@ -233,7 +233,8 @@ def _ask_emitter(scene, sampler, numbers, guide, si, depth, active):
     emitter = dr.gather(mi.EmitterPtr, guide.emitters, chosen, active)
     ds, radiance = emitter.sample_direction(si, number, active)
     ds.pdf *= chance
-    lit = active & (ds.pdf != 0)
+    # Where a spot does not point no shadow ray is needed.
+    lit = active & (ds.pdf != 0) & dr.any(radiance != 0)
     lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
     return _Asked(ds, radiance, lit, chance, cell, chosen)
 
