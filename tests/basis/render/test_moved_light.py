@@ -2,7 +2,7 @@
 
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,15 @@ from lightpaint.basis.render import obtain as obtain_module
 from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.basis.render.parts import render_in_parts
 from lightpaint.basis.render.render import render_basis
+from lightpaint.batch.work.basis_parts import PartwiseRender
+from lightpaint.batch.work.work import run_item
+from lightpaint.batch.work.work_items import ItemResult, SceneFilm
+from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BasisError
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.settings import Settings
-from lightpaint.progress import Interrupted
+from lightpaint.pipeline.sources import SceneFile
+from lightpaint.progress import Interrupted, listener, silent
 from lightpaint.scene.scene import Scene, load_scene
 
 #: Edits of the XML of the test room.
@@ -414,3 +419,30 @@ def make_listener() -> Callable[[], Any]:
             self.said.append(text)
 
     return Hears
+
+
+class Here:
+    """An engine that does its items in this process, and notes of which lights they are."""
+
+    def __init__(self) -> None:
+        self.lights: set[tuple[str, ...]] = set()
+
+    def run(self, items: Sequence[Any]) -> Iterator[ItemResult]:
+        memory = WorkerCache()
+        for item in items:
+            self.lights.add(item.film.only)
+            yield run_item(item, memory, listener(silent))
+
+
+def test_workers_render_the_moved_lamp_alone(tmp_path: Path) -> None:
+    def obtained(scene: Scene) -> tuple[Basis, set[tuple[str, ...]]]:
+        engine = Here()
+        render = PartwiseRender(engine, SceneFilm(SceneFile(str(scene.path))))  # type: ignore[arg-type]
+        return obtain_basis(scene, spp=16, render=render), engine.lights
+
+    first, lights = obtained(room(tmp_path))
+    assert lights == {()}
+    second, lights = obtained(scene := room(tmp_path, MOVED))
+    assert lights == {("bulb",)}
+    assert taken(second, first) == {*NAMES} - {"bulb"}
+    agrees(second, render_basis(scene, spp=16, seed=5))
