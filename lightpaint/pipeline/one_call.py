@@ -67,13 +67,15 @@ def paint_with_light(
         constraints: Constraints on the lights; they override those of the scene's lights file.
         mask: Picture of the importance of pixels, if `target` is a path. The next two are also
             those of `read_target`.
-        layer: Layer of an EXR. find: Whether to look for a template beside the painting.
+        layer: Layer of an EXR.
+        find: Whether to look for a template beside the painting.
         sensor: Index or id, if `scene` is a path. The next four are also those of `load_scene`.
         parameters: Values of `$name` parameters.
         lights: Names or patterns of the lights to adjust.
-        groups: Emitters that form one light, by its name. integrator: Integrator to use instead of
-        the scene's own, like `path`. progress: Receives progress and, if it is a `Listener`,
-        remarks. **settings: Any field of `Settings`, like spp=64.
+        groups: Emitters that form one light, by its name.
+        integrator: Integrator to use instead of the scene's own, like `path`.
+        progress: Receives progress and, if it is a `Listener`, remarks.
+        **settings: Any field of `Settings`, like spp=64.
 
     Returns:
         The look; for a list of views, a list of looks.

@@ -71,12 +71,14 @@ class Look:
     """A painting and its answer.
 
     Attributes:
-        target: The painting, at the size of the basis. basis: The basis it was solved with.
-        solution: The answer, with its errors and active bounds. predicted: Σ w_i Φ_i, the predicted
-        picture. relit: The relit scene; None if there was only a saved basis. verification:
-        Comparison of the prediction with a render; None without a scene. analysis: How certain the
-        lights are, and why the answer is not closer. suggestions: Lights that would help most; None
-        if not requested.
+        target: The painting, at the size of the basis.
+        basis: The basis it was solved with.
+        solution: The answer, with its errors and active bounds.
+        predicted: Σ w_i Φ_i, the predicted picture.
+        relit: The relit scene; None if there was only a saved basis.
+        verification: Comparison of the prediction with a render; None without a scene.
+        analysis: How certain the lights are, and why the answer is not closer.
+        suggestions: Lights that would help most; None if not requested.
 
     Examples:
         >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")

@@ -35,11 +35,11 @@ class Settings(Fit):
         method: `polished`, to a certified optimum, or `gauss-seidel`, the paper's sweeps alone.
         transform: View transform of `space`; None for that of the painting or, if it holds light,
             sRGB at a metered exposure.
-        emitters: Whether pixels in which the camera sees an emitter count, as in `Fit`. resize:
-        Whether to resample a target of another size.
-        spp: Samples per pixel of the basis, and upper limit for the verification. time_s: Seconds
-        to render the bases of all views, instead of spp. seed: Seed of the basis; the verification
-        derives its own from it.
+        emitters: Whether pixels in which the camera sees an emitter count, as in `Fit`.
+        resize: Whether to resample a target of another size.
+        spp: Samples per pixel of the basis, and upper limit for the verification.
+        time_s: Seconds to render the bases of all views, instead of spp.
+        seed: Seed of the basis; the verification derives its own from it.
         resolution: `1/4` or `320x180`: size of the film for the basis. The verification uses the
             whole film, or as much of it as its samples allow.
         quality: Preset of spp and resolution, if these are not given.

@@ -55,10 +55,11 @@ class SceneFile(ReadOnce):
         parameters: Values of the `$name` parameters.
         variant: Mitsuba variant.
         lights: Names or patterns of the lights to adjust.
-        groups: Emitters that form one light, by its name. lights_file: TOML to read instead of the
-        one beside the scene. use_lights_file: False to ignore that one. group_alike: False to
-        adjust similar emitters without names one by one. integrator: Integrator to use instead of
-        the scene's own.
+        groups: Emitters that form one light, by its name.
+        lights_file: TOML to read instead of the one beside the scene.
+        use_lights_file: False to ignore that one.
+        group_alike: False to adjust similar emitters without names one by one.
+        integrator: Integrator to use instead of the scene's own.
 
     Examples:
         >>> lp.SceneFile("room.xml").content.size
@@ -89,9 +90,11 @@ class Painting(ReadOnce):
 
     Attributes:
         path: EXR, PNG, TIFF, JPEG or a layered file.
-        mask: Picture of the importance of pixels. layer: Layer of an EXR. transform: View transform
-        that encoded it. template: Folder of the template it was painted on. find: Whether to look
-        for a template beside it.
+        mask: Picture of the importance of pixels.
+        layer: Layer of an EXR.
+        transform: View transform that encoded it.
+        template: Folder of the template it was painted on.
+        find: Whether to look for a template beside it.
         paint: `look` or `light`.
 
     Examples:

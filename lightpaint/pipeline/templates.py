@@ -45,13 +45,14 @@ def render_template(
     The look is the sum of the basis that `solve` needs, which is kept in the cache.
 
     Args:
-        scene: The scene to paint. folder: Receives the files.
+        scene: The scene to paint.
+        folder: Receives the files.
         transform: View transform of the picture; by default sRGB at a metered exposure.
         spp: Samples per pixel (the scene's own number by default).
         time_s: Seconds to render the basis, instead of spp.
         seed: Any number >= 0.
-        use_cache: Whether to use a basis from an earlier run, and keep this one. progress: Receives
-        progress and, if it is a `Listener`, remarks.
+        use_cache: Whether to use a basis from an earlier run, and keep this one.
+        progress: Receives progress and, if it is a `Listener`, remarks.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -98,7 +99,8 @@ def template_of_basis(
     noise is known, template.png shows the denoised look.
 
     Args:
-        basis: The basis to solve with later. folder: Receives the files.
+        basis: The basis to solve with later.
+        folder: Receives the files.
         transform: View transform of the picture; by default sRGB at a metered exposure.
 
     Examples:

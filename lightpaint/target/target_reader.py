@@ -86,8 +86,7 @@ def read_target(
         mask: Picture of the importance, black for pixels that do not count.
         layer: The layer, part or view of an EXR.
         transform: The encoding of 8 and 16 bits. Open parts come from `template`, else from the
-        file,
-            else from a template that is found for it, else from sRGB.
+            file, else from a template that is found for it, else from sRGB.
         template: Folder of `lightpaint template`.
         find: Whether to look for a template beside the painting if none is given.
         paint: `light` takes colours for the light that falls on a surface, and multiplies them by
