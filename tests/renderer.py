@@ -107,35 +107,43 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
 
     plain: with Mitsuba's own numbers and choices; else as a basis is rendered, unguided yet.
     """
-    import drjit as dr
-    import mitsuba as mi
+    from lightpaint.scene.runtime.variant import use_variant
 
-    from lightpaint.basis.render.guide import Guide
-    from lightpaint.basis.render.integrators import needs_a_bounce
-    from lightpaint.basis.render.one_pass import Guided, accumulate, lights_by_instance
+    use_variant()
+    from lightpaint.basis.render.one_pass import Tracer, trace_plainly
 
-    names = [light.name for light in scene.lights]
+    if plain:
+        loaded = scene.load({light.name: (1.0, 1.0, 1.0) for light in scene.lights})
+        planes = trace_plainly(scene, loaded, seed=seed, spp=spp)
+        del loaded
+        gc.collect()
+        return planes
+    tracer = Tracer(scene, seed)
+    tracer.end_lesson()
     height, width = scene.size
-    loaded = scene.load(dict.fromkeys(names, (1.0, 1.0, 1.0)))
-    planes = dr.zeros(mi.Float, len(names) * height * width * 3)
-    light_of = lights_by_instance(loaded, scene.plane_of)
-    guide = Guide(loaded, light_of, scene.eye(loaded))
-    traced = accumulate(
-        loaded,
-        scene.integrator,
-        camera=scene.camera(loaded),
-        light_of=light_of,
-        planes=planes,
-        seen=dr.zeros(mi.Float, height * width),
-        seed=seed,
-        spp=spp,
-        guided=None if plain else Guided(seed, 0, guide),
-        block=scene.film.block,
-        must_bounce=needs_a_bounce(scene),
-    )
-    del loaded
-    gc.collect()
-    return np.array(planes).reshape(len(names), height, width, 3) / traced
+    traced = tracer.planes(range(height))
+    tracer.add(traced, 0, range(height), 0, spp)
+    tracer.close()
+    return traced.sums().reshape(-1, height, width, 3) / spp
+
+
+def render_in_parts(scene: Scene, *, spp: int, seed: int = 0, start: Basis | None = None) -> Basis:
+    """Render all parts of a basis one after the other, as processes of a batch share them."""
+    from lightpaint.basis.render.lessons import lesson
+    from lightpaint.basis.render.parts import PartRenderer, PartSums, plan_parts
+
+    learned = None if start is None else start.learned
+    if learned is None:
+        learned = lesson(scene, seed)
+    parts = plan_parts(scene, spp, start=start)
+    sums = PartSums(scene, parts, seed=seed, start=start)
+    renderer = PartRenderer(scene, seed, learned)
+    try:
+        for part in parts:
+            sums.add(part, *renderer.render(part))
+    finally:
+        renderer.close()
+    return sums.basis(learned)
 
 
 def same_basis(a: Basis, b: Basis, *, of_file: bool = False) -> None:

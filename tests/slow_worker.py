@@ -9,11 +9,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.render import parts
+from lightpaint.basis.render import lessons
 from lightpaint.batch.work import work
 
 #: Of a lesson, here and in the tests: what is learned does not matter to them.
-LESSON = 2**12
+LESSON = (2**12,)
 
 _FOLDER = Path(os.environ["LIGHTPAINT_TEST_SLOW"])
 _run = work._run
@@ -31,4 +31,4 @@ def _slowly(item: Any, *others: Any) -> Any:
 
 
 work._run = _slowly
-parts.LESSON = LESSON
+lessons.LESSON = LESSON

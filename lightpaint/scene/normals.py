@@ -7,7 +7,7 @@ process to process.
 
 from typing import Any
 
-from lightpaint.scene.runtime.kernel_threads import adds_in_order, kernels
+from lightpaint.scene.runtime.kernel_threads import kernels
 
 #: Largest difference at which the normals of a file count as computed from its faces. Round-off is
 #: a hundredth of it.
@@ -15,20 +15,24 @@ NORMAL_TOLERANCE = 1e-5
 
 
 def settle_normals(scene: Any) -> None:
-    """Compute the normals again on one thread, if this process runs its kernels on one.
+    """Compute the normals again on one thread, which adds in the same order each time.
 
     Normals from a file stay, unless they equal the computed ones. scene: a `mi.Scene`.
     """
     import mitsuba as mi
 
-    if not adds_in_order() or not isinstance(scene, mi.Scene):
+    # Scalar variants have one thread anyway.
+    if mi.variant().startswith("scalar") or not isinstance(scene, mi.Scene):
         return
     import drjit as dr
 
-    with kernels():
-        for mesh in (x for x in scene.shapes() if isinstance(x, mi.Mesh)):
+    meshes = [x for x in scene.shapes() if isinstance(x, mi.Mesh) and x.has_vertex_normals()]
+    if not meshes:
+        return
+    with kernels(threads=1):
+        for mesh in meshes:
             parameters, key = mi.traverse(mesh), "vertex_normals"
-            if key not in parameters or not mesh.has_vertex_normals():
+            if key not in parameters:
                 continue
             loaded = type(parameters[key])(parameters[key])
             dr.eval(loaded)

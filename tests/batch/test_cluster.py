@@ -21,6 +21,7 @@ from batches import contents
 from command import run
 from renderer import write_room
 
+from lightpaint.basis.render import lessons
 from lightpaint.basis.render import parts as parts_module
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
@@ -153,7 +154,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[st
 
 def in_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
     patch.setattr(parts_module, "SAMPLES", 2**11)
-    patch.setattr(parts_module, "LESSON", 2**12)
+    patch.setattr(lessons, "LESSON", (2**12,))
     patch.setattr(scene_render, "SAMPLES_PER_RANGE", 1)
     patch.setenv("LIGHTPAINT_CACHE", str(cache))
 

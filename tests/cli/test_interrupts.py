@@ -16,13 +16,14 @@ from renderer import CORNELL, LIGHTS, PATH, write_room
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file import read_basis
 from lightpaint.basis.render.obtain import obtain_basis
+from lightpaint.basis.render.render import ONE_PASS, SEPARATE
 from lightpaint.scene.scene import load_scene
 
 SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
-INTEGRATORS = {"one pass": PATH, "separate renders": SEPARATELY}
+INTEGRATORS = {ONE_PASS: PATH, SEPARATE: SEPARATELY}
 
 #: Samples per pixel: dozens of passes, and seconds of work where it goes slowly.
-SPP = {"one pass": 2500, "separate renders": 250}
+SPP = {ONE_PASS: 2500, SEPARATE: 250}
 
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
@@ -123,7 +124,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
         # Nothing of what was kept is lost, and there is more to do.
         assert done < samples(part) < spp * len(part.lights)
         done = samples(part)
-        if number == signal.SIGINT and method == "one pass":
+        if number == signal.SIGINT and method == ONE_PASS:
             assert f"{part.origin.spp} of {spp}" in said
     assert {p.name for p in tmp_path.iterdir()} == {"stopped"}
 
@@ -144,14 +145,14 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
 @pytest.mark.parametrize(
     ("never_stopped", "number", "delay_s"),
     [
-        ("one pass", signal.SIGINT, 0),
-        ("one pass", signal.SIGTERM, 0.1),
-        ("one pass", signal.SIGHUP, 0.1),
-        ("separate renders", signal.SIGINT, 0.1),
-        at_night("one pass", signal.SIGINT, 0.1),
-        at_night("separate renders", signal.SIGINT, 0),
-        at_night("separate renders", signal.SIGTERM, 0.1),
-        at_night("separate renders", signal.SIGHUP, 0.1),
+        (ONE_PASS, signal.SIGINT, 0),
+        (ONE_PASS, signal.SIGTERM, 0.1),
+        (ONE_PASS, signal.SIGHUP, 0.1),
+        (SEPARATE, signal.SIGINT, 0.1),
+        at_night(ONE_PASS, signal.SIGINT, 0.1),
+        at_night(SEPARATE, signal.SIGINT, 0),
+        at_night(SEPARATE, signal.SIGTERM, 0.1),
+        at_night(SEPARATE, signal.SIGHUP, 0.1),
     ],
     indirect=["never_stopped"],
 )

@@ -207,7 +207,7 @@ def test_a_small_pixel_is_the_mean_of_its_block(
     small = scene.reduced(f"1/{factor}")
     assert small.identity == scene.identity
     assert small.size == size
-    large = render(scene, spp=256, stream=Stream.TEMPLATE)
+    large = render(scene, spp=1024, stream=Stream.TEMPLATE)
     whole = large.reduced(factor)
     beside = block_mean(np.roll(large.image, 1, axis=(0, 1)), factor)
     part = render(small, spp=4096, stream=Stream.VERIFICATION)

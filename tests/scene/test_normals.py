@@ -1,4 +1,4 @@
-"""Normals of smooth meshes, where a process adds everything up on one thread."""
+"""Normals of smooth meshes, which are the same on any number of threads."""
 
 from collections.abc import Iterator
 
@@ -14,9 +14,9 @@ use_variant()
 import mitsuba as mi  # noqa: E402
 
 
-@pytest.fixture(autouse=True)
-def _in_order() -> Iterator[None]:
-    limit_threads(1)
+@pytest.fixture(autouse=True, params=[1, None])
+def _threads(request: pytest.FixtureRequest) -> Iterator[None]:
+    limit_threads(request.param)
     yield
     limit_threads(None)
 
@@ -58,14 +58,6 @@ def test_what_was_computed_is_computed_again() -> None:
 
 def test_those_of_a_file_stay() -> None:
     scene = ball(factor=-1.0)
-    before = normals(scene)
-    settle_normals(scene)
-    np.testing.assert_array_equal(normals(scene), before)
-
-
-def test_where_threads_are_many_nothing_is_touched() -> None:
-    limit_threads(None)
-    scene = ball(off=2e-7)
     before = normals(scene)
     settle_normals(scene)
     np.testing.assert_array_equal(normals(scene), before)

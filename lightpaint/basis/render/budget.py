@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from lightpaint.basis.basis import Basis
@@ -13,8 +13,8 @@ from lightpaint.scene.scene_render import largest_pass, plan_passes
 #: Seconds of work that a crash may cost.
 KEEP_EVERY_S = 30.0
 
-#: Where the clock decides, and where nothing is known of the integrator, passes are shorter by
-#: this factor: they are the steps in which time is spent, and what Ctrl-C has to wait for.
+#: Passes of a basis are shorter by this factor than those of a picture: they are the steps in which
+#: time is spent, and what Ctrl-C has to wait for.
 SHORTER = 4
 
 
@@ -59,26 +59,31 @@ class Clock:
             self.reported = spent
 
 
-def passes(
-    pixels: int, budget: Budget, done: Sequence[int], progress: Progress
-) -> Iterator[tuple[int, int]]:
-    """Yield (half 0 or 1, samples per pixel) of one pass after another until `budget` is spent.
+def steps(pixels: int, budget: Budget, done: int, progress: Progress) -> Iterator[int]:
+    """Yield the samples per pixel of one step after another until `budget` is spent, in each half.
 
-    done: samples per pixel of each half so far; the caller brings it up to date before the
-    next pass. A time ends with the first pair of passes after it, the halves then equal.
+    done: samples per pixel of each half so far.
     """
+    largest = largest_pass(pixels, shorter=SHORTER)
     if budget.time_s is None:
-        plan = plan_passes(pixels, budget.spp, done=(done[0], done[1]))
-        progress("basis", 0, len(plan))
-        for k, one in enumerate(plan):
-            yield one
-            progress("basis", k + 1, len(plan))
+        left = half_of(budget.spp) - done
+        count = -(-left // largest)
+        progress("basis", 0, count)
+        for k in range(count):
+            yield min(largest, left - k * largest)
+            progress("basis", k + 1, count)
         return
     clock = Clock(budget.time_s, progress)
     while clock.left_s > 0:
-        for one in next_pair(pixels, (done[0], done[1])):
-            yield one
-            clock.report()
+        yield largest
+        clock.report()
+
+
+def half_of(spp: int) -> int:
+    """Return the samples per pixel of each half of `spp`. Raises SceneError if there is none."""
+    if spp < 2:
+        raise SceneError(f"{spp} samples per pixel are too few for two halves: ask for 2 or more")
+    return -(-spp // 2)
 
 
 def next_pair(

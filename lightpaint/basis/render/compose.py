@@ -17,7 +17,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.composed_planes import Pick, compose_planes
 from lightpaint.basis.file import is_large
 from lightpaint.basis.lights import Lights
-from lightpaint.basis.render.render import ONE_PASS, basis_lights, goes_on, method_of, origin_of
+from lightpaint.basis.render.render import ONE_PASS, basis_lights, method_of, origin_of
 from lightpaint.basis.render.separate import emitters_seen
 from lightpaint.scene.emission import ENVIRONMENTS
 from lightpaint.scene.scene import Scene
@@ -141,7 +141,7 @@ def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
         and entry.image_size == scene.size
         and (origin.sensor, origin.seed) == (scene.sensor_names[scene.sensor], seed)
         and origin.lightpaint == __version__
-        and goes_on(origin.method, method_of(scene))
+        and origin.method == method_of(scene)
     )
 
 

@@ -1,12 +1,14 @@
-"""Learned probabilities of sampling each emitter from each place.
+"""The choice of the emitter to sample from a place, learned from a lesson.
 
 A path tracer that chooses emitters at random samples most of them in vain: a spot whose cone is
 elsewhere, a window behind a wall. Space is divided into cells, and each cell remembers what
-its surface points received from every emitter, shadows included. The next pass draws an
+its surface points received from every emitter, shadows included. What is rendered then draws an
 emitter with a probability that follows that light, relative to what the light of that emitter does
 in the whole picture, so that a faint light gets its rays where it matters as well as a
 bright one. A remainder is drawn evenly: no emitter is left out anywhere, so that the mean of
 every image does not depend on what has been learned.
+
+Light is counted in integers, whose sums are the same in whatever order threads add.
 
 Import it once a variant is set and not a scalar one: its arrays do not exist before.
 """
@@ -25,12 +27,17 @@ from lightpaint.basis.render.sobol import hashed
 
 #: Share of the samples that is spread evenly over the emitters of a cell.
 EVEN_SHARE = 0.1
-#: Samples of emitters after which there is little left to learn: in all, and for each emitter.
-ENOUGH, ENOUGH_EACH = 2**23, 2**17
+#: Units in which the light of an emitter is counted: so many make up its average contribution, and
+#: one sample counts at most so many.
+UNITS, MOST_UNITS = 2.0**12, 2.0**31
+#: Units of radiance 1, before anything is known of an emitter.
+FIRST_UNITS = 2.0**20
 #: Weight of the mean over all cells, in samples of the cell itself.
 PRIOR_SAMPLES = 0.5
 #: Largest ratio of a cell's distance from the camera to its width; the least is half of that.
 CELLS_PER_DISTANCE = 24.0
+#: The largest number in [0, 1).
+BELOW_1 = 1 - 2**-24
 #: Largest size of the table: entries in all, and cells.
 ENTRIES, CELLS = 2**22, 2**16
 
@@ -41,7 +48,8 @@ class Guide:
     scene: an `mi.Scene`, whose emitters it chooses from.
     light_of: UInt32 array, the light that an emitter belongs to, by its Dr.Jit instance id.
     eye: position of the camera; cells are smaller near it.
-    learned: table that `learned()` of an earlier guide returned; ignored if it is implausible.
+    learned: table that `learned()` of an earlier guide returned, which this one then uses as it is;
+        None, or an implausible one, to learn from the passes that sample by this guide.
     """
 
     def __init__(self, scene: Any, light_of: Any, eye: Any, learned: Floats | None = None) -> None:
@@ -57,30 +65,46 @@ class Guide:
         # Emitters that the scene never samples are not chosen; point lights among them are dark.
         self._sampled = np.array([emitter.sampling_weight() > 0 for emitter in scene.emitters()])
         shape = (2, self.cells, self.count)
-        if learned is None or learned.shape != shape or not _is_sane(learned):
-            learned = np.zeros(shape, np.float32)
-        # In double precision the order of additions, which differs between runs, has no effect.
-        self.received = mi.Float64(learned[0].ravel().astype(np.float64))
-        self.asked = mi.UInt32(learned[1].ravel().astype(np.uint32))
-        self._learning = True
-        self.update()
+        if learned is not None and (learned.shape != shape or not _is_sane(learned)):
+            learned = None
+        self._units = np.full(self.count, FIRST_UNITS)
+        self._received, self._asked = np.zeros(shape) if learned is None else learned.astype(float)
+        self._learns = dr.opaque(mi.Bool, True)
+        self._begin_counting(self.cells * self.count)
+        if learned is not None:
+            self.freeze()
+        self._set_probabilities()
 
     def learned(self) -> Floats:
-        """Return (2, cells, emitters) float32: the light received in all, the number of samples."""
-        return np.stack(
-            [np.array(x).reshape(self.cells, self.count) for x in (self.received, self.asked)]
-        ).astype(np.float32)
-
-    def freeze(self) -> None:
-        """Stop learning, so that later choices do not depend on what has been rendered."""
-        self._learning = False
-        self._learns = dr.opaque(mi.Bool, False)
+        """(2, cells, emitters) float32: what was received in all, and how often it was asked."""
+        return np.stack([self._received, self._asked]).astype(np.float32)
 
     def update(self) -> None:
-        """Update the probabilities by what passes have learned since the last call."""
-        if not self._learning:
-            return
-        # Rounded as in a file, so that continuing from a file makes no difference.
+        """Take what a pass has learned into the probabilities."""
+        shape = self.cells, self.count
+        counted = np.array(self._counted).reshape(shape).astype(float)
+        asked = np.array(self._questions).reshape(shape)
+        self._received += counted / self._units
+        self._asked += asked
+        mean = counted.sum(axis=0) / np.maximum(asked.sum(axis=0), 1)
+        # Powers of two, by which no digit of what is counted changes.
+        units = self._units * 2.0 ** np.round(np.log2(UNITS / np.maximum(mean, 1 / UNITS)))
+        self._units = np.clip(units, 2.0**-60, 2.0**100)
+        self._begin_counting(self.cells * self.count)
+        self._set_probabilities()
+
+    def freeze(self) -> None:
+        """Learn nothing more."""
+        self._learns = dr.opaque(mi.Bool, False)
+        self._begin_counting(1)
+
+    def _begin_counting(self, entries: int) -> None:
+        self._counted = dr.zeros(mi.UInt64, entries)
+        self._questions = dr.zeros(mi.UInt32, entries)
+        self._units_of = mi.Float(self._units.astype(np.float32))
+
+    def _set_probabilities(self) -> None:
+        # As they come from a file, so that it makes no difference who has learned.
         received, asked = self.learned()
         # Most cells of the table hold no surface: there the choice is even.
         known = asked.any(axis=1)
@@ -95,8 +119,6 @@ class Guide:
         cumulative[known] = np.cumsum(found, axis=1)
         cumulative[:, np.flatnonzero(self._sampled)[-1] :] = 1
         self._cumulative = mi.Float(cumulative.ravel())
-        self._learning = bool(asked.sum() < max(ENOUGH, ENOUGH_EACH * self.count))
-        self._learns = dr.opaque(mi.Bool, self._learning)
         dr.eval(self._cumulative)
 
     def cell(self, si):
@@ -126,7 +148,7 @@ class Guide:
             lambda k: dr.gather(mi.Float, self._cumulative, first + k, active) <= number,
         )
         below, probability = self._share(first, emitter, active)
-        return emitter, probability, dr.minimum((number - below) / probability, _BELOW_1)
+        return emitter, probability, dr.minimum((number - below) / probability, BELOW_1)
 
     def probability(self, cell, emitter, active):
         """Return the probability with which `choose` draws `emitter`, a pointer, in `cell`."""
@@ -147,12 +169,16 @@ class Guide:
         """
         entry = cell * self.count + emitter
         asked, lit = asked & self._learns, lit & self._learns
-        dr.scatter_add(self.asked, mi.UInt32(1), entry, asked)
+        dr.scatter_add(self._questions, mi.UInt32(1), entry, asked)
         gray = dr.mean(contribution)
-        dr.scatter_add(self.received, mi.Float64(gray), entry, lit & dr.isfinite(gray))
+        units = gray * dr.gather(mi.Float, self._units_of, emitter, lit)
+        units = mi.UInt64(mi.UInt32(dr.clip(units, 0, MOST_UNITS)))
+        dr.scatter_add(self._counted, units, entry, lit & dr.isfinite(gray))
 
-
-_BELOW_1 = 1 - 2**-24
+    def evaluate(self) -> None:
+        """Run what was traced, and wait for it."""
+        dr.eval(self._counted, self._questions)
+        dr.sync_thread()
 
 
 def _is_sane(learned: Floats) -> bool:

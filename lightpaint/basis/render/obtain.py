@@ -67,8 +67,7 @@ def obtain_basis(
     asked = scene.spp if spp is None else spp
     start = kept
     if exact_spp:
-        in_parts = render is not render_basis
-        if start is not None and not is_on_the_way(scene, start, spp, is_in_parts=in_parts):
+        if start is not None and not is_on_the_way(scene, start, spp):
             start = None
     elif time_s is None and (kept is None or kept.origin.spp < asked):
         start = gather(scene, kept, spp=asked, seed=seed)

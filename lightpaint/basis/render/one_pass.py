@@ -6,9 +6,9 @@ by choice (next-event estimation). This integrator traces the very paths of Mits
 It draws random numbers in the same order too, so that with equal seeds the sum over the
 lights equals `mi.render` up to round-off, and one pass serves all lights.
 
-That is its plain mode, which tests hold against Mitsuba's. For a basis two things are done
-better, at the same cost: numbers come from an evenly spread sequence instead of from chance
-(see sobol.py), and emitters are chosen by what earlier passes have learned (see guide.py).
+That is its plain mode, `trace_plainly`, which tests hold against Mitsuba's. For a basis two things
+are done better, at the same cost: numbers come from an evenly spread sequence instead of from
+chance (see sobol.py), and emitters are chosen by what a lesson has learned (see lessons.py).
 
 Import it once a variant is set and not a scalar one: its arrays do not exist before.
 """
@@ -16,7 +16,6 @@ Import it once a variant is set and not a scalar one: its arrays do not exist be
 # mypy: disable-error-code="no-untyped-call"
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -25,195 +24,161 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.render.guide import Guide
-from lightpaint.basis.render.half_sums import HalfSums
 from lightpaint.basis.render.integrators import depth_limit, needs_a_bounce
-from lightpaint.basis.render.paths import Planes, camera_rays, trace
+from lightpaint.basis.render.light_planes import LightPlanes
+from lightpaint.basis.render.paths import Rules, View, trace_paths, trace_samples
 from lightpaint.basis.render.sobol import SobolPairs
-from lightpaint.scene.integrator import Integrator
+from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
+#: How many emitters are asked at the first vertex, and at later ones where there are fewer emitters
+#: than that.
+FIRST_QUESTIONS = 8
+LATER_QUESTIONS = {32: 2, 128: 4, 2**32: 8}
+
 
 class Tracer:
-    """A loaded scene, all lights at unit emission, that adds passes to `HalfSums`.
+    """A loaded scene, all lights at unit emission, whose samples are traced for `LightPlanes`.
 
-    Close it before another scene is loaded. seed: of all random numbers.
-    learned: what an earlier one had learned of the same scene, if there was one.
+    Close it before another scene is loaded. seed: of all random numbers. learned: how it chooses
+    emitters, as a lesson has found out; without, it chooses by what it is taught. questions: how
+    many emitters the first vertex asks and later ones, if other than usual.
+
+    The samples of a pixel are terms of one sequence for each half, whatever is traced of them at a
+    time. So their sum does not depend on that, nor on the number of threads.
     """
 
-    def __init__(self, scene: Scene, seed: int, learned: Floats | None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        seed: int,
+        learned: Floats | None = None,
+        *,
+        questions: tuple[int, int] | None = None,
+    ) -> None:
         self.scene = scene
         self.loaded = scene.load({light.name: (1.0, 1.0, 1.0) for light in scene.lights})
         self.light_of = lights_by_instance(self.loaded, scene.plane_of)
         self.guide = Guide(self.loaded, self.light_of, scene.eye(self.loaded), learned)
-        # One stream of numbers for each half and for the rehearsal, far from all others.
-        self.streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(3)]
-
-    def rehearse(self, spp: int) -> None:
-        """Render a pass only to learn from it: without guidance it is the noisiest."""
-        nowhere = HalfSums(len(self.scene.lights), self.scene.size)
-        self._trace(nowhere.planes[0], nowhere.seen, spp, Guided(self.streams[2], 0, self.guide))
+        self.learned = learned
+        if questions is None:
+            questions = FIRST_QUESTIONS, later_questions(self.guide.count)
+        self._questions = questions
+        # One stream of numbers for each half and for the lesson, far from all others.
+        self._streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(3)]
 
     def learn(self, rows: range, first: int, spp: int) -> None:
         """Learn from some samples of some rows, whose light is not kept.
 
         first: samples of a pixel that were learned from before.
         """
-        planes, seen = dr.zeros(mi.Float, 3 * len(self.scene.lights)), dr.zeros(mi.Float, 1)
-        numbers = Guided(self.streams[2], first, self.guide)
-        self._trace(planes, seen, spp, numbers, rows, is_kept=False)
+        nowhere = LightPlanes.nowhere(self.light_of)
+        with kernels():
+            self._trace(2, nowhere, rows, first, spp)
+            self.guide.evaluate()
+        self.guide.update()
 
-    def add_pass(self, sums: HalfSums, half: int, spp: int) -> None:
-        """Add `spp` samples per pixel to one of the halves of `sums`."""
-        numbers = Guided(self.streams[half], sums.spp[half], self.guide)
-        self._trace(sums.planes[half], sums.seen, spp, numbers)
-        sums.spp[half] += spp
-        sums.passes[half] += 1
+    def end_lesson(self) -> Floats:
+        """Learn no more. Returns what was learned, (2, cells, emitters)."""
+        self.learned = self.guide.learned()
+        self.guide.freeze()
+        return self.learned
 
-    def part(self, half: int, rows: range, first: int, spp: int) -> tuple[Floats, Floats]:
-        """Return the sums of some samples of some rows, (n, rows, w, 3), and rays that saw an
-        emitter.
+    @property
+    def is_taught(self) -> bool:
+        """True once it has learned all that it will."""
+        return self.learned is not None
+
+    def planes(self, rows: range) -> LightPlanes:
+        """Return planes of some rows, to which nothing is added yet."""
+        return LightPlanes(self.light_of, len(self.scene.lights), len(rows) * self.scene.size[1])
+
+    def add(self, planes: LightPlanes, half: int, rows: range, first: int, spp: int) -> None:
+        """Add the light of some samples of some rows, of one half, to `planes` of these rows.
 
         first: samples of a pixel of that half that come before.
         """
-        n, width = len(self.scene.lights), self.scene.size[1]
-        planes = dr.zeros(mi.Float, n * len(rows) * width * 3)
-        seen = dr.zeros(mi.Float, len(rows) * width)
-        numbers = Guided(self.streams[half], first, self.guide)
-        self._trace(planes, seen, spp, numbers, rows)
-        shape = len(rows), width
-        return np.array(planes).reshape(n, *shape, 3), np.array(seen).reshape(shape)
+        with kernels():
+            self._trace(half, planes, rows, first, spp)
+            planes.evaluate()
 
     def close(self) -> None:
         """Release the scene and all that refers to it."""
         del self.loaded, self.light_of, self.guide
 
-    def _trace(
-        self,
-        planes: Any,
-        seen: Any,
-        spp: int,
-        numbers: "Guided",
-        rows: range | None = None,
-        *,
-        is_kept: bool = True,
-    ) -> None:
-        accumulate(
-            self.loaded,
-            self.scene.integrator,
-            camera=self.scene.camera(self.loaded),
-            light_of=self.light_of,
-            planes=planes,
-            seen=seen,
-            spp=spp,
-            guided=numbers,
-            block=self.scene.film.block,
-            must_bounce=needs_a_bounce(self.scene),
-            rows=rows,
-            is_kept=is_kept,
+    def _trace(self, stream: int, planes: LightPlanes, rows: range, first: int, spp: int) -> None:
+        view = view_of(self.scene, self.loaded)
+        place = dr.arange(mi.UInt32, view.width * len(rows))
+        row = place // view.width
+        column = place - row * view.width
+        # What differs between calls is no constant of the kernel, which is compiled once.
+        start, step, begin, count = (
+            dr.opaque(mi.UInt32, x) for x in (rows.start, rows.step, first, spp)
         )
-        # A running kernel cannot be interrupted, and what is not waited for is still running.
-        dr.sync_thread()
+        pixel = (row * step + start) * view.width + column
+        numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, self._streams[stream]))
+        first, later = self._questions
+        rules = rules_of(self.scene)._replace(
+            first_questions=dr.opaque(mi.UInt32, first),
+            later_questions=dr.opaque(mi.UInt32, later),
+        )
+        end = begin + count
+        trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
+
+
+def later_questions(emitters: int) -> int:
+    """Return how many emitters are asked at vertices but the first, of so many."""
+    return next(its for fewer, its in LATER_QUESTIONS.items() if emitters < fewer)
+
+
+def view_of(scene: Scene, loaded: Any) -> View:
+    """Return what the camera of `scene`, which is loaded, sees."""
+    camera = scene.camera(loaded)
+    width, height = (int(v) // scene.film.block for v in camera.film().crop_size())
+    return View(loaded, camera, width, height)
+
+
+def rules_of(scene: Scene) -> Rules:
+    """Return what paths the integrator of `scene` follows."""
+    integrator = scene.integrator
+    return Rules(
+        hide_emitters=integrator.hide_emitters,
+        must_bounce=needs_a_bounce(scene),
+        max_depth=mi.UInt32(depth_limit(integrator)),
+        rr_depth=mi.UInt32(integrator.rr_depth),
+    )
 
 
 def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
     """Return a UInt32 array from the Dr.Jit instance id of an emitter to its light's plane.
 
-    plane_of: index of the plane by the emitter's name.
+    plane_of: index of the plane by the emitter's name. What belongs to no light is black, and does
+    no harm in the first plane.
     """
     instances = np.array(dr.reinterpret_array(mi.UInt32, scene.emitters_dr())).tolist()
     table = np.zeros(max(instances) + 1, dtype=np.uint32)
     for instance, emitter in zip(instances, scene.emitters(), strict=True):
-        # What is in no light is black, so that it does not matter to which it adds nothing.
         table[instance] = plane_of.get(emitter.id(), 0)
     return mi.UInt32(table)
 
 
-@dataclass(frozen=True)
-class Guided:
-    """The guidance for drawing numbers and emitters.
+def trace_plainly(scene: Scene, loaded: Any, *, seed: int, spp: int) -> Floats:
+    """Render all planes with Mitsuba's own numbers and choices, (n, h, w, 3).
 
-    stream, first: the samples of a pixel are terms `first` … of the pixel's own sequence;
-    passes that are averaged go on in one stream, passes that must be independent have two.
-    guide: chooses emitters, and learns from the pass.
+    loaded: `scene`, by its `load`. spp: samples per pixel, which some samplers round up.
     """
-
-    stream: int
-    first: int
-    guide: Guide
-
-
-def accumulate(
-    scene: Any,
-    integrator: Integrator,
-    *,
-    camera: Any,
-    light_of: Any,
-    planes: Any,
-    seen: Any,
-    spp: int,
-    seed: int = 0,
-    guided: Guided | None = None,
-    block: int = 1,
-    must_bounce: bool = False,
-    rows: range | None = None,
-    is_kept: bool = True,
-) -> int:
-    """Trace `spp` paths per pixel and add what they carry, undivided, to `planes`.
-
-    scene: an `mi.Scene`; camera: one of its sensors, with a box-filtered film.
-    light_of: what `lights_by_instance` returns.
-    planes: Float array of n·h·w·3 values, laid out (n, h, w, 3).
-    seen: Float array of h·w values; counts the camera rays that see an emitter.
-    guided: None draws all numbers at random, from `seed`, in Mitsuba's order.
-    block: side of the blocks of the film's pixels that are pixels here.
-    must_bounce: whether paths that only pass surfaces carry nothing (see integrators.py).
-    rows: those of the picture that are rendered, which are then all that `planes` and `seen` have;
-    guided alone. Their samples are the same as of the whole picture.
-    is_kept: whether pixels are kept apart; else these have one, for all.
-    Returns the number of paths per pixel, which some samplers round up.
-    """
-    width, height = (int(v) // block for v in camera.film().crop_size())
-    sampler = None
-    if guided is None:
-        sampler = camera.sampler().clone()
-        sampler.set_sample_count(spp)
-        spp = int(sampler.sample_count())
-        sampler.set_samples_per_wavefront(spp)
-        sampler.seed(seed, width * height * spp)
-
-    rows = range(height) if rows is None else rows
-    sample = dr.arange(mi.UInt32, width * len(rows) * spp)
-    its = sample // dr.opaque(mi.UInt32, spp)
-    row = its // width
-    pixel = (row * dr.opaque(mi.UInt32, rows.step) + dr.opaque(mi.UInt32, rows.start)) * width
-    pixel += its - row * width
-    numbers = None
-    if guided is not None:
-        term = sample - its * dr.opaque(mi.UInt32, spp) + dr.opaque(mi.UInt32, guided.first)
-        numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, guided.stream), term)
-    ray, weight = camera_rays(camera, sampler, numbers, pixel, width, height)
-    guide = guided.guide if guided is not None else None
-    trace(
-        scene,
-        sampler,
-        numbers,
-        guide,
-        ray,
-        weight,
-        Planes(
-            planes,
-            seen,
-            light_of,
-            its & dr.opaque(mi.UInt32, 0xFFFFFFFF if is_kept else 0),
-            dr.opaque(mi.UInt32, width * len(rows) if is_kept else 1),
-        ),
-        hide_emitters=integrator.hide_emitters,
-        must_bounce=must_bounce,
-        max_depth=mi.UInt32(depth_limit(integrator)),
-        rr_depth=mi.UInt32(integrator.rr_depth),
-    )
-    dr.eval(planes, seen)
-    if guide is not None:
-        guide.update()
-    return spp
+    view = view_of(scene, loaded)
+    sampler = view.camera.sampler().clone()
+    sampler.set_sample_count(spp)
+    spp = int(sampler.sample_count())
+    sampler.set_samples_per_wavefront(spp)
+    pixels = view.width * view.height
+    sampler.seed(seed, pixels * spp)
+    pixel = dr.arange(mi.UInt32, pixels * spp) // dr.opaque(mi.UInt32, spp)
+    light_of = lights_by_instance(loaded, scene.plane_of)
+    planes = LightPlanes(light_of, len(scene.lights), pixels, is_shared=True)
+    rules = rules_of(scene)
+    trace_paths(view, sampler, None, None, planes, rules, pixel, pixel, mi.UInt32(0))
+    planes.evaluate()
+    return planes.sums().reshape(len(scene.lights), view.height, view.width, 3) / spp

@@ -1,36 +1,40 @@
 """Rendering the basis: all lights in one pass where that is possible, else one by one."""
 
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import as_planes
-from lightpaint.basis.render.budget import Budget, Keeper, passes
+from lightpaint.basis.render.budget import Budget, Keeper, half_of, steps
 from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.render.lessons import teach
 from lightpaint.basis.render.separate import (
     LightSums,
     emitters_seen,
     plan_of_light,
     render_separately,
 )
+from lightpaint.basis.render.sums import add_halves, mean_and_half_difference
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.mitsuba_errors import render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import SAMPLES_PER_PASS, plan_passes, view_seed
+from lightpaint.scene.scene_render import SAMPLES_PER_PASS, view_seed
 from lightpaint.scene.surfaces import render_first_hits
 
-#: Camera samples that choices of emitters are learned from before any counts.
-REHEARSAL = 2**18
-
-ONE_PASS = "one pass"
+ONE_PASS = "one pass, several questions"
 SEPARATE = "separate renders"
-#: The first of these, by parts.py: the same samples, but for which emitters they ask.
-IN_PARTS = "one pass, in parts"
+
+#: Passes of a one-pass basis, whose samples do not depend on them: whether it has all that were
+#: asked for, or an interrupt ended it.
+FINISHED, UNFINISHED = (1, 1), (0, 0)
 
 
 @keywords()
@@ -49,7 +53,7 @@ def render_basis(
     Args:
         scene: As `load_scene` returns it.
         spp: Samples per pixel (the scene's own number by default).
-        time_s: Instead, seconds to render for, besides what `start` took; whole pairs of passes.
+        time_s: Instead, seconds to render for, besides what `start` took; whole steps.
         seed: Any number >= 0; other seeds give independent bases.
         start: An earlier basis of the same scene, sensor and seed: its samples count, and only what
             is missing to `spp` is rendered, or as many more as `time_s` allows.
@@ -80,7 +84,7 @@ def render_basis(
     if start is not None and budget.met_by(start.origin.spp):
         return with_first_hits(start.with_requests(scene.requests), scene, seed)
     method = method_of(scene)
-    if start is not None and not goes_on(start.origin.method, method):
+    if start is not None and start.origin.method != method:
         # Nothing to go on from, but nothing to be replaced by less either.
         start, keep = None, None
     if start is not None and method == ONE_PASS and start.origin.each_light:
@@ -94,11 +98,6 @@ def render_basis(
     if start is not None:
         made = replace(made, features=start.features, objects=start.objects)
     return with_first_hits(made, scene, seed)
-
-
-def goes_on(its: str, method: str) -> bool:
-    """Return True if samples by `method` can be added to those of a basis by the method `its`."""
-    return (ONE_PASS if its == IN_PARTS else its) == method
 
 
 def with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
@@ -150,23 +149,21 @@ def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
     return of == mine and basis.size == scene.size
 
 
-def is_on_the_way(
-    scene: Scene, basis: Basis, spp: int | None, *, is_in_parts: bool = False
-) -> bool:
-    """Return True if a render to `spp` samples per pixel passes through those of `basis`.
+def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
+    """Return True if a render from nothing to `spp` samples comes by just those of `basis`.
 
-    So does one that an interrupt ended, and not one that was made for fewer samples: its passes
-    end elsewhere. spp: the scene's own number if None. is_in_parts: whether it is rendered by
-    parts.py, which comes by nothing but its end.
+    So does one that an interrupt ended, and not one that was made for fewer samples: it is rounded
+    where it is kept, or its passes end elsewhere. spp: the scene's own number if None.
     """
     origin = basis.origin
     if origin.is_composed:
         return False
-    if is_in_parts and method_of(scene) == ONE_PASS:
-        return origin.method == IN_PARTS and origin.spp == samples_for(scene, spp)
     if origin.method != method_of(scene):
         return False
-    plan = _plan(scene, spp)
+    if origin.method == ONE_PASS:
+        wanted = samples_for(scene, spp)
+        return origin.spp == wanted or (origin.spp < wanted and origin.passes == UNFINISHED)
+    plan = plan_of_light(scene, scene.spp if spp is None else spp)
     sizes = [[size for half, size in plan if half == h] for h in range(2)]
     return all(
         count <= len(its) and sum(its[:count]) == done
@@ -181,15 +178,10 @@ def samples_for(scene: Scene, spp: int | None) -> int:
     One more where that makes the halves equal, and some where a pixel is a block of pixels that
     ordinary renders take one sample of each in.
     """
-    return sum(size for _, size in _plan(scene, spp))
-
-
-def _plan(scene: Scene, spp: int | None) -> list[tuple[int, int]]:
-    """Return the passes of all lights, or of each, up to `spp`, by default the scene's own."""
-    (height, width), spp = scene.size, scene.spp if spp is None else spp
+    spp = scene.spp if spp is None else spp
     if method_of(scene) == ONE_PASS:
-        return plan_passes(height * width, spp)
-    return plan_of_light(scene, spp)
+        return 2 * half_of(spp)
+    return sum(size for _, size in plan_of_light(scene, spp))
 
 
 def method_of(scene: Scene) -> str:
@@ -234,6 +226,44 @@ def basis_lights(scene: Scene) -> Lights:
     return Lights(lights, scene.requests)
 
 
+def basis_of_sums(
+    scene: Scene,
+    seed: int,
+    halves: Sequence[Floats],
+    seen: Bools,
+    half_spp: int,
+    learned: Floats | None,
+    *,
+    start: Basis | None,
+    is_finished: bool = True,
+) -> Basis:
+    """Return the one-pass basis of what was rendered, and of `start`.
+
+    halves: undivided sums of two halves of the samples, (n, h, w, 3), which are overwritten. seen:
+    (h, w). half_spp: samples per pixel of each half in all. is_finished: whether there are as many
+    as were asked for.
+    """
+    if start is not None:
+        add_halves(halves, start)
+        seen = seen | start.emitters_seen
+    images, half_differences = mean_and_half_difference(halves, (half_spp, half_spp))
+    return Basis(
+        basis_lights(scene),
+        as_planes(images),
+        as_planes(half_differences),
+        seen,
+        origin_of(
+            scene,
+            seed,
+            ONE_PASS,
+            (half_spp, half_spp),
+            FINISHED if is_finished else UNFINISHED,
+        ),
+        learned,
+        source=str(scene.path),
+    )
+
+
 @MITSUBA.taken()
 def _render_together(
     scene: Scene,
@@ -243,50 +273,48 @@ def _render_together(
     keeper: Keeper,
     progress: Progress,
 ) -> Basis:
-    """Render all lights in one path-traced pass after another (see one_pass.py)."""
-    from lightpaint.basis.render.half_sums import HalfSums
+    """Render all lights by one path tracer (see one_pass.py), step by step."""
     from lightpaint.basis.render.one_pass import Tracer
 
     height, width = scene.size
-    sums = HalfSums(len(scene.lights), scene.size) if start is None else HalfSums.of(start)
-    numbers = view_seed(seed, scene.sensor)
-    tracer = Tracer(scene, numbers, start.learned if start is not None else None)
-    knows_nothing = start is None or start.learned is None
+    rows = range(height)
+    begun = done = 0 if start is None else start.origin.halves[0]
+    learned = None if start is None else start.learned
+    tracer = Tracer(scene, view_seed(seed, scene.sensor), learned)
+    halves = [tracer.planes(rows) for _ in range(2)]
 
-    def basis(*, is_last: bool = False) -> Basis:
-        images, half_differences = sums.mean_and_half_difference(is_last=is_last)
-        halves, passes = (sums.spp[0], sums.spp[1]), (sums.passes[0], sums.passes[1])
-        return Basis(
-            basis_lights(scene),
-            as_planes(images),
-            as_planes(half_differences),
-            sums.emitters_seen(),
-            origin_of(scene, seed, ONE_PASS, halves, passes),
-            tracer.guide.learned(),
-            source=str(scene.path),
+    def basis(*, is_last: bool = False, is_finished: bool = False) -> Basis:
+        seen = np.add(*(planes.seen() for planes in halves)).reshape(height, width) > 0
+        sums = []
+        for half, planes in enumerate(halves):
+            sums.append(planes.sums().reshape(-1, height, width, 3))
+            if is_last:  # saves as much memory again
+                halves[half] = tracer.planes(range(0))
+        return basis_of_sums(
+            scene, seed, sums, seen, done, tracer.learned, start=start, is_finished=is_finished
         )
 
     try:
         with tracing() as let_others_through:
-            for half, spp in passes(height * width, budget, sums.spp, progress):
-                if knows_nothing:
-                    knows_nothing = False
-                    tracer.rehearse(max(1, REHEARSAL // (height * width)))
-                let_others_through()
-                tracer.add_pass(sums, half, spp)
-                if all(sums.spp):
-                    keeper.now_and_then(basis)
-        return basis(is_last=True)
+            for spp in steps(height * width, budget, done, progress):
+                if not tracer.is_taught:
+                    teach(tracer, let_others_through)
+                for half, planes in enumerate(halves):
+                    let_others_through()
+                    tracer.add(planes, half, rows, done, spp)
+                done += spp
+                keeper.now_and_then(basis)
+        return basis(is_last=True, is_finished=True)
     except KeyboardInterrupt:
         if keeper.keep is None:
             raise
-        if not all(sums.spp):
+        if done == begun == 0:
             raise Interrupted("too early for anything to be kept") from None
         if not keeper.keep(basis(is_last=True)):
             raise
         of = "" if budget.time_s is not None else f" of {budget.spp}"
         raise Interrupted(
-            f"{sum(sums.spp)}{of} samples per pixel are kept; the same command goes on"
+            f"{2 * done}{of} samples per pixel are kept; the same command goes on"
         ) from None
     finally:
         tracer.close()

@@ -20,21 +20,20 @@ PAIRS_PER_VERTEX = 3
 
 
 class SobolPairs:
-    """The numbers of many paths: each path is one term of the sequence of its pixel.
+    """The numbers of many pixels: each of their samples is one term of a sequence.
 
-    pixel, term: UInt32 arrays. stream: other streams share nothing with this one.
+    pixel: UInt32 array. stream: other streams share nothing with this one. Terms are UInt32 arrays.
     """
 
-    def __init__(self, pixel, stream, term):
+    def __init__(self, pixel, stream):
         self._key, _ = mi.sample_tea_32(pixel, stream)
-        self._reversed_term = dr.brev(term)
 
-    def pair(self, dimension):
-        """Return two numbers in [0, 1) per path, evenly spread together over the terms."""
+    def pair(self, term, dimension):
+        """Two numbers in [0, 1) per pixel, evenly spread together over the terms."""
         seed = hashed(self._key + dimension * mi.UInt32(0x9E3779B9))
         # The terms are shuffled so that pairs of unlike dimensions do not go together. A
         # shuffled term, its bits reversed, is the first Sobol' dimension as it stands.
-        x = _scrambled(self._reversed_term, seed)
+        x = _scrambled(dr.brev(term), seed)
         # The second is its polynomial over GF(2) taken at 1 + x, block by block.
         y = mi.UInt32(x)
         for shift, low_halves in _BLOCKS:
@@ -44,9 +43,9 @@ class SobolPairs:
         shift_y = hashed(shift_x ^ 0x02E5BE93)
         return mi.Point2f(_unit(x ^ shift_x), _unit(y ^ shift_y))
 
-    def at_vertex(self, depth, which):
-        """Return pair `which` (below PAIRS_PER_VERTEX) of the path vertex at `depth`."""
-        return self.pair(FIRST_VERTEX + which + depth * PAIRS_PER_VERTEX)
+    def at_vertex(self, term, depth, which):
+        """Pair `which` (below PAIRS_PER_VERTEX) of the path vertex at `depth`."""
+        return self.pair(term, FIRST_VERTEX + which + depth * PAIRS_PER_VERTEX)
 
 
 _BLOCKS = ((16, 0x0000FFFF), (8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555))

@@ -8,13 +8,17 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 
 
-def halves_of(basis: Basis) -> list[Floats]:
-    """Return the undivided sums of both halves of `basis`, up to round-off, (n, h, w, 3) each."""
+def add_halves(halves: Sequence[Floats], basis: Basis) -> None:
+    """Add the undivided sums of both halves that made `basis`, up to round-off, to `halves`.
+
+    halves: (n, h, w, 3) each.
+    """
     a, b = basis.origin.halves
     # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
-    half_a = basis.images + basis.half_differences * (2 * b / (a + b))
-    half_b = basis.images - basis.half_differences * (2 * a / (a + b))
-    return [half_a * a, half_b * b]
+    to_a, to_b = np.float32(2 * b / (a + b)), np.float32(2 * a / (a + b))
+    for k, (image, half_difference) in enumerate(zip(basis.planes, basis.noise, strict=True)):
+        halves[0][k] += a * (image + half_difference * to_a)
+        halves[1][k] += b * (image - half_difference * to_b)
 
 
 def mean_and_half_difference(halves: Sequence[Floats], spp: Sequence[int]) -> tuple[Floats, Floats]:

@@ -5,11 +5,11 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.parts import LESSON, LESSONS, Part, PartSums, plan_parts
+from lightpaint.basis.render.lessons import LESSON
+from lightpaint.basis.render.parts import Part, PartSums, plan_parts
 from lightpaint.basis.render.render import (
     ONE_PASS,
     check_memory,
-    goes_on,
     method_of,
     render_basis,
     with_first_hits,
@@ -50,13 +50,13 @@ class PartwiseRender:
         spp = scene.spp if spp is None else spp
         if start is not None and start.origin.spp >= spp:
             return with_first_hits(start.with_requests(scene.requests), scene, seed)
-        if start is not None and not goes_on(start.origin.method, method_of(scene)):
+        if start is not None and start.origin.method != method_of(scene):
             start = None
         check_memory(scene)
         parts = plan_parts(scene, spp, start=start)
         spool = Spool(scene, parts, seed=seed, start=start)
         film = self._film_of(scene)
-        learned = obtain_lesson(self._engine, film, scene, spp, seed, start, spool)
+        learned = obtain_lesson(self._engine, film, scene, seed, start, spool)
         sums = PartSums(scene, parts, seed=seed, start=start)
         self._add_all(scene, parts, sums, seed, spool, progress)
         basis = sums.basis(learned)
@@ -86,7 +86,8 @@ class PartwiseRender:
                 continue
             pixels = (part.bottom - part.top) * scene.size[1]
             lights = len(scene.lights) if part.light is None else 1
-            expected_s = render_seconds(pixels * part.spp, lights)
+            samples = pixels * part.spp * (2 if part.half is None else 1)
+            expected_s = render_seconds(samples, lights)
             item = PartOfBasis(f"part {k}", self._film_of(scene), part, seed, learned, expected_s)
             left[item.name] = item
         progress("basis", len(parts) - len(left), len(parts), "parts")
@@ -103,7 +104,6 @@ def obtain_lesson(
     engine: Engine,
     film: SceneFilm,
     scene: Scene,
-    spp: int,
     seed: int,
     start: Basis | None,
     spool: Spool,
@@ -115,8 +115,8 @@ def obtain_lesson(
         return None
     learned = spool.lesson() if start is None else start.learned
     if learned is None:
-        expected_s = render_seconds(LESSON * LESSONS, len(scene.lights))
-        [done] = engine.run([Lesson("lesson", film, spp, seed, expected_s)])
+        expected_s = render_seconds(sum(LESSON), len(scene.lights))
+        [done] = engine.run([Lesson("lesson", film, seed, expected_s)])
         if done.failure:
             raise BasisError(done.failure)
         learned = done.value

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from lightpaint.basis.render.parts import Part, plan_parts
+from lightpaint.basis.render.parts import plan_parts
 from lightpaint.basis.render.render import basis_lights
 from lightpaint.batch.work.basis_parts import obtain_lesson
 from lightpaint.batch.work.engine import Engine
@@ -65,19 +65,16 @@ def _render_sums(
     file = replace(job_fields(task, cache)["scenes"][0])
     film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, scene.read_files)))
     spool = Spool(scene, parts, seed=settings.seed, start=None)
-    obtain_lesson(engine, film, scene, spp, settings.seed, None, spool)
+    obtain_lesson(engine, film, scene, settings.seed, None, spool)
     paintings = tuple(
         PaintingOfSums(_file_of(job), job.fit.emitters, job.settings.resize) for job in jobs
     )
     reads = tuple(dict.fromkeys(str(x) for job in jobs for x in job.views[0].target.files))
-    tiles: dict[tuple[int, int], list[Part]] = {}
-    for part in sorted(parts, key=lambda part: (part.top, part.half, part.first)):
-        tiles.setdefault((part.top, part.bottom), []).append(part)
     items = []
-    for k, ((top, bottom), its) in enumerate(tiles.items()):
-        pixels = (bottom - top) * scene.size[1]
-        expected_s = render_seconds(pixels * sum(part.spp for part in its), len(scene.lights))
-        options: dict[str, Any] = {"film": film, "parts": tuple(its), "seed": settings.seed}
+    for k, part in enumerate(parts):
+        pixels = (part.bottom - part.top) * scene.size[1]
+        expected_s = render_seconds(2 * pixels * part.spp, len(scene.lights))
+        options: dict[str, Any] = {"film": film, "part": part, "seed": settings.seed}
         options |= {"learned": str(spool.learned), "paintings": paintings, "files": reads}
         items.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **options))
     results: dict[str, list[Sums]] = {}

@@ -81,8 +81,8 @@ class Spool:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _file(self, part: Part) -> Path:
-        light = "" if part.light is None else f"-{part.light}"
-        return self.folder / f"{part.half}-{part.top}-{part.first}{light}.npz"
+        light = "" if part.light is None else f"-{part.light}-{part.half}"
+        return self.folder / f"{part.top}-{part.first}{light}.npz"
 
     def _delete_leftovers(self) -> None:
         for other in self.folder.parent.glob("*"):

@@ -1,13 +1,10 @@
 """Answers of which only the lighting is wanted: the sums of rows, and what is solved from them."""
 
 from dataclasses import replace
-from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
-from lightpaint.basis.planes import as_planes
-from lightpaint.basis.render.render import IN_PARTS, basis_lights, origin_of
-from lightpaint.basis.render.sums import mean_and_half_difference
+from lightpaint.basis.render.render import basis_of_sums
 from lightpaint.batch.work.work_items import SumsOfRows
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.lighting.answer.lighting import Lighting
@@ -25,19 +22,11 @@ def sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
     these rows.
     """
     renderer, scene = cache.renderer(item), cache.film(item.film)
-    halves: list[Any] = [None, None]
-    spp, seen = [0, 0], None
-    for part in item.parts:
-        planes, its = renderer.render(part)
-        before = halves[part.half]
-        halves[part.half] = planes if before is None else before + planes
-        seen = its if seen is None else seen + its
-        spp[part.half] += part.spp
-    assert seen is not None
-    images, differences = mean_and_half_difference(halves, spp)
-    rows = slice(item.parts[0].top, item.parts[0].bottom)
-    origin = origin_of(scene, item.seed, IN_PARTS, (spp[0], spp[1]), (1, 1))
-    basis = Basis(basis_lights(scene), as_planes(images), as_planes(differences), seen > 0, origin)
+    part = item.part
+    halves, seen = renderer.render(part)
+    seen = seen.sum(axis=0) > 0
+    basis = basis_of_sums(scene, item.seed, list(halves), seen, part.spp, None, start=None)
+    rows = slice(part.top, part.bottom)
     return [
         sum_rows(basis, cache.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
         for wanted in item.paintings

@@ -9,7 +9,7 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.basis.render.parts import lesson
+from lightpaint.basis.render.lessons import lesson
 from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
@@ -80,7 +80,7 @@ def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
     """Run an item; return its value, or None if it fills a folder instead."""
     if isinstance(item, Lesson):
         cache.release_renderer()
-        return lesson(cache.film(item.film), item.spp, item.seed)
+        return lesson(cache.film(item.film), item.seed)
     if isinstance(item, PartOfBasis):
         return cache.renderer(item).render(item.part)
     if isinstance(item, SumsOfRows):

@@ -106,13 +106,10 @@ class SceneFilm:
 
 @dataclass(frozen=True)
 class Lesson:
-    """An item that learns the emission by which parts of a basis sample. spp: of the whole
-    basis.
-    """
+    """An item that learns the emission by which parts of a basis sample."""
 
     name: str
     film: SceneFilm
-    spp: int
     seed: int
     expected_s: float
     kind: Literal["lesson"] = "lesson"
@@ -180,12 +177,12 @@ class PaintingOfSums:
 class SumsOfRows:
     """An item that renders rows of a basis, and keeps nothing but their sums with paintings.
 
-    parts: all of these rows, in their order. learned: as of `PartOfBasis`. files: of the paintings.
+    part: of all of their samples. learned: as of `PartOfBasis`. files: of the paintings.
     """
 
     name: str
     film: SceneFilm
-    parts: tuple[Part, ...]
+    part: Part
     seed: int
     learned: str
     paintings: tuple[PaintingOfSums, ...]

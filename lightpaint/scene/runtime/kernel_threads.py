@@ -22,11 +22,6 @@ def limit_threads(count: int | None) -> None:
     limit_jobs(count)
 
 
-def adds_in_order() -> bool:
-    """Return True if all kernels of this process add up in the same order each time."""
-    return _limit == 1
-
-
 @contextmanager
 def kernels(threads: int | None = None) -> Iterator[None]:
     """Run the kernels of this block on no more threads than the process may use.

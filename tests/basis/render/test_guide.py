@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from renderer import write_room
 
 from lightpaint.basis.file import read_basis, write_basis
+from lightpaint.basis.render import lessons
 from lightpaint.basis.render.budget import Budget, Keeper
 from lightpaint.basis.render.render import _render_one_by_one, render_basis
 from lightpaint.progress import silent
@@ -65,16 +66,12 @@ def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
     np.testing.assert_allclose(found, [[sure, 1 - sure], [1 - sure, sure]], atol=2e-6)
 
 
-@pytest.mark.parametrize("enough", [2**12, 2**24])
+@pytest.mark.parametrize("lesson", [(2**10,), (2**16, 2**18)])
 def test_guided_planes_are_those_of_separate_renders_within_noise(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, enough: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lesson: tuple[int, ...]
 ) -> None:
-    """While it learns, and after."""
-    use_variant()
-    import lightpaint.basis.render.guide
-
-    monkeypatch.setattr(lightpaint.basis.render.guide, "ENOUGH", enough)
-    monkeypatch.setattr(lightpaint.basis.render.guide, "ENOUGH_EACH", 0)
+    """However little was learned."""
+    monkeypatch.setattr(lessons, "LESSON", lesson)
     from renderer import LIGHTS
 
     lights = SPOTS + BEHIND + LIGHTS["panel"] + LIGHTS["sky"]

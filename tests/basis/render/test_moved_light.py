@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, same_basis, write_room
+from renderer import LIGHTS, render_in_parts, same_basis, write_room
 
 from lightpaint.basis import cache, file
 from lightpaint.basis.basis import Basis
@@ -17,7 +17,6 @@ from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.render import obtain as obtain_module
 from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.parts import render_in_parts
 from lightpaint.basis.render.render import render_basis
 from lightpaint.batch.work.basis_parts import PartwiseRender
 from lightpaint.batch.work.work import run_item
@@ -367,7 +366,7 @@ def test_planes_without_an_identity_are_none_of_anybodys(
 def test_an_interrupt_keeps_what_is_done(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rendered: Rendered
 ) -> None:
-    monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 24 * 20)
+    monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 2 * 24 * 20)
     obtain_basis(room(tmp_path), spp=32)
     scene = room(tmp_path, MOVED)
 

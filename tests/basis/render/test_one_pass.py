@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from renderer import CORNELL, LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
+from renderer import CORNELL, LIGHTS, REPOSITORY, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
 from lightpaint.basis.render.budget import Budget, Keeper
 from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
@@ -20,6 +20,7 @@ from lightpaint.basis.render.separate import BLACK, WHITE
 from lightpaint.errors import SceneError
 from lightpaint.pipeline.remarks import remarks_of_scene
 from lightpaint.progress import silent
+from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes, render
 
@@ -343,6 +344,48 @@ def test_integrators_that_take_other_samples_have_the_same_mean(
 
 
 @pytest.mark.parametrize(
+    ("name", "size"), [("cornell", "1/4"), ("stage", "1/10"), ("gallery", "1/10")]
+)
+def test_planes_of_the_scenes_that_come_along_add_up_to_their_render(name: str, size: str) -> None:
+    """Of all emitters as they are, textured ones and environments among them."""
+    scene = load_scene(REPOSITORY / "scenes" / name / "scene.xml").reduced(size)
+    basis = render_basis(scene, spp=128)
+    rendered = render(scene, spp=256, stream=Stream.VERIFICATION)
+    weights = basis.present_weights.astype(np.float32)[:, None, None, :]
+    gap = (basis.images * weights).sum(axis=0, dtype=np.float64) - rendered.image
+    noise = np.square((basis.half_differences * weights).sum(axis=0), dtype=np.float64)
+    noise += np.square(rendered.half_difference, dtype=np.float64)
+    # Noise: four and a half standard errors, of the sums over nine blocks of the picture.
+    for rows in np.array_split(np.arange(gap.shape[0]), 3):
+        for columns in np.array_split(np.arange(gap.shape[1]), 3):
+            where = np.ix_(rows, columns)
+            assert abs(gap[where].sum()) <= 4.5 * np.sqrt(noise[where].sum()), (rows, columns)
+
+
+@pytest.mark.parametrize("questions", [(1, 1), (2, 1), (8, 8)])
+def test_any_number_of_questions_has_the_same_mean(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, questions: tuple[int, int]
+) -> None:
+    """By chance, by choice and, on a glossy wall beside a panel, by both."""
+    use_variant()
+    from lightpaint.basis.render import one_pass as module
+
+    lights = LIGHTS["panel"] + LIGHTS["beam"] + LIGHTS["sky"]
+    scene = load_scene(write_room(tmp_path, lights=lights))
+    usual = render_basis(scene, spp=1024, seed=1)
+    monkeypatch.setattr(module, "FIRST_QUESTIONS", questions[0])
+    monkeypatch.setattr(module, "LATER_QUESTIONS", {2**32: questions[1]})
+    other = render_basis(scene, spp=1024, seed=2)
+    gap = (other.images - usual.images).sum(axis=(1, 2), dtype=np.float64)
+    noise = np.square(usual.half_differences, dtype=np.float64).sum(axis=(1, 2))
+    noise += np.square(other.half_differences, dtype=np.float64).sum(axis=(1, 2))
+    # Noise: four and a half standard errors, three lights in three channels.
+    assert (np.abs(gap) <= 4.5 * np.sqrt(noise)).all()
+    # Less than a hundredth of each light: what is counted twice or never would be seen.
+    assert (4.5 * np.sqrt(noise) <= 0.03 * usual.images.sum(axis=(1, 2))).all()
+
+
+@pytest.mark.parametrize(
     ("integrator", "lights", "why"),
     [
         (_integrator("volpath"), SEVERAL, "fog, smoke or liquids"),
@@ -412,17 +455,18 @@ def test_direct_is_path_of_depth_2(tmp_path: Path) -> None:
     basis = render_basis(scene, spp=256)
     assert basis.origin.method == ONE_PASS
     white = {light.name: WHITE for light in scene.lights}
-    rendered = mitsuba_render(scene, white, seed=1, spp=256)
-    gap = float((basis.images.sum(axis=0) - rendered).sum(dtype=np.float64))
-    # Noise: both have about the same; five standard errors of the difference of the sums.
-    noise = 2 * np.square(basis.half_differences.sum(axis=0), dtype=np.float64).sum()
+    rendered = render(scene, white, spp=256, stream=Stream.VERIFICATION)
+    gap = float((basis.images.sum(axis=0) - rendered.image).sum(dtype=np.float64))
+    noise = np.square(basis.half_differences.sum(axis=0), dtype=np.float64).sum()
+    noise += np.square(rendered.half_difference, dtype=np.float64).sum()
+    # Noise: five standard errors of the difference of the sums.
     assert abs(gap) <= 5 * np.sqrt(noise)
 
 
 def test_equal_seeds_repeat_and_others_differ(small_room: Scene) -> None:
     a, b, c = (render_basis(small_room, spp=4, seed=s) for s in (0, 0, 1))
-    # Threads add in any order: the last bits of float32.
-    assert np.abs(a.images - b.images).max() <= SAME_SAMPLES * a.images.max()
+    assert a.images.tobytes() == b.images.tobytes()
+    assert a.half_differences.tobytes() == b.half_differences.tobytes()
     assert np.abs(a.images - c.images).max() > 0.01 * a.images.max()
 
 
@@ -506,14 +550,14 @@ def test_what_is_no_number_is_left_out(small_room: Scene) -> None:
     import drjit as dr
     import mitsuba as mi
 
+    from lightpaint.basis.render.light_planes import LightPlanes
     from lightpaint.basis.render.one_pass import Tracer
-    from lightpaint.basis.render.paths import Planes
 
-    tracer = Tracer(small_room, 0, None)
-    planes, seen = dr.zeros(mi.Float, 3 * len(small_room.lights)), dr.zeros(mi.Float, 1)
-    into = Planes(planes, seen, tracer.light_of, mi.UInt32(0), mi.UInt32(1))
+    tracer = Tracer(small_room, 0)
+    planes = LightPlanes(tracer.light_of, len(small_room.lights), 3)
     emitter = dr.gather(mi.EmitterPtr, tracer.loaded.emitters_dr(), mi.UInt32(0, 0, 0))
     value = mi.Color3f(mi.Float(1, np.nan, 2), mi.Float(1, 1, np.inf), mi.Float(1, 1, 1))
-    into.add(emitter, value, mi.Bool(True))
-    assert np.sort(np.array(planes))[-3:].tolist() == [1, 1, 1]
+    planes.add(mi.UInt32(0, 1, 2), emitter, value, mi.Bool(True))
+    planes.evaluate()
+    np.testing.assert_array_equal(planes.sums().sum(axis=0), [[1] * 3, [0] * 3, [0] * 3])
     tracer.close()

@@ -3,23 +3,18 @@
 import random
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import BasisFactory
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.render import budget, lessons
 from lightpaint.basis.render import parts as parts_module
-from lightpaint.basis.render.parts import (
-    Part,
-    PartRenderer,
-    PartSums,
-    lesson,
-    plan_parts,
-    render_in_parts,
-)
+from lightpaint.basis.render.parts import Part, PartRenderer, PartSums, plan_parts
 from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.scene.runtime.kernel_threads import limit_threads
@@ -29,27 +24,30 @@ SPP = 32
 
 
 @pytest.fixture(autouse=True)
-def _one_thread() -> Iterator[None]:
-    """Sums of one thread are the same to the last bit."""
-    limit_threads(1)
+def _short_lessons(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lessons, "LESSON", (2**12, 2**13))
+
+
+@pytest.fixture
+def _all_threads() -> Iterator[None]:
     yield
     limit_threads(None)
 
 
 @pytest.fixture
-def _small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts_module, "SAMPLES", 2**8)
-
-
-@pytest.fixture(scope="module")
 def learned(small_room: Scene) -> np.ndarray:
-    found = lesson(small_room, SPP, 0)
-    assert found is not None
-    return found
+    return lessons.lesson(small_room, 0)
 
 
-def made(scene: Scene, learned: np.ndarray | None, order: list[Part], plan: list[Part]) -> Basis:
-    sums, renderer = PartSums(scene, plan, seed=0), PartRenderer(scene, 0, learned)
+def made(
+    scene: Scene,
+    learned: np.ndarray | None,
+    order: list[Part],
+    plan: list[Part],
+    start: Basis | None = None,
+) -> Basis:
+    sums = PartSums(scene, plan, seed=0, start=start)
+    renderer = PartRenderer(scene, 0, learned)
     for part in order:
         sums.add(part, *renderer.render(part))
     renderer.close()
@@ -70,77 +68,98 @@ def test_every_sample_of_every_pixel_is_in_one_part(
 ) -> None:
     monkeypatch.setattr(parts_module, "SAMPLES", samples)
     height, _ = small_room.size
-    covered = Counter[tuple[int, int]]()
-    begun: dict[tuple[int, int], int] = {}
+    covered = Counter[int]()
     for part in plan_parts(small_room, spp):
+        assert part.first == 0
         for row in range(part.top, part.bottom):
-            assert begun.get((part.half, row), 0) == part.first
-            begun[part.half, row] = part.first + part.spp
-            covered[part.half, row] += part.spp
-    assert set(covered.values()) == {-(-spp // 2)}
-    assert len(covered) == 2 * height
+            covered[row] += part.spp
+    assert covered == dict.fromkeys(range(height), -(-spp // 2))
     with pytest.raises(SceneError, match="too few"):
         plan_parts(small_room, 1)
 
 
-@pytest.mark.usefixtures("_small_parts")
-def test_parts_in_any_order_make_the_same_basis(small_room: Scene, learned: np.ndarray) -> None:
-    plan = plan_parts(small_room, SPP)
-    assert len({part.top for part in plan}) > 1
-    assert len({part.first for part in plan}) > 1
-    shuffled = plan.copy()
-    random.Random(3).shuffle(shuffled)
-    assert same(made(small_room, learned, plan, plan), made(small_room, learned, shuffled, plan))
-
-
-def test_rows_may_be_cut_anywhere(
+def test_parts_in_any_order_make_the_basis_of_one_go(
     small_room: Scene, learned: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = plan_parts(small_room, SPP)
-    monkeypatch.setattr(parts_module, "BYTES", 5 * 24 * 12 * 3)
-    cut = plan_parts(small_room, SPP)
-    assert (len(whole), len(cut)) == (2, 14)
-    assert same(made(small_room, learned, whole, whole), made(small_room, learned, cut, cut))
+    whole = render_basis(small_room, spp=SPP)
+    monkeypatch.setattr(parts_module, "SAMPLES", 2**12)
+    # Kernels of three samples of a pixel, or of all rows.
+    monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 3 * 24 * 3)
+    plan = plan_parts(small_room, SPP)
+    assert len(plan) == 4
+    shuffled = plan.copy()
+    random.Random(3).shuffle(shuffled)
+    for order in (plan, shuffled):
+        basis = made(small_room, learned, order, plan)
+        assert same(basis, whole)
+        assert basis.origin == whole.origin
+        np.testing.assert_array_equal(basis.learned, whole.learned)
 
 
-def test_a_lesson_is_the_same_each_time(small_room: Scene, learned: np.ndarray) -> None:
-    again = lesson(small_room, SPP, 0)
-    assert again is not None
-    np.testing.assert_array_equal(again, learned)
+@pytest.mark.usefixtures("_all_threads")
+@pytest.mark.parametrize("threads", [1, 2])
+def test_threads_decide_no_bit(small_room: Scene, threads: int) -> None:
+    whole = render_basis(small_room, spp=SPP)
+    limit_threads(threads)
+    assert same(render_basis(small_room, spp=SPP), whole)
 
 
-def test_they_are_samples_of_the_same_pictures(
-    small_room: Scene, small_room_basis: BasisFactory
+def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
+    small_room: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ours, its = render_in_parts(small_room, spp=64), small_room_basis(spp=64, seed=5)
-    differences = ours.images - its.images
-    noise = np.sqrt(ours.half_differences**2 + its.half_differences**2)
-    # Sums over the picture, in standard errors.
-    off = differences.sum(axis=(1, 2, 3)) / np.sqrt((noise**2).sum(axis=(1, 2, 3)))
-    assert np.abs(off).max() < 4
-    assert ours.origin.halves == (32, 32)
-    np.testing.assert_array_equal(ours.emitters_seen, its.emitters_seen)
+    # Steps of three samples of a pixel of each half.
+    monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 3 * 24 * 20)
+    seconds = iter(range(1000))
+    monkeypatch.setattr(budget, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
+    basis = render_basis(small_room, time_s=9)
+    assert basis.origin.spp % 6 == 0
+    assert basis.origin.spp > 6
+    monkeypatch.undo()
+    monkeypatch.setattr(lessons, "LESSON", (2**12, 2**13))
+    whole = render_basis(small_room, spp=basis.origin.spp)
+    assert same(basis, whole)
+    assert basis.origin == whole.origin
 
 
 def test_what_is_there_counts(small_room: Scene) -> None:
-    half = render_in_parts(small_room, spp=16)
-    whole, on = render_in_parts(small_room, spp=32), render_in_parts(small_room, spp=32, start=half)
-    assert on.origin == whole.origin
+    half = render_basis(small_room, spp=16)
+    plan = plan_parts(small_room, 32, start=half)
+    in_parts = made(small_room, half.learned, plan, plan, start=half)
+    on = render_basis(small_room, spp=32, start=half)
+    assert same(in_parts, on)
+    whole = render_basis(small_room, spp=32)
+    assert in_parts.origin == on.origin == whole.origin
     # The sums behind a basis are known up to round-off of float32.
     scale = whole.images.max(axis=(1, 2, 3), keepdims=True)
     assert (np.abs(on.images - whole.images) / scale).max() < 1e-5
-    # And an ordinary render goes on from parts.
-    both = render_basis(small_room, spp=64, start=half)
-    assert both.origin.halves == (32, 32)
 
 
+def test_a_lesson_depends_on_the_seed_alone(small_room: Scene, learned: np.ndarray) -> None:
+    np.testing.assert_array_equal(lessons.lesson(small_room, 0), learned)
+    for spp in (2, 64):
+        np.testing.assert_array_equal(render_basis(small_room, spp=spp).learned, learned)
+    assert (lessons.lesson(small_room, 1) != learned).any()
+
+
+def test_what_an_older_version_has_rendered_is_used_but_not_gone_on_with(
+    small_room: Scene,
+) -> None:
+    new = render_basis(small_room, spp=4)
+    old = replace(new, origin=replace(new.origin, method="one pass"))
+    assert render_basis(small_room, spp=4, start=old).origin.method == "one pass"
+    assert same(render_basis(small_room, spp=8, start=old), render_basis(small_room, spp=8))
+
+
+@pytest.mark.usefixtures("_all_threads")
 def test_lights_that_are_rendered_one_by_one(tmp_path: Path) -> None:
+    """By Mitsuba, which adds in the same order on one thread alone."""
+    limit_threads(1)
     integrator = '<integrator type="ptracer"><integer name="max_depth" value="3"/></integrator>'
     lights = LIGHTS["panel"] + LIGHTS["bulb"]
     scene = load_scene(write_room(tmp_path, lights=lights, integrator=integrator))
     plan = plan_parts(scene, 8)
     assert len(plan) == 4
-    parts = made(scene, lesson(scene, 8, 0), plan[::-1], plan)
+    parts = made(scene, None, plan[::-1], plan)
     whole = render_basis(scene, spp=8)
     assert same(parts, whole)
     assert parts.origin == whole.origin

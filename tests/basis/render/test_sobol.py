@@ -16,8 +16,8 @@ def pairs(dimension: int, *, pixels: int = 1, first: int = 0, terms: int, stream
 
     index = dr.arange(mi.UInt32, pixels * terms)
     pixel = index // terms
-    numbers = SobolPairs(pixel, mi.UInt32(stream), index - pixel * terms + first)
-    points = np.array(numbers.pair(mi.UInt32(dimension)))
+    numbers = SobolPairs(pixel, mi.UInt32(stream))
+    points = np.array(numbers.pair(index - pixel * terms + first, mi.UInt32(dimension)))
     return points.T.reshape(pixels, terms, 2)
 
 

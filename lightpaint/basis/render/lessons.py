@@ -1,0 +1,48 @@
+"""The lesson that comes before a basis: which emitter matters where.
+
+It is the same for all numbers of samples, budgets and machines, since it depends on the scene and
+the seed alone. So samples choose emitters alike whoever renders them, and none waits for another.
+"""
+
+import gc
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from lightpaint.arrays import Floats
+from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import view_seed
+
+if TYPE_CHECKING:
+    from lightpaint.basis.render.one_pass import Tracer
+
+#: Camera samples of the passes of a lesson. Each chooses by what those before have learned.
+LESSON = (2**16, 2**17, 2**17)
+
+
+@MITSUBA.taken()
+def lesson(scene: Scene, seed: int) -> Floats:
+    """Learn which emitters to choose where in `scene`, as `Basis.learned` says it."""
+    from lightpaint.basis.render.one_pass import Tracer
+
+    tracer = Tracer(scene, view_seed(seed, scene.sensor))
+    try:
+        with tracing() as let_others_through:
+            return teach(tracer, let_others_through)
+    finally:
+        tracer.close()
+        gc.collect()
+
+
+def teach(tracer: "Tracer", let_others_through: Callable[[], None]) -> Floats:
+    """Teach `tracer` the lesson. Returns it. let_others_through: called between its passes."""
+    (height, width), done = tracer.scene.size, 0
+    for k, samples in enumerate(LESSON):
+        let_others_through()
+        # Of a large picture some rows tell enough, each time others.
+        step = min(max(1, height * width // samples), height)
+        rows = range(k * step // len(LESSON), height, step)
+        spp = max(1, samples // (len(rows) * width))
+        tracer.learn(rows, done, spp)
+        done += spp
+    return tracer.end_lesson()

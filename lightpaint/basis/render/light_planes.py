@@ -1,0 +1,76 @@
+"""Planes that paths add their light to, one for each light, on the device that renders.
+
+Import it once a variant is set and not a scalar one: its arrays do not exist before.
+"""
+
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lightpaint.arrays import Floats
+
+
+class LightPlanes:
+    """Sums of the samples of some pixels, undivided, light by light.
+
+    light_of: as `lights_by_instance` returns it. lights: how many there are. pixels: how many, for
+    which `add` takes indices. is_shared: whether several paths may add to one pixel at a time,
+    whose order then decides the last bits; else each pixel has one path, which adds in order.
+
+    An object, and not arrays of the loop that traces: Dr.Jit refuses such an array once it finds
+    that nothing can ever be added to it, as to `seen` where all lights are points.
+    """
+
+    def __init__(self, light_of: Any, lights: int, pixels: int, *, is_shared: bool = False) -> None:
+        self.lights, self.pixels = lights, pixels
+        self._light_of = light_of
+        self._keeps = dr.opaque(mi.Bool, True)
+        self._mode = dr.ReduceMode.Auto if is_shared else dr.ReduceMode.NoConflicts
+        self._pixels = dr.opaque(mi.UInt32, pixels)
+        self._sums = dr.zeros(mi.Float, lights * pixels * 3)
+        self._seen = dr.zeros(mi.Float, pixels)
+
+    @classmethod
+    def nowhere(cls, light_of: Any) -> "LightPlanes":
+        """Return planes that keep nothing: for paths of which only what they learn counts."""
+        nothing = cls(light_of, 1, 1)
+        nothing._keeps = dr.opaque(mi.Bool, False)
+        return nothing
+
+    def add(self, pixel, emitter, value, active):
+        """Add RGB values to the plane of the light that `emitter` belongs to.
+
+        What is no number, as one path in a hundred million carries, is left out: a pixel of it
+        would make all sums over the picture none.
+        """
+        active = active & dr.all(dr.isfinite(value))
+        instance = dr.reinterpret_array(mi.UInt32, emitter)
+        light = dr.gather(mi.UInt32, self._light_of, instance, active)
+        place = dr.fma(light, self._pixels, pixel) * 3
+        for channel in range(3):
+            self._add_one(self._sums, value[channel], place + channel, active)
+
+    def note_seen(self, pixel, active):
+        """Count a camera ray that sees an emitter."""
+        self._add_one(self._seen, mi.Float(1), pixel, active)
+
+    def _add_one(self, array, value, place, active):
+        add, active = dr.ReduceOp.Add, active & self._keeps
+        dr.scatter_reduce(add, array, value, place, active, mode=self._mode)
+
+    def evaluate(self) -> None:
+        """Run what was traced, and wait for it: a running kernel cannot be interrupted."""
+        dr.eval(self._sums, self._seen)
+        dr.sync_thread()
+
+    def sums(self) -> Floats:
+        """Return a copy of the sums, (lights, pixels, 3)."""
+        return np.array(self._sums).reshape(self.lights, self.pixels, 3)
+
+    def seen(self) -> Floats:
+        """Return how many camera rays of each pixel saw an emitter, (pixels,)."""
+        return np.array(self._seen)
