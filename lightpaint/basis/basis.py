@@ -16,6 +16,7 @@ from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.dataframes import CHANNELS, by_channel, pandas, xarray
 from lightpaint.errors import BasisError
 from lightpaint.images.denoiser import Features
+from lightpaint.images.estimate import Estimate
 from lightpaint.images.object_map import Objects
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import SceneRequests
@@ -251,31 +252,50 @@ class Basis(Shown):
     @cached_property
     def power(self) -> Doubles:
         """‖Φᵢ‖² over the picture, (n, 3) float64; where an emitter is seen, nothing counts."""
-        counted = (~self.emitters_seen.ravel()).astype(np.float64)
-        return read_only(self._sums(counted, is_squared=True))
+        return read_only(self._power_and_totals[0])
 
     @cached_property
     def totals(self) -> Doubles:
         """Σ_pixels Φᵢ, (n, 3) float64, over all of the picture."""
-        return read_only(self._sums(np.ones(self.size[0] * self.size[1])))
+        return read_only(self._power_and_totals[1])
 
-    def _sums(self, counted: Doubles, *, is_squared: bool = False) -> Doubles:
-        """Return Σ_pixels counted · Φᵢ, or its square, (n, 3). counted: (pixels,)."""
-        sums = np.zeros((len(self.lights), 3))
+    @cached_property
+    def _power_and_totals(self) -> tuple[Doubles, Doubles]:
+        """Power and totals of one walk, (n, 3) each."""
+        power, totals = np.zeros((2, len(self.lights), 3))
+        counted = (~self.emitters_seen.ravel()).astype(np.float64)
         # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
         # is as exact as the sum, and needs no copy of the basis.
         for start in range(0, counted.size, BLOCK):
+            its = counted[start : start + BLOCK]
             block = self.planes.pixels(slice(start, start + BLOCK)).astype(np.float64)
-            if is_squared:
-                block *= block
-            sums += counted[start : start + BLOCK] @ block
-        return sums
+            totals += np.ones(its.size) @ block
+            block *= block
+            power += its @ block
+        return power, totals
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return the image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the
         lights.
         """
         return self.planes.mix(weights)
+
+    def predict(self, weights: Doubles) -> Estimate:
+        """Return the image Σ w_i Φ_i with its noise, read-only. weights: (n, 3).
+
+        The last one is kept: an analysis and a report of the same weights ask for it many times.
+        """
+        key = np.asarray(weights, np.float64).tobytes()
+        found = self._predicted.get(key)
+        if found is None:
+            found = Estimate(read_only(self.mix(weights)), read_only(self.noise.mix(weights)))
+            self._predicted.clear()
+            self._predicted[key] = found
+        return found
+
+    @cached_property
+    def _predicted(self) -> dict[bytes, Estimate]:
+        return {}
 
 
 def meter_exposure(image: Floats, *bases: Basis) -> float:

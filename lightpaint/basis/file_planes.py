@@ -2,7 +2,7 @@
 
 import os
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import cached_property
 from threading import Lock
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.planes import MemoryPlanes, Planes, PlanesBase, mix
 from lightpaint.images.formats.exr_rows import PartLayout, RowFile
+from lightpaint.threads import parallel_map
 
 #: Bytes of strips of rows that are kept, of all planes together; and how many strips these are, so
 #: that each thread may walk along one of its own.
@@ -37,11 +38,6 @@ class RowPlanes(PlanesBase):
         height, width = self.size
         step = max(1, STRIPS // (KEPT * 12 * self.count * width))
         return _Strips(step, lambda k: self.rows(k * step, min((k + 1) * step, height)))
-
-    def strips(self) -> Iterator[Floats]:
-        """Yield all rows, a few at a time."""
-        height, step = self.size[0], self._strips.step
-        return (self.rows(top, min(top + step, height)) for top in range(0, height, step))
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
@@ -78,7 +74,14 @@ class RowPlanes(PlanesBase):
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (h, w, 3)."""
-        return np.concatenate([mix(strip, weights) for strip in self.strips()])
+        (height, width), step = self.size, self._strips.step
+        made = np.empty((height, width, 3), np.float32)
+
+        def fill(top: int) -> None:
+            made[top : top + step] = mix(self.rows(top, min(top + step, height)), weights)
+
+        parallel_map(fill, range(0, height, step))
+        return made
 
     def replaced(self, planes: Mapping[int, Floats]) -> Planes:
         """Return these planes with others, (h, w, 3), for some of the lights."""

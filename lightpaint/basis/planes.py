@@ -61,6 +61,9 @@ class Planes(Protocol):
         (h, w, 3).
         """
 
+    def squares(self) -> Doubles:
+        """Return Σ Φ² of all pixels and channels, (n,)."""
+
     def replaced(self, planes: Mapping[int, Floats]) -> "Planes":
         """Return these planes with others, (h, w, 3), for some of the lights."""
 
@@ -95,6 +98,14 @@ class PlanesBase:
 
     def __iter__(self) -> Iterator[Floats]:
         return (self.plane(k) for k in range(self.count))
+
+    def squares(self) -> Doubles:
+        """Return Σ Φ² of all pixels and channels, (n,)."""
+        made, pixels = np.zeros(self.count), self.size[0] * self.size[1]
+        for start in range(0, pixels, BLOCK):
+            block = self.pixels(slice(start, start + BLOCK)).astype(np.float64)
+            made += np.einsum("npc,npc->n", block, block)
+        return made
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels that count."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import SizeError
+from lightpaint.images.bands import LARGE_PICTURE
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.pixel_blocks import block_mean
 
@@ -32,6 +33,9 @@ Quality = Literal["fast", "high"]
 #: Pixels that pad a picture for Open Image Denoise. At unpadded borders even a flat picture comes
 #: out 0.7 to 1.2 times as bright; with padding, within half a percent.
 MARGIN = 16
+
+#: Megabytes that Open Image Denoise may take for a large picture, beside the picture itself.
+TILES_MB = 512
 
 #: Parameters of the plain filter: window radius in pixels; ratio of light, as a natural logarithm,
 #: and distance in pixels at which a neighbour's weight is 1/√e; exponent of the cosine between
@@ -120,10 +124,36 @@ def _denoise_with_oidn(image: Floats, features: Features | None, quality: Qualit
         guides = {"albedo": padded(features.albedo), "normal": padded(features.normal)}
         # `high` has a network of its own for features that have no noise.
         guides["clean_aux"] = quality == "high"
-    clean = pyoidn.denoise(padded(image), hdr=True, quality=quality, **guides)
     height, width = image.shape[:2]
+    denoise = _in_tiles if height * width >= LARGE_PICTURE else pyoidn.denoise
+    clean = denoise(padded(image), hdr=True, quality=quality, **guides)
     inside = clean[MARGIN : MARGIN + height, MARGIN : MARGIN + width]
     return np.maximum(np.ascontiguousarray(inside, np.float32), 0)
+
+
+def _in_tiles(
+    image: Floats, *, hdr: bool, quality: Quality, clean_aux: bool = False, **guides: Floats
+) -> Floats:
+    """Denoise as `pyoidn.denoise` does, in tiles that take `TILES_MB`, and keep nothing."""
+    import pyoidn
+
+    made = np.empty_like(image)
+    levels = {"fast": pyoidn.OIDN_QUALITY_FAST, "high": pyoidn.OIDN_QUALITY_HIGH}
+    with pyoidn.Device() as device:
+        device.commit()
+        with pyoidn.Filter(device) as tiles:
+            pictures = {"color": image, **guides, "output": made}
+            for name, picture in pictures.items():
+                tiles.set_image(name, picture, pyoidn.OIDN_FORMAT_FLOAT3)
+            tiles.set_bool("hdr", hdr)
+            tiles.set_bool("cleanAux", clean_aux)
+            tiles.set_int("maxMemoryMB", TILES_MB)
+            tiles.set_quality(levels[quality])
+            tiles.commit()
+            tiles.execute()
+        if error := device.get_error():
+            raise RuntimeError(error)
+    return made
 
 
 def _denoise_with_filter(image: Floats, features: Features | None) -> Floats:

@@ -147,7 +147,7 @@ class Problem(LinearProblem):
             at_least_mask(views),
             fit.transform,
             painted=lambda: target_light(views),
-            current=lambda: whole.mix(whole.present_weights),
+            current=lambda: whole.present_look,
         )
         reduction = reduce_lights(all_constraints, whole.lights, fit, gamuts_for(whole, views, fit))
         return cls(

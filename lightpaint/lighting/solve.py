@@ -17,7 +17,7 @@ from lightpaint.lighting.linear_solve import (
     solve_reduction,
 )
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.loss import Squares, image_of
+from lightpaint.lighting.loss.loss import Squares, image_in_place
 from lightpaint.lighting.loss.pixel_bins import BinnedPixels, bin_pixels, block_side
 from lightpaint.lighting.loss.reweighting import Descent, WeightTerms, descend, total_loss
 from lightpaint.lighting.loss.warm_start import find_near_optimum
@@ -295,7 +295,7 @@ def _problem_of_blocks(problem: Problem, found: Descent, blocks: BinnedPixels) -
     x = LitPixels.whole(problem.basis, loss).predicted(at)
     image, weight = loss.pixels.squares(x, from_clipping=False)
     parts = (image, weight, loss.pixels.shares(x, weight))
-    squares = Squares(*(image_of(part, problem.basis.size) for part in parts))
+    squares = Squares(*(image_in_place(part, problem.basis.size) for part in parts))
     return replace(
         problem,
         squares=squares,

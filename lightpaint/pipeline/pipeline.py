@@ -8,7 +8,6 @@ from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
@@ -65,6 +64,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
         for basis in problem.views.bases:
             make_ahead(basis, prepare_page)
     solution = _reduce_noise(job, solution_of(problem), listen)
+    del problem  # some of its arrays are as large as the pictures
     analyses = analyse(solution)
     lighting, scene = with_findings(solution, analyses).lighting, job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
@@ -109,7 +109,7 @@ def _finish_view(
     basis = solution.basis
     folder = answer.path / view.folder.relative_to(job.folder)
     folder.mkdir(exist_ok=True)
-    predicted = combine(basis, solution.lighting)
+    predicted = basis.predict(solution.weights)
     verification, suggestions, budget, relit = None, None, None, None
     if scene is not None:
         relit = answer.seen_through(scene.sensor)

@@ -9,6 +9,7 @@ from typing import Any
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
+from lightpaint.images.bands import in_turns
 from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.images.pixel_blocks import Size, whole_factor
@@ -38,7 +39,6 @@ from lightpaint.screen import some_names
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish
 from lightpaint.target.target import Target
-from lightpaint.threads import parallel_map
 
 #: Header attribute of predicted.exr: the sensor, film and samples of the basis.
 VIEW_KEY = "lightpaint.view"
@@ -216,7 +216,7 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
     def numbers() -> None:
         write_text(folder / "report.json", report_numbers(**arguments, missed=missed))
 
-    parallel_map(lambda write: write(), (page, comparison, numbers))
+    in_turns(lambda write: write(), (page, comparison, numbers), look.basis.size)
 
 
 def _report_arguments(look: Look, command: str) -> dict[str, Any]:

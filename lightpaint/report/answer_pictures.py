@@ -5,17 +5,24 @@ current look, grey, dim and hatched, so that they cannot be taken for paint.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, Indices, largest
 from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.bands import by_bands
 from lightpaint.images.estimate import box_mean
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
+
+#: What becomes of each band of a picture in display values.
+Finish = Callable[[Floats], npt.NDArray[Any]]
 
 #: False colours of a signed quantity from −1 to +1, in display values. Their lightness
 #: rises all the way, so that the sign also shows without colour.
@@ -48,7 +55,7 @@ def report_transform(target: Target, basis: Basis, predicted: Floats) -> ViewTra
 
 def brighter_than_white(image: Floats, transform: ViewTransform) -> float:
     """Return share of the pixels of a linear picture that a display cannot show."""
-    return float((image.max(axis=-1) > transform.white).mean())
+    return float((largest(image) > transform.white).mean())
 
 
 def coverage(importance: Floats) -> Floats:
@@ -56,8 +63,8 @@ def coverage(importance: Floats) -> Floats:
 
     Importance itself, as alpha; where all of it is below 1, relative to its largest.
     """
-    largest = float(importance.max(initial=0))
-    return np.clip(importance / min(1.0, largest), 0, 1) if largest > 0 else 0 * importance
+    most = float(importance.max(initial=0))
+    return np.clip(importance / min(1.0, most), 0, 1) if most > 0 else 0 * importance
 
 
 def painted_coverage(target: Target, solution: Solution) -> Floats:
@@ -67,41 +74,80 @@ def painted_coverage(target: Target, solution: Solution) -> Floats:
 
 def unpainted_look(current: Floats, *, transform: ViewTransform) -> Floats:
     """Return the current look as the background of what counts: grey, dim, with diagonal lines."""
+    return np.repeat(_dim_look(current, transform)[..., None], 3, axis=-1)
+
+
+def _dim_look(current: Floats, transform: ViewTransform) -> Floats:
+    """Return the grey of `unpainted_look`, (h, w)."""
     height, width = current.shape[:2]
-    grey = luminance(transform.encode(current))
     period = max(6, width // 80)
-    y, x = np.mgrid[:height, :width]
-    lines = (x + y) % period < max(1, period // 5)
-    dim = 0.07 + 0.28 * grey + 0.08 * lines
-    return np.repeat(dim[..., None], 3, axis=-1)
+
+    def dim(look: Floats, y: Indices) -> Floats:
+        lines = (np.arange(width) + y) % period < max(1, period // 5)
+        return np.asarray(0.07 + 0.28 * luminance(transform.encode(look)) + 0.08 * lines)
+
+    return np.asarray(by_bands(dim, current, np.arange(height)[:, None]))
 
 
 def over_unpainted(
-    picture: Floats, share: Floats, current: Floats, *, transform: ViewTransform
-) -> Floats:
-    """Return a picture, laid over `unpainted_look` by its share of each pixel, (h, w)."""
-    share = share[..., None]
-    return np.asarray(share * picture + (1 - share) * unpainted_look(current, transform=transform))
+    picture: Callable[[Floats], Floats],
+    of: Floats,
+    share: Floats,
+    current: Floats,
+    *,
+    transform: ViewTransform,
+    finish: Finish = np.asarray,
+) -> npt.NDArray[Any]:
+    """Return a picture, laid over `unpainted_look` by its share of each pixel, (h, w).
+
+    picture: makes display values of a band of `of`, (h, w, …). finish: what becomes of each band,
+    such as `to_8_bit`.
+    """
+
+    def lay(of: Floats, share: Floats, dim: Floats) -> npt.NDArray[Any]:
+        share = share[..., None]
+        return finish(np.asarray(share * picture(of) + (1 - share) * dim[..., None]))
+
+    return np.asarray(by_bands(lay, of, share, _dim_look(current, transform)))
 
 
 def target_picture(
-    target: Target, solution: Solution, current: Floats, *, transform: ViewTransform
-) -> Floats:
+    target: Target,
+    solution: Solution,
+    current: Floats,
+    *,
+    transform: ViewTransform,
+    finish: Finish = np.asarray,
+) -> npt.NDArray[Any]:
     """Return the painting, laid over the dimmed current look by its importance.
 
     current: (h, w, 3) linear, the scene as it is. Fully painted pixels are exactly the
-    display encoding of the target.
+    display encoding of the target. finish: see `over_unpainted`.
     """
-    paint = transform.encode(target.image)
-    return over_unpainted(paint, painted_coverage(target, solution), current, transform=transform)
+    share = painted_coverage(target, solution)
+    how: Any = {"transform": transform, "finish": finish}
+    return over_unpainted(transform.encode, target.image, share, current, **how)
 
 
-def importance_picture(importance: Floats, current: Floats, *, transform: ViewTransform) -> Floats:
-    """Return the current look in pale yellow where it counts; dimmed and hatched where not."""
-    grey = luminance(transform.encode(current))[..., None]
-    counted = (0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70])
+def importance_picture(
+    importance: Floats,
+    current: Floats,
+    *,
+    transform: ViewTransform,
+    finish: Finish = np.asarray,
+) -> npt.NDArray[Any]:
+    """Return the current look in pale yellow where it counts; dimmed and hatched where not.
+
+    finish: see `over_unpainted`.
+    """
     most = max(1.0, float(importance.max(initial=0)))
-    return over_unpainted(counted, coverage(importance / most), current, transform=transform)
+
+    def yellow(look: Floats) -> Floats:
+        grey = luminance(transform.encode(look))[..., None]
+        return np.asarray((0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70]))
+
+    how: Any = {"transform": transform, "finish": finish}
+    return over_unpainted(yellow, current, coverage(importance / most), current, **how)
 
 
 @dataclass(frozen=True)
@@ -131,7 +177,9 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
     scale, so that the map shows the error and no grain.
     """
     counts = (solution.importance > 0).astype(np.float64)
-    exact = luminance(predicted.astype(np.float64) - solution.goal(predicted))
+    goal = solution.goal(predicted)
+    exact = by_bands(lambda x, y: luminance(x.astype(np.float64) - y), predicted, goal)
+    del goal
 
     def averaged(radius: int) -> tuple[Floats, float]:
         if radius == 0:
@@ -144,7 +192,8 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
         end = float(np.percentile(np.abs(values[counts > 0]), 99))
         return values, round_up(max(end, FINEST_SCALE * 2.0**-transform.stops))
 
-    noise = luminance(solution.basis.noise.mix(solution.weights).astype(np.float64))
+    half = solution.basis.predict(solution.weights).half_difference
+    noise = by_bands(lambda x: luminance(x.astype(np.float64)), half)
     spread = float(np.sqrt((np.square(noise) * counts).sum() / max(counts.sum(), 1)))
     if spread == 0:
         return Residual(*averaged(0), 0)
@@ -155,11 +204,22 @@ def residual_of(solution: Solution, predicted: Floats, *, transform: ViewTransfo
 
 
 def residual_picture(
-    residual: Residual, solution: Solution, current: Floats, *, transform: ViewTransform
-) -> Floats:
-    """Return false colours of the residual over its scale, dimmed where it does not count."""
-    colours = diverging(residual.values / residual.limit)
-    return over_unpainted(colours, coverage(solution.importance), current, transform=transform)
+    residual: Residual,
+    solution: Solution,
+    current: Floats,
+    *,
+    transform: ViewTransform,
+    finish: Finish = np.asarray,
+) -> npt.NDArray[Any]:
+    """Return false colours of the residual over its scale, dimmed where it does not count.
+
+    finish: see `over_unpainted`.
+    """
+    how: Any = {"transform": transform, "finish": finish}
+    share = coverage(solution.importance)
+    return over_unpainted(
+        lambda x: diverging(x / residual.limit), residual.values, share, current, **how
+    )
 
 
 def diverging(values: Floats) -> Floats:

@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.bands import LARGE_PICTURE, by_bands
 from lightpaint.images.denoiser import DENOISED_KEY, Features, denoised, denoiser_text
 from lightpaint.report.basis_memo import cached_clean_planes
 
@@ -27,6 +30,8 @@ class Encoder(ViewTransform):
 
     def encode(self, image: Floats) -> Floats:
         """Return the display values of `ViewTransform.encode`, read-only."""
+        if image.size >= 3 * LARGE_PICTURE:  # which would be kept as long as the report is made
+            return np.asarray(by_bands(super().encode, image))
         if id(image) not in self.encoded:
             shown = super().encode(image)
             shown.flags.writeable = False

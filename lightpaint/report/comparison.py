@@ -35,14 +35,14 @@ SURROUND, TEXT, FAINT = (38, 38, 38), (230, 230, 230), (165, 165, 165)
 
 @dataclass(frozen=True)
 class Tile:
-    """A picture of the comparison, (h, w, 3) in display values, with the texts below it.
+    """A picture of the comparison, (h, w, 3) in 8 bits, with the texts below it.
 
     limit: end of its false-colour scale, drawn as a bar, if it has one.
     """
 
     title: str
     detail: str
-    picture: Floats
+    picture: npt.NDArray[np.uint8]
     limit: float | None = None
 
 
@@ -75,12 +75,12 @@ def comparison_image(
         Tile(
             f"target: {target.name}",
             f"{target.spoken_share} painted{', the rest hatched' if is_part else ''}",
-            target_picture(target, solution, looks.current, transform=transform),
+            target_picture(target, solution, looks.current, transform=transform, finish=to_8_bit),
         ),
         Tile(
             f"predicted{at}",
             _short_verdict(seen or what_is_seen(solution)),
-            transform.encode(looks.predicted),
+            to_8_bit(transform.encode(looks.predicted)),
         ),
     ]
     if verified is not None and looks.verified is not None:
@@ -92,11 +92,13 @@ def comparison_image(
             Tile(
                 f"verified{at}",
                 f"independent render, {rmse:.2g} RMS off the prediction",
-                transform.encode(looks.verified),
+                to_8_bit(transform.encode(looks.verified)),
             )
         )
     missed = missed or residual_of(solution, predicted, transform=transform)
-    picture = residual_picture(missed, solution, looks.current, transform=transform)
+    picture = residual_picture(
+        missed, solution, looks.current, transform=transform, finish=to_8_bit
+    )
     detail = f"luminance, predicted - target{missed.spoken}"
     tiles.append(Tile("residual", detail, picture, missed.limit))
     return compose(tiles)
@@ -118,7 +120,7 @@ def compose(tiles: list[Tile]) -> npt.NDArray[np.uint8]:
     for k, tile in enumerate(tiles):
         x = gap + k * (width + gap)
         factor = whole_factor((height, width), tile.picture.shape[:2])
-        picture = enlarged(to_8_bit(tile.picture), factor or zoom)
+        picture = enlarged(tile.picture, factor or zoom)
         sheet.paste(Image.fromarray(picture), (x, gap))
         _caption(sheet, tile, (x, gap + height + text // 2), width, text)
     return np.asarray(sheet)

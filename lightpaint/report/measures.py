@@ -5,6 +5,7 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import LUMINANCE
+from lightpaint.images.bands import sum_by_bands
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
@@ -39,18 +40,23 @@ def relative_residual(solution: Solution) -> float:
 def noise_residual(solution: Solution, predicted: Estimate) -> float:
     """Return the part of `relative_residual` that is the basis's own noise."""
     norm2 = _norm2(solution)
-    squares = np.square(predicted.half_difference, dtype=np.float64)
-    noise2 = float((solution.weight * squares).sum())
+
+    def power(weight: Floats, half: Floats) -> Floats:
+        return np.asarray((weight * np.square(half, dtype=np.float64)).sum())
+
+    noise2 = float(sum_by_bands(power, solution.weight, predicted.half_difference))
     return float(np.sqrt(noise2 / norm2)) if norm2 > 0 else 0.0
 
 
 def linear_residual(solution: Solution, predicted: Estimate) -> float:
     """Return `relative_residual` in linear light, whatever the space of the fit."""
-    D = solution.importance[..., None]
+
+    def powers(D: Floats, meant: Floats, image: Floats) -> Floats:
+        both = np.square(meant - image, dtype=np.float64), np.square(meant, dtype=np.float64)
+        return np.array([(D[..., None] * x).sum() for x in both])
+
     meant = solution.goal(predicted.image)
-    missed2, norm2 = (
-        float((D * np.square(x, dtype=np.float64)).sum()) for x in (meant - predicted.image, meant)
-    )
+    missed2, norm2 = sum_by_bands(powers, solution.importance, meant, predicted.image).tolist()
     return float(np.sqrt(missed2 / norm2)) if norm2 > 0 else float(missed2 > 0)
 
 
@@ -63,8 +69,11 @@ def error_in_codes(solution: Solution) -> float:
 def _norm2(solution: Solution) -> float:
     if not solution.problem.is_linear:
         return float(solution.norm2.sum())
-    weighted = solution.importance[..., None] * np.square(solution.image, dtype=np.float64)
-    return float(weighted.sum())
+
+    def power(D: Floats, image: Floats) -> Floats:
+        return np.asarray((D[..., None] * np.square(image, dtype=np.float64)).sum())
+
+    return float(sum_by_bands(power, solution.importance, solution.image))
 
 
 def count_at_least_pixels(solution: Solution, predicted: Floats) -> tuple[int, int] | None:

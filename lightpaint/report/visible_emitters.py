@@ -4,8 +4,9 @@ answer.
 
 import numpy as np
 
-from lightpaint.arrays import Bools
+from lightpaint.arrays import Bools, Floats
 from lightpaint.colour.color import luminance
+from lightpaint.images.bands import sum_by_bands
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
@@ -36,8 +37,13 @@ def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> 
         counted &= ~read.at_least.all(axis=-1)
     if not counted.any():
         return []
-    energy = target.importance[..., None] * np.square(target.image, dtype=np.float64)
-    if (part := energy[counted].sum() / (energy.sum() or 1)) >= DOMINANT_SHARE:
+
+    def energies(D: Floats, image: Floats, its: Bools) -> Floats:
+        energy = D[..., None] * np.square(image, dtype=np.float64)
+        return np.array([energy[its].sum(), energy.sum()])
+
+    own, every = sum_by_bands(energies, target.importance, target.image, counted).tolist()
+    if (part := own / (every or 1)) >= DOMINANT_SHARE:
         return [
             f"{_share(counted, painted)}, which make up {100 * part:.0f} % of the painted energy "
             'and rule the fit: emitters="skip" leaves them out'

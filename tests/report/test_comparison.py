@@ -135,7 +135,7 @@ def test_captions_do_not_meet(monkeypatch: pytest.MonkeyPatch, size: tuple[int, 
 
     monkeypatch.setattr(ImageDraw.ImageDraw, "text", drawing)
     monkeypatch.setattr(Image.Image, "paste", pasting)
-    flat = np.broadcast_to(np.float32(0.5), (*size, 3))
+    flat = np.full((*size, 3), 128, np.uint8)
     long = "over the old harbour, version 12, final"
     tiles = [
         Tile(f"target: evening {long}", f"31 % painted, the rest hatched {long}", flat),
@@ -157,7 +157,7 @@ def test_captions_do_not_meet(monkeypatch: pytest.MonkeyPatch, size: tuple[int, 
 @pytest.mark.parametrize("size", FILMS)
 def test_text_is_as_large_beside_any_picture(size: tuple[int, int]):
     """A sheet that is fitted to a screen can be read, however many pixels it has."""
-    flat = np.broadcast_to(np.float32(0.5), (*size, 3))
+    flat = np.full((*size, 3), 128, np.uint8)
     height, width, _ = compose([Tile("a", "b", flat, 0.2)] * 4).shape
     tile = (width - 5 * max(12, width // 100)) / 4
     below = height - tile * size[0] / size[1]

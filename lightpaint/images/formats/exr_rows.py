@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, copy_as_singles
 from lightpaint.errors import ImageError
 
 MAGIC, MULTI_PART = 20000630, 0x1000
@@ -34,8 +34,8 @@ TYPES: dict[int, np.dtype[Any]] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np
 #: Bytes that contain most headers, and the longest header that is read.
 FIRST_READ, MAX_HEADER = 2**18, 2**26
 
-#: Bytes that are read at a time when a whole part is read.
-READ_BYTES = 2**23
+#: Bytes of a part that are read at a time where many rows of it are.
+READ_BYTES = 2**22
 
 #: Header of a chunk: its part, its first line, the number of bytes that follow.
 HEAD = struct.Struct("<iii")
@@ -130,18 +130,24 @@ class RowFile:
         Raises ImageError for a file that is cut off or damaged.
         """
         starts = dict(zip(part.channels, _starts(part), strict=True))
-        first = top // part.lines
-        for lines, begin in self._lines(part, first, -(-bottom // part.lines)):
-            rows = slice(max(top, begin), min(bottom, begin + len(lines)))
-            inner = lines[rows.start - begin : rows.stop - begin]
-            for target, name in zip(into, names, strict=True):
-                target[rows.start - top : rows.stop - top] = _values(part, inner, starts, name)
+        last, step = -(-bottom // part.lines), self._chunks_at_a_time(part)
+        for first in range(top // part.lines, last, step):
+            for lines, begin in self._lines(part, first, min(first + step, last)):
+                rows = slice(max(top, begin), min(bottom, begin + len(lines)))
+                inner = lines[rows.start - begin : rows.stop - begin]
+                for target, name in zip(into, names, strict=True):
+                    values = _values(part, inner, starts, name)
+                    copy_as_singles(values, target[rows.start - top : rows.stop - top])
+
+    def _chunks_at_a_time(self, part: PartLayout) -> int:
+        """Return how many chunks to read at a time."""
+        return max(1, READ_BYTES // (part.line_bytes * part.lines))
 
     def channels(self, part: PartLayout) -> dict[str, npt.NDArray[Any]]:
         """Read all channels of a part as they are stored, (h, w) each."""
         starts = dict(zip(part.channels, _starts(part), strict=True))
         channels = {name: np.empty(part.size, kind) for name, kind in part.channels.items()}
-        step = max(1, READ_BYTES // (part.line_bytes * part.lines))
+        step = self._chunks_at_a_time(part)
         for first in range(0, len(part.offsets), step):
             for lines, begin in self._lines(part, first, first + step):
                 for name, pixels in channels.items():

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Doubles
 from lightpaint.lighting.algebra.quadratic import UNREACHED_POWER
 from lightpaint.lighting.solution import Solution
 
@@ -55,10 +55,7 @@ def ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
     """
     basis = solution.basis
     free = np.flatnonzero(~basis.is_fixed)
-    noise, power = (
-        np.array([_power(planes.plane(int(k))) for k in free])
-        for planes in (basis.noise, basis.planes)
-    )
+    noise, power = (planes.squares()[free] for planes in (basis.noise, basis.planes))
     shares = noise[power > 0] / power[power > 0]
     alike = max(ALIKE, 2 * float(np.median(shares))) if shares.size else ALIKE
     # Strong noise would make different images look alike.
@@ -110,12 +107,6 @@ def indistinguishable(
                 mixed = tuple(names[i] for i in heads[part].tolist())
                 mixes[mixed] = min(mixes.get(mixed, np.inf), max(0.0, float(value)))
     return (*found, *(Ambiguity(mixed, left, is_mix=True) for mixed, left in mixes.items()))
-
-
-def _power(image: Floats) -> float:
-    """Return the sum of squares."""
-    its = image.astype(np.float64).ravel()
-    return float(its @ its)
 
 
 def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:

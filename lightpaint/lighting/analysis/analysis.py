@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from lightpaint.images.bands import in_turns
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
 from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
@@ -18,7 +19,6 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty, error_bars, with_error_bars
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import short_repr
-from lightpaint.threads import parallel_map
 
 
 @keywords()
@@ -72,8 +72,10 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     jobs += [partial(error_bars, solution), partial(best_by_colors, solution)]
     jobs += [partial(_ambiguities, solution)]
     jobs += [partial(without_constraints, view) for view in views]
+    # All of them ask for it.
+    solution.basis.predict(solution.weights)
     # The jobs are independent, and each leaves a processor idle now and then.
-    answers = iter(parallel_map(lambda ask: ask(), jobs))
+    answers = iter(in_turns(lambda ask: ask(), jobs, solution.basis.size))
     looked_at: list[tuple[Seen, Diagnosis]] = [next(answers) for _ in views]
     seen = [its for its, _ in looked_at]
     diagnoses = [diagnosis for _, diagnosis in looked_at]

@@ -11,23 +11,26 @@ second is the compromise with the others. After reweighting, all parts are of th
 problem: without clipping by a display, and on a scale of its own.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, as_rgb
 from lightpaint.colour.color import luminance
+from lightpaint.images.bands import bands_of
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.bound_release import bounds_of
 from lightpaint.lighting.analysis.noise.directions import all_columns
-from lightpaint.lighting.analysis.noise.grain import grain
-from lightpaint.lighting.analysis.noise.noise import pseudo_inverse, residual_and_noise
+from lightpaint.lighting.analysis.noise.grain import channel_grain
+from lightpaint.lighting.analysis.noise.noise import Residuals, pseudo_inverse
 from lightpaint.lighting.answer.active_bound import Bound
-from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
 from lightpaint.screen import short_repr
+from lightpaint.threads import parallel_map
 
 #: Blocks along each side of the image for finding where light is missing, and regions along each
 #: side that sentences name: left, middle, right.
@@ -142,35 +145,20 @@ def diagnose(solution: Solution) -> Diagnosis:
         >>> diagnosis.missed < 0.01
         True
     """
-    basis, loss, weights = solution.basis, solution.problem.loss, solution.weights
-    [target] = solution.problem.views.targets
-    predicted = combine(basis, solution.lighting)
-    free = unbounded_weights(solution)
-    D = solution.weight.astype(np.float64)
-    missed = solution.image.astype(np.float64) - predicted.image
+    basis, weights = solution.basis, solution.weights
+    predicted, free = basis.predict(weights).image, unbounded_weights(solution)
     # The difference of two mixes, so that both maps add up to the error exactly.
-    forbidden = basis.mix(free - weights).astype(np.float64)
-    unreachable = missed - forbidden
-    total = float((D * np.square(missed)).sum())
-    out_of_reach = min(float((D * np.square(unreachable)).sum()), total)
-    # Grain is measured with the weights of the fit: otherwise a mean would give dark pixels the
-    # grain of bright neighbours, and more than the whole error.
+    forbidden = basis.mix(free - weights)
+    unreachable, ignored = np.empty(predicted.shape), np.empty(predicted.shape[:2])
+    energies = _Energies.of(solution, predicted, forbidden, unreachable, ignored)
+    total = energies.total
+    out_of_reach = min(energies.out_of_reach, total)
     noise, painting_noise = (
-        min(float(power.sum()), out_of_reach)
-        for power in (
-            # Not the noise that the painting shares where it is to look as it does now.
-            D * np.square(residual_and_noise(solution)[1]).reshape(missed.shape),
-            grain(np.sqrt(D) * unreachable, solution.importance > 0),
-        )
+        min(power, out_of_reach) for power in (energies.noise, _grain_power(solution, unreachable))
     )
     # The visible noise is that of both.
     painting_noise = max(painting_noise - noise, 0.0)
     lacking = out_of_reach - noise - painting_noise
-    uncounted = np.maximum(1 - solution.importance.astype(np.float64), 0)
-    # Black target pixels have no colour to miss.
-    uncounted = np.where(np.any(target.image > 0, axis=-1), uncounted, 0)
-    outside = target.image.astype(np.float64) - predicted.image
-    seen = outside if solution.problem.is_linear else loss.residual(predicted.image)
     compromise = min(_compromise(solution), total - out_of_reach)
     whole = solution.whole or solution
     bounds, left_out = bounds_of(whole)
@@ -179,11 +167,11 @@ def diagnose(solution: Solution) -> Diagnosis:
         unreachable=lacking,
         forbidden=total - out_of_reach - compromise,
         noise=noise,
-        ignored=float((uncounted[..., None] * np.square(seen)).sum()),
-        missed=_relative_error(solution, D, total),
+        ignored=energies.ignored,
+        missed=_relative_error(solution, total, energies.painted),
         unreachable_map=unreachable,
         forbidden_map=forbidden,
-        ignored_map=uncounted * luminance(outside),
+        ignored_map=ignored,
         bounds=bounds,
         bounds_left_out=left_out,
         lighting_total=total if whole is solution else whole.energy,
@@ -194,9 +182,80 @@ def diagnose(solution: Solution) -> Diagnosis:
     )
 
 
-def _relative_error(solution: Solution, D: Floats, total: float) -> float:
-    """Return the error relative to the painting, root mean square."""
-    norm2 = float((D * np.square(solution.image, dtype=np.float64)).sum())
+@dataclass(frozen=True)
+class _Energies:
+    """Sums over pixels. total, out_of_reach, noise, ignored: as in `Diagnosis`, uncut. painted:
+    Σ D Ψ².
+    """
+
+    total: float
+    out_of_reach: float
+    noise: float
+    ignored: float
+    painted: float
+
+    @classmethod
+    def of(
+        cls,
+        solution: Solution,
+        predicted: Floats,
+        forbidden: Floats,
+        unreachable_map: Doubles,
+        ignored_map: Doubles,
+    ) -> "_Energies":
+        """Sum, band by band, and fill the maps: (h, w, 3) and (h, w)."""
+        [target] = solution.problem.views.targets
+        residuals, loss, width = Residuals.of(solution), solution.problem.loss, predicted.shape[1]
+
+        def sums(rows: slice) -> Doubles:
+            D, importance = (
+                x[rows].astype(np.float64) for x in (solution.weight, solution.importance)
+            )
+            image, mixed = solution.image[rows].astype(np.float64), predicted[rows]
+            missed = image - mixed
+            unreachable = missed - forbidden[rows]
+            # Not the noise that the painting shares where it is to look as it does now.
+            noise = residuals.noise(slice(rows.start * width, rows.stop * width))
+            uncounted = np.maximum(1 - importance, 0)
+            # Black target pixels have no colour to miss.
+            uncounted = np.where(np.any(target.image[rows] > 0, axis=-1), uncounted, 0)
+            outside = target.image[rows].astype(np.float64) - mixed
+            is_linear = solution.problem.is_linear
+            seen = outside if is_linear else loss.cut(lambda x: x[rows]).residual(mixed)
+            unreachable_map[rows] = unreachable
+            ignored_map[rows] = uncounted * luminance(outside)
+            return np.array(
+                [
+                    (D * np.square(missed)).sum(),
+                    (D * np.square(unreachable)).sum(),
+                    (D * np.square(noise.reshape(missed.shape))).sum(),
+                    (uncounted[..., None] * np.square(seen)).sum(),
+                    (D * np.square(image)).sum(),
+                ]
+            )
+
+        its = np.sum(parallel_map(sums, bands_of(predicted.shape)), axis=0).tolist()
+        total, out_of_reach, noise, ignored, painted = its
+        return cls(total, out_of_reach, noise, ignored, painted)
+
+
+def _grain_power(solution: Solution, unreachable: Doubles) -> float:
+    """Return the power of the painting's noise in the part out of reach.
+
+    Grain is measured with the weights of the fit: otherwise a mean would give dark pixels the grain
+    of bright neighbours, and more than the whole error.
+    """
+    counted, weight = solution.importance > 0, solution.weight
+    power = 0.0
+    for c in range(3):
+        its = np.sqrt(weight[..., c % weight.shape[2]].astype(np.float64))
+        its *= unreachable[..., c]
+        power += float(channel_grain(its, counted).sum())
+    return power
+
+
+def _relative_error(solution: Solution, total: float, norm2: float) -> float:
+    """Return the error relative to the painting, root mean square. norm2: Σ D Ψ²."""
     if not solution.problem.is_linear:
         total, norm2 = sum(solution.certificate.objective), float(solution.norm2.sum())
     return float(np.sqrt(total / norm2)) if norm2 > 0 else 0.0
@@ -226,16 +285,20 @@ def unbounded_weights(solution: Solution) -> Doubles:
 
 def _place(solution: Solution, unreachable: Floats) -> Place | None:
     """Find the region and block of the image with the most energy out of reach."""
-    D = solution.weight.astype(np.float64)
     rows, columns = (_edges(length, BLOCKS) for length in solution.importance.shape)
 
-    def block_sums(image: Floats) -> Floats:
-        return np.add.reduceat(np.add.reduceat(image, rows[:-1], 0), columns[:-1], 1)
+    def block_sums(part: Callable[[slice], Floats]) -> Floats:
+        sums = []
+        for top, bottom in pairwise(rows.tolist()):
+            its = part(slice(top, bottom))
+            sums.append(np.add.reduceat(its.sum(axis=0, dtype=np.float64), columns[:-1], 0))
+        return np.stack(sums)
 
+    D = solution.weight
     # Noise averages out: the square of a block's mean is nearly free of it.
-    counted = block_sums(D)
+    counted = block_sums(lambda its: D[its])
     safe = np.where(counted > 0, counted, 1)
-    lacking = block_sums(D * unreachable) / safe
+    lacking = block_sums(lambda its: D[its] * unreachable[its]) / safe
     energy = (counted * np.square(lacking)).sum(axis=-1)
     if not energy.any():
         return None
@@ -245,7 +308,7 @@ def _place(solution: Solution, unreachable: Floats) -> Place | None:
     worst = np.unravel_index(int(np.argmax(region)), region.shape)
     inside = (place_of[0] == worst[0])[:, None] & (place_of[1] == worst[1])
     y, x = np.unravel_index(int(np.argmax(np.where(inside, energy, -1))), energy.shape)
-    painted = (block_sums(D * solution.image) / safe)[y, x]
+    painted = (block_sums(lambda its: D[its] * solution.image[its]) / safe)[y, x]
     return Place(
         region=(int(worst[0]), int(worst[1])),
         share=float(region[worst] / energy.sum()),

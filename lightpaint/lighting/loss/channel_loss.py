@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.loss.loss import PixelLoss
 
@@ -15,14 +15,14 @@ from lightpaint.lighting.loss.loss import PixelLoss
 class PaintedPixels(PixelLoss):
     """Pixels of a `PaintingLoss`, in which the formula stands.
 
-    painted, current: (3, p), linear. importance, share: (p,). at_least: (3, p), None if brighter
-    is nowhere as good. encoded: V of painted and of current, if computed already.
+    painted, current: (3, p), linear, of any precision. importance, share: (p,). at_least: (3, p),
+    None if brighter is nowhere as good. encoded: V of painted and of current, if computed already.
     """
 
-    painted: Doubles
+    painted: Floats
     importance: Doubles
     share: Doubles
-    current: Doubles
+    current: Floats
     at_least: Bools | None
     transform: ViewTransform | None
     encoded: tuple[Doubles, Doubles] | None = None
@@ -55,16 +55,17 @@ class PaintedPixels(PixelLoss):
         """True if light itself is compared."""
         return self.transform is None
 
-    def encode(self, x: Doubles) -> Doubles:
+    def encode(self, x: Floats) -> Doubles:
         """Return V(x), (3, p)."""
+        light: Doubles = x.astype(np.float64, copy=False)
         if self.transform is None:
-            return x
-        return np.asarray(self.transform.encode_planes(x), np.float64)
+            return light
+        return np.asarray(self.transform.encode_planes(light), np.float64)
 
-    def _with_slopes(self, x: Doubles) -> tuple[Doubles, Doubles]:
+    def _with_slopes(self, x: Floats) -> tuple[Doubles, Doubles]:
         """Return V(x), and its derivatives in the form of `ViewTransform.with_slopes`."""
         assert self.transform is not None
-        shown, slopes = self.transform.with_slopes(x)
+        shown, slopes = self.transform.with_slopes(x.astype(np.float64, copy=False))
         return np.asarray(shown, np.float64), np.asarray(slopes, np.float64)
 
     def exceeds(self, x: Doubles) -> Bools | None:
@@ -157,14 +158,15 @@ class PaintedPixels(PixelLoss):
         """Return the share of squares made at x that follow the current look, (3, p). weight:
         theirs.
         """
+        if not self._is_shared:
+            return super().shares(x, weight)
         share = np.zeros_like(x)
 
         def fill(where: slice, its: "PaintedPixels") -> None:
             steep = its._slope_product(x[:, where]) * its.share * its.importance
             np.divide(steep, weight[:, where], out=share[:, where], where=weight[:, where] > 0)
 
-        if self.share.any():
-            self.map_strips(fill)
+        self.map_strips(fill)
         return share
 
     def _slope_product(self, x: Doubles) -> Doubles:
@@ -210,8 +212,8 @@ def join_pixels(parts: Sequence[PaintedPixels]) -> PaintedPixels:
     """Join pixels of several pictures into one set, where brighter is nowhere as good."""
     first = parts[0]
 
-    def put(get: Callable[[PaintedPixels], Doubles]) -> Doubles:
-        return np.concatenate([get(part) for part in parts], axis=-1)
+    def put(get: Callable[[PaintedPixels], Floats]) -> Doubles:
+        return np.concatenate([get(part) for part in parts], axis=-1, dtype=np.float64)
 
     return PaintedPixels(
         put(lambda its: its.painted),

@@ -19,8 +19,9 @@ from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.threads import parallel_map
 
-#: Pixels in a strip.
-STRIP_PIXELS = 2**13
+#: Pixels in a strip, and in all strips that keep what they compute: of 1920 x 1080 pixels. With
+#: more, the painting is encoded anew each time.
+STRIP_PIXELS, MAX_KEPT_PIXELS = 2**13, 2**21
 
 #: From arrays of all views to the part of one of them.
 Cut = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
@@ -88,27 +89,30 @@ class PixelLoss(ABC):
 
         weight: of these squares, (3, p).
         """
-        return np.zeros_like(x)
+        return np.broadcast_to(0.0, x.shape)
 
     def has_same_squares(self, a: Doubles, b: Doubles) -> bool:
         """Return whether two pictures lie on the same pieces. Called if `has_pieces`."""
         return False
 
     @cached_property
-    def strips(self) -> tuple[tuple[slice, Self], ...]:
-        """All pixels in parts, with the slice of each."""
-        if len(self) <= STRIP_PIXELS:
-            return ((slice(0, len(self)), self),)
-        parts = [
+    def _kept_strips(self) -> list[tuple[slice, Self]]:
+        """All pixels in parts, which keep what they compute once."""
+        return [(where, self.subset(where)) for where in self._parts]
+
+    @property
+    def _parts(self) -> list[slice]:
+        return [
             slice(k, min(k + STRIP_PIXELS, len(self))) for k in range(0, len(self), STRIP_PIXELS)
         ]
-        return tuple((where, self.subset(where)) for where in parts)
 
     def map_strips(self, work: Callable[[slice, Self], Result]) -> list[Result]:
         """Return the result of each strip, in order."""
-        if len(self.strips) == 1:
-            return [work(*self.strips[0])]
-        return parallel_map(lambda strip: work(*strip), self.strips)
+        if len(self) <= STRIP_PIXELS:
+            return [work(slice(0, len(self)), self)]
+        if len(self) > MAX_KEPT_PIXELS:
+            return parallel_map(lambda where: work(where, self.subset(where)), self._parts)
+        return parallel_map(lambda strip: work(*strip), self._kept_strips)
 
 
 class Loss(ABC):
@@ -238,6 +242,11 @@ class SquaredPixels(PixelLoss):
 def planes_of(image: npt.NDArray[Any], kind: npt.DTypeLike = np.float64) -> npt.NDArray[Any]:
     """Return an image (h, w, 3) as planes (3, p)."""
     return np.ascontiguousarray(image.reshape(-1, 3).T, dtype=kind)
+
+
+def image_in_place(planes: Doubles, size: tuple[int, ...]) -> Doubles:
+    """Return planes (3, p) as an image (h, w, 3) in the same memory."""
+    return planes.T.reshape(*size, 3)
 
 
 def image_of(planes: Doubles, size: tuple[int, ...]) -> Doubles:

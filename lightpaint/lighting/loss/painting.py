@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import TargetError
@@ -87,7 +87,7 @@ def resolve_emitter_paint(target: Target, basis: Basis, fit: Fit) -> Target:
 
 def present_look(basis: Basis, unpainted: float) -> Floats | None:
     """Return the look (h, w, 3) that holds unpainted pixels; None if it does not."""
-    return basis.mix(basis.present_weights) if unpainted > 0 else None
+    return basis.present_look if unpainted > 0 else None
 
 
 def target_squares(basis: Basis, target: Target, *, unpainted: float = 0.0) -> Squares:
@@ -146,7 +146,7 @@ def choose_loss(
     at_least: Bools,
     transform: ViewTransform | None,
     *,
-    painted: Callable[[], Doubles],
+    painted: Callable[[], Floats],
     current: Callable[[], Floats],
 ) -> Loss:
     """Choose the loss: `literal` itself if it is equal to it.
@@ -173,6 +173,6 @@ def at_least_mask(views: Views) -> Bools:
     return views.join([n if a is None else a for a, n in zip(given, nowhere, strict=True)])
 
 
-def target_light(views: Views) -> Doubles:
-    """Return Ψ of all views in float64."""
-    return views.join([target.image.astype(np.float64) for target in views.targets])
+def target_light(views: Views) -> Floats:
+    """Return Ψ of all views, (h, w, 3), in the precision of the paintings."""
+    return views.join([target.image for target in views.targets])

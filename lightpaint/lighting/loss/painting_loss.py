@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.bands import by_bands
 from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.loss.channel_loss import PaintedPixels
 from lightpaint.lighting.loss.loss import STRIP_PIXELS, Cut, Loss, image_of, planes_of
@@ -52,10 +53,10 @@ class PaintingLoss(Loss):
     def pixels(self) -> PaintedPixels:
         """All pixels, channel by channel."""
         return PaintedPixels(
-            planes_of(self.painted),
+            planes_of(self.painted, self.painted.dtype),
             np.asarray(self.importance, np.float64).ravel(),
             np.asarray(self.share, np.float64).ravel(),
-            planes_of(self.current),
+            planes_of(self.current, self.current.dtype),
             planes_of(self.at_least, bool) if self._may_exceed else None,
             self.transform,
         )
@@ -73,8 +74,13 @@ class PaintingLoss(Loss):
 
     def goal(self, x: Floats) -> Doubles:
         """Return (1 − q) ψ + q C at a picture x, (h, w, 3) linear."""
-        q = self.share[..., None]
-        return np.asarray((1 - q) * self._psi(x) + q * self.current, np.float64)
+
+        def mean(q: Floats, x: Floats, painted: Floats, at_least: Bools, current: Floats) -> Floats:
+            q, psi = q[..., None], np.where(at_least & (x > painted), x, painted)
+            return np.asarray((1 - q) * psi.astype(np.float64) + q * current, np.float64)
+
+        its = self.share, x, self.painted, self.at_least, self.current
+        return np.asarray(by_bands(mean, *its))
 
     def residual(self, x: Floats) -> Doubles:
         """Return V(ψ) − V(x), (h, w, 3)."""

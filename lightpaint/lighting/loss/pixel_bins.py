@@ -127,7 +127,7 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
 
     None for a loss that only fits single pixels.
     """
-    planes: list[list[Doubles]] = [[], []]
+    planes: list[list[Floats]] = [[], []]
     parts: list[tuple[Cut, Doubles]] = []
     for k, basis in enumerate(views.bases):
         cut = partial(views.part, k=k)
@@ -140,12 +140,15 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
         total = block_sums(counts, side)
         safe = np.where(total > 0, total, 1)
         for made, pictures in zip(planes, (basis.planes, basis.noise), strict=True):
-            means = [block_sums(x * counts[..., None], side) / safe[..., None] for x in pictures]
-            made.append(np.stack(means).reshape(len(means), -1, 3))
+            means = np.empty((len(basis.lights), *total.shape, 3), np.float32)
+            for mean, image in zip(means, pictures, strict=True):
+                mean[...] = block_sums(image * counts[..., None], side) / safe[..., None]
+            made.append(means.reshape(len(means), -1, 3))
         parts.append((cut, counts))
     if (blocks := loss.block_means(parts, side)) is None:
         return None
-    images, halves = (np.concatenate(x, axis=1)[:, None].astype(np.float32) for x in planes)
+    images, halves = (x[0] if len(x) == 1 else np.concatenate(x, axis=1) for x in planes)
+    images, halves = images[:, None], halves[:, None]
     basis = replace(
         views.bases[0],
         planes=as_planes(images),

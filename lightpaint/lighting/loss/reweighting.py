@@ -14,9 +14,8 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.loss.lit_pixels import LitPixels
-from lightpaint.lighting.loss.loss import Loss, PixelLoss, Squares, image_of
+from lightpaint.lighting.loss.loss import Loss, PixelLoss, Squares, image_in_place
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.threads import parallel_map
 
 #: Rounds at most.
 MAX_ROUNDS = 100
@@ -141,7 +140,7 @@ def descend(
         x = LitPixels.whole(basis, loss).predicted(result.at)
         image, weight = loss.pixels.squares(x, from_clipping=result.from_clipping)
     share = loss.pixels.shares(x, weight)
-    squares = Squares(*parallel_map(lambda x: image_of(x, basis.size), (image, weight, share)))
+    squares = Squares(*(image_in_place(x, basis.size) for x in (image, weight, share)))
     reweighting = Reweighting(result.at, result.count, result.step, result.converged)
     return Descent(result.weights, squares, result.equations, reweighting)
 

@@ -5,6 +5,7 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.solution import Solution
@@ -96,7 +97,8 @@ def _figures(
         # Reduced it is quick to denoise, and needs no features.
         image = np.asarray(block_mean(basis.mix(weights), factor), np.float32)
         pixels = transform.encode(denoised(image) if looks and looks.is_clean else image)
-        figures.append(figure(PagePicture(name, f"{name}, predicted.", pixels), caption, ""))
+        picture = PagePicture(name, f"{name}, predicted.", to_8_bit(pixels))
+        figures.append(figure(picture, caption, ""))
     return "".join(figures)
 
 

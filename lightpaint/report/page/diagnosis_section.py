@@ -8,6 +8,8 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import to_8_bit
+from lightpaint.images.bands import by_bands
 from lightpaint.lighting.analysis.appearance.appearance import Seen
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
@@ -17,8 +19,8 @@ from lightpaint.report.answer_pictures import (
     FINEST_SCALE,
     coverage,
     diverging,
+    over_unpainted,
     round_up,
-    unpainted_look,
 )
 from lightpaint.report.diagnosis_sentences import error_sentences, spoken_hold
 from lightpaint.report.measures import brightness, energy_shares, relative_errors
@@ -147,25 +149,28 @@ def _maps(
         ),
     ]
     limit = maps_limit(solution, diagnosis, transform=transform)
-    share = coverage(solution.importance)[..., None]
-    grey = unpainted_look(current, transform=transform)
-    figures = []
+    share, figures = coverage(solution.importance), []
     for name, image, caption in parts:
         if name == "Forbidden" and diagnosis.share(diagnosis.avoidable) < SMALLEST_GAIN:
             continue  # an empty picture
         # As in the residual's map: predicted − painted, so that bright is too bright.
-        colours = diverging(-luminance(image) / limit)
+        shown = over_unpainted(
+            lambda x: diverging(-luminance(x) / limit),
+            image,
+            share,
+            current,
+            transform=transform,
+            finish=to_8_bit,
+        )
         figures.append(
             figure(
-                PagePicture(
-                    name, f"False-colour map: {name}.", share * colours + (1 - share) * grey
-                ),
+                PagePicture(name, f"False-colour map: {name}.", shown),
                 caption,
                 signed_scale(limit),
             )
         )
     if diagnosis.ignored > 0:
-        colours = diverging(-diagnosis.ignored_map / limit)
+        colours = by_bands(lambda x: to_8_bit(diverging(-x / limit)), diagnosis.ignored_map)
         figures.append(
             figure(
                 PagePicture("Not counted", "False-colour map of what does not count.", colours),
@@ -180,7 +185,7 @@ def maps_limit(solution: Solution, diagnosis: Diagnosis, *, transform: ViewTrans
     """Return the end of the scale of all maps of the error."""
     counted = solution.importance > 0
     maps = (diagnosis.unreachable_map, diagnosis.forbidden_map)
-    sizes = np.concatenate([np.abs(luminance(image))[counted] for image in maps])
+    sizes = np.concatenate([np.abs(by_bands(luminance, image)[counted]) for image in maps])
     return round_up(max(float(np.percentile(sizes, 99)), FINEST_SCALE * 2.0**-transform.stops))
 
 

@@ -48,16 +48,15 @@ CLEAN_REDUCTION = 4
 
 @dataclass(frozen=True)
 class PagePicture:
-    """A picture of the page, (h, w, 3) in display values. alt: its content in words. alt: what it
-    shows, in words.
+    """A picture of the page, (h, w, 3) in 8 bits. alt: its content in words.
 
     raw: the same without denoising, if `pixels` were denoised.
     """
 
     name: str
     alt: str
-    pixels: Floats
-    raw: Floats | None = None
+    pixels: npt.NDArray[np.uint8]
+    raw: npt.NDArray[np.uint8] | None = None
 
 
 def data_uri(
@@ -126,7 +125,7 @@ def exposure_of(image: Floats, emitters_seen: npt.NDArray[np.bool_]) -> float:
 def _raw_uri(look: PagePicture) -> str:
     if look.raw is None:
         return ""
-    return data_uri(to_8_bit(look.raw), largest_png=0, quality=RAW_QUALITY)
+    return data_uri(look.raw, largest_png=0, quality=RAW_QUALITY)
 
 
 def wipe(looks: list[PagePicture]) -> str:
@@ -142,7 +141,7 @@ def wipe(looks: list[PagePicture]) -> str:
             for k, look in enumerate(looks)
         )
 
-    shown = parallel_map(lambda look: data_uri(to_8_bit(look.pixels)), looks)
+    shown = parallel_map(lambda look: data_uri(look.pixels), looks)
     raw = parallel_map(_raw_uri, looks)
     images = "".join(
         f'<img class="{"is-a" if k == a else "is-b" if k == b else ""}" data-look="{k}" '
@@ -188,7 +187,7 @@ def maps(
     result of `residual_of`.
     """
     missed = missed or residual_of(solution, predicted, transform=transform)
-    picture = residual_picture(missed, solution, current, transform=transform)
+    picture = residual_picture(missed, solution, current, transform=transform, finish=to_8_bit)
     figures = [
         figure(
             PagePicture("Residual", "False-colour map of the residual.", picture),
@@ -200,7 +199,9 @@ def maps(
             PagePicture(
                 "Importance",
                 "Map of how much each pixel counts.",
-                importance_picture(solution.importance, current, transform=transform),
+                importance_picture(
+                    solution.importance, current, transform=transform, finish=to_8_bit
+                ),
             ),
             f"How much each pixel counts: {solution.importance.mean():.2g} on average, "
             f"{solution.importance.max():.3g} at most.",
@@ -211,7 +212,9 @@ def maps(
         z = verification.z.mean(axis=-1, dtype=np.float64)
         figures.append(
             figure(
-                PagePicture("Verification", "False-colour map of z.", diverging(z / LIMIT)),
+                PagePicture(
+                    "Verification", "False-colour map of z.", to_8_bit(diverging(z / LIMIT))
+                ),
                 "Answer − render in standard errors, mean of the channels. Noise alone "
                 "looks like even grain; a shape in it is an error.",
                 scale(SIGNED, f"−{LIMIT:g} answer darker", "0", f"answer brighter +{LIMIT:g}"),
@@ -225,7 +228,7 @@ def figure(picture: PagePicture, caption: str, legend: str) -> str:
     height, width = picture.pixels.shape[:2]
     return (
         f'<figure><img width="{width}" height="{height}" alt="{picture.alt} {caption}" '
-        f'src="{data_uri(to_8_bit(picture.pixels))}">{legend}'
+        f'src="{data_uri(picture.pixels)}">{legend}'
         f"<figcaption><strong>{picture.name}.</strong> {caption}</figcaption></figure>"
     )
 

@@ -14,6 +14,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.photometry import Photometry
 from lightpaint.colour.srgb import to_8_bit
+from lightpaint.images.bands import in_turns
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
@@ -30,7 +31,6 @@ from lightpaint.report.uncertainty_sentences import (
     spoken_errors,
     unreached_channels,
 )
-from lightpaint.threads import parallel_map
 
 #: Headings of the columns, with the classes of their cells.
 COLUMNS = (
@@ -126,9 +126,8 @@ def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int,
         picture, stops = thumbnail(basis.planes.plane(k), basis.emitters_seen, is_clean=is_clean)
         return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
 
-    return make_once(
-        basis, ("thumbnails", is_clean), lambda: parallel_map(shown, range(len(basis.lights)))
-    )
+    every = range(len(basis.lights))
+    return make_once(basis, ("thumbnails", is_clean), lambda: in_turns(shown, every, basis.size))
 
 
 def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:

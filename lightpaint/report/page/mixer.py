@@ -21,6 +21,7 @@ from lightpaint.colour.display.transform_table import curve_of, lattice_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.photometry import photometry
 from lightpaint.colour.srgb import to_8_bit
+from lightpaint.images.bands import in_turns
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.packed_picture import PackedPicture, pack_picture
 from lightpaint.images.pixel_blocks import block_mean
@@ -150,7 +151,7 @@ def _compact_planes(
             made = planes.plane(lights[k]) if planes else basis.planes.plane(lights[k])
         return np.asarray(block_mean(made, factor), np.float32)
 
-    pictures = parallel_map(small, range(len(lights) + len(mixes)))
+    pictures = in_turns(small, range(len(lights) + len(mixes)), basis.size)
     if is_clean and planes is None and factor < CLEAN_REDUCTION:
         features = basis.features and basis.features.reduced(factor)
         pictures = [denoised(picture, features) for picture in pictures]

@@ -15,6 +15,8 @@ from string import Template
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.colour.srgb import to_8_bit
+from lightpaint.images.bands import in_turns
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import covered
 from lightpaint.lighting.analysis.appearance.appearance import Seen
@@ -44,7 +46,6 @@ from lightpaint.report.page.suggestion_section import suggestion_section
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
-from lightpaint.threads import parallel_map
 
 
 def report_page(
@@ -102,7 +103,7 @@ def report_page(
         ),
         "lights": partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
     }
-    made = parallel_map(lambda make: make(), tuple(making.values()))
+    made = in_turns(lambda make: make(), tuple(making.values()), basis.size)
     drawn = dict(zip(making, made, strict=True))
     drawn["missed"] += drawn.pop("constraints") + colors_section(color_choices)
     drawn["mixer"] += mixer_assets()
@@ -165,7 +166,7 @@ def _wipe(
 
     def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> PagePicture:
         size = looks.predicted.shape[:2]
-        both = [covered(transform.encode(x), size) for x in (clean, noisy)]
+        both = [to_8_bit(covered(transform.encode(x), size)) for x in (clean, noisy)]
         return PagePicture(name, alt, both[0], both[1] if looks.is_clean else None)
 
     pictures = [
@@ -173,7 +174,7 @@ def _wipe(
         PagePicture(
             "painting",
             "What was painted. Unpainted pixels are grey, dim and hatched.",
-            target_picture(target, solution, looks.current, transform=transform),
+            target_picture(target, solution, looks.current, transform=transform, finish=to_8_bit),
         ),
         picture(
             "answer",

@@ -41,7 +41,6 @@ from lightpaint.lighting.analysis.diagnosis import (
     diagnose,
     error_shares,
 )
-from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.constraints.light_patterns import constraints_by_light, tied_lights
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import short_repr
@@ -201,10 +200,10 @@ def what_is_seen(
         True
     """
     problem = solution.problem
-    predicted = predicted or combine(solution.basis, solution.lighting)
+    predicted = predicted or solution.basis.predict(solution.weights)
     look = PaintComparison.of_problem(problem)
     light, grain = look.pixels(predicted.image), look.pixels(predicted.half_difference)
-    now = look.pixels(problem.basis.mix(problem.basis.present_weights))
+    now = look.pixels(problem.basis.present_look)
     with_noise, missed = block_differences(look, light, grain)
     delta_e, left = (float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed))
     seen = Seen(delta_e, max(delta_e - left, 0.0), look.mean(look.difference(now)))
@@ -255,5 +254,6 @@ def _unpainted_change(
     for kind in FIXING_KINDS:
         its = list(kinds.get(kind, ()))
         before[its] = solution.weights[its]
-    now = basis.mix(before)
+    is_present = np.array_equal(before, basis.present_weights)
+    now = basis.present_look if is_present else basis.mix(before)
     return unpainted_change(look, basis, target.importance > 0, now, predicted.image)

@@ -40,15 +40,16 @@ class PaintComparison:
     def of_problem(problem: Problem, *, max_pixels: int = MAX_COMPARED_PIXELS) -> "PaintComparison":
         """Choose pixels of the painting of a problem, in all its views. most: pixels, about."""
         views = problem.views
-        weight = views.join([target.importance for target in views.targets]).astype(np.float64)
+        weight = views.join([target.importance for target in views.targets])
         step = max(int(np.sqrt((weight > 0).sum() / max_pixels)), 1)
         if not weight[::step, ::step].any():
             step = 1
         every = (slice(None, None, step), slice(None, None, step))
         return PaintComparison(
-            target_light(views)[every],
-            at_least_mask(views)[every],
-            weight[every],
+            # Copies, which do not keep the whole pictures.
+            target_light(views)[every].astype(np.float64),
+            at_least_mask(views)[every].copy(),
+            weight[every].astype(np.float64),
             step,
             display_transform(problem),
             problem.loss.transform,

@@ -115,8 +115,9 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
         whole = np.full(len(part), part.sum())
     else:
         part, enough = np.where(basis.is_fixed, 0, luminance(there)), GETS_THERE
-        every = np.stack([luminance(x[::STEP, ::STEP]) for x in basis.planes])
-        whole = np.percentile(every.reshape(len(part), -1), 99, axis=1)
+        # One light at a time: the brightness of all would be as much as half of their pictures.
+        every = (luminance(x[::STEP, ::STEP]) for x in basis.planes)
+        whole = np.array([np.percentile(x, 99) for x in every])
     share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
     names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)
     return tuple(names), bool(share.max() > DOES_MUCH)

@@ -209,7 +209,7 @@ def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -
             little = between
     [target] = solution.problem.views.targets
     basis = solution.basis
-    before, after = (basis.mix(x) for x in (solution.weights, weights))
+    before, after = basis.predict(solution.weights).image, basis.mix(weights)
     look = PaintComparison.of_problem(solution.problem)
     changed = unpainted_change(look, basis, target.importance > 0, before, after)
     return Loosening(enough, share, changed)

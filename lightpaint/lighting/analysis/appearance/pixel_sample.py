@@ -225,14 +225,14 @@ def _average_blocks(views: Views, side: int) -> Views:
         unseen = ~basis.emitters_seen[:height, :width]
         total = block_sums(unseen.astype(np.float64), side)
         counts, safe = unseen[..., None], np.where(total > 0, total, 1)[..., None]
-        images, halves = (
-            np.stack([block_sums(x[:height, :width] * counts, side) / safe for x in planes])
-            for planes in (basis.planes, basis.noise)
-        )
+        images, halves = np.empty((2, len(basis.lights), *total.shape, 3), np.float32)
+        for means, planes in ((images, basis.planes), (halves, basis.noise)):
+            for mean, image in zip(means, planes, strict=True):
+                mean[...] = block_sums(image[:height, :width] * counts, side) / safe
         made = replace(
             basis,
-            planes=as_planes(images.astype(np.float32)),
-            noise=as_planes(halves.astype(np.float32)),
+            planes=as_planes(images),
+            noise=as_planes(halves),
             emitters_seen=total == 0,
             learned=None,
             features=None,

@@ -44,11 +44,11 @@ def grain(residual: Floats, counted: Bools) -> Doubles:
 
     residual: (h, w, 3). counted: (h, w), the pixels that count.
     """
-    return np.stack([_variance(residual[..., c], counted) for c in range(3)], axis=-1)
+    return np.stack([channel_grain(residual[..., c], counted) for c in range(3)], axis=-1)
 
 
-def _variance(residual: Floats, counted: Bools) -> Doubles:
-    """Return the variance of one channel, (h, w)."""
+def channel_grain(residual: Floats, counted: Bools) -> Doubles:
+    """Return the variance of the noise of one channel, (h, w). Arguments: as of `grain`, (h, w)."""
     near, far = (_tap_variance(residual, counted, step) for step in (1, 2))
     if far[counted].sum() > MAX_RATIO * near[counted].sum():
         return near
@@ -62,16 +62,19 @@ def _tap_variance(residual: Floats, counted: Bools, step: int) -> Doubles:
     a, whole = residual.astype(np.float64), counted
     for axis in (0, 1):
         first, middle, last = _taps(a, step, axis)
-        a = first - 2 * middle + last
+        a = first - 2 * middle
+        a += last
         whole = np.logical_and.reduce(_taps(whole, step, axis))
     a *= whole
     products = np.square(a)
     for here, there in _distant_windows(3 * step):
-        pairs = a[here] * a[there] / 2
+        pairs = a[here] * a[there]
+        pairs /= 2
         products[here] -= pairs
         products[there] -= pairs
     seen = np.maximum(_neighbourhood_means(whole.astype(np.float64)), 1e-12)
-    power, size = _neighbourhood_means(products) / seen, _neighbourhood_means(np.abs(a)) / seen
+    power = _neighbourhood_means(products) / seen
+    size = _neighbourhood_means(np.abs(a, out=products)) / seen
     variance = np.clip(power, 0, MAX_PEAK * np.square(size)) / POWER
     variance = enlarged(variance, BLOCK)[: a.shape[0], : a.shape[1]]
     # The border gets the values beside it.

@@ -71,7 +71,7 @@ def noise_sums(solution: Solution) -> Noise:
     # (pixels, 1), or (pixels, 3) where channels differ.
     squares = problem.squares
     weight, share = (x.reshape(-1, x.shape[2]) for x in (squares.weight, squares.share))
-    residual, mixed = residual_and_noise(solution)
+    residuals = Residuals.of(solution)
     # The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by: of a
     # pixel it adds Φᵢ hᵢ times this.
     pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
@@ -82,9 +82,7 @@ def noise_sums(solution: Solution) -> Noise:
         basis.noise,
         weight,
         share,
-        residual,
-        mixed,
-        basis.noise.mix(basis.present_weights).reshape(-1, 3),
+        residuals,
         unseen,
     )
     # A dimmer, a tie or a limit on luminance couples channels, as the one weight of a scalar light.
@@ -97,12 +95,18 @@ def noise_sums(solution: Solution) -> Noise:
         if len(weights) <= FEW_LIGHTS
         else [pixels.sums(its, weights, pulled, is_coupled=is_coupled) for its in parts]
     )
+    error, noise = np.zeros((2, 3))
+    for start in range(0, len(weight), BLOCK):
+        its = slice(start, start + BLOCK)
+        mixed = residuals.noise(its)
+        error += np.square(weight[its] * residuals.residual(its) * mixed).sum(axis=0)
+        noise += (weight[its] * np.square(mixed)).sum(axis=0)
     return Noise(
         power=np.asarray(sum(x.power for x in sums)),
         target_noise=np.asarray(sum(x.target_noise for x in sums)),
         gradient=np.asarray(sum(x.gradient for x in sums)),
-        objective_error=2 * np.sqrt(np.square(weight * residual * mixed).sum(axis=0)),
-        objective_noise=(weight * np.square(mixed)).sum(axis=0),
+        objective_error=2 * np.sqrt(error),
+        objective_noise=noise,
         hidden=np.array([Peaks.merged([x.peaks[c] for x in sums]).hidden() for c in range(3)]),
     )
 
@@ -127,18 +131,14 @@ class _Sums:
 class _Pixels:
     """Data of all pixels.
 
-    planes, noise: of the basis. weight, share: (p, 1) or (p, 3). residual, mixed: (p, 3), see
-    `residual_and_noise`. present: (p, 3), noise of the current look. unseen: (p,), where no emitter
-    is.
+    planes, noise: of the basis. weight, share: (p, 1) or (p, 3). unseen: (p,), where no emitter is.
     """
 
     planes: Planes
     noise: Planes
     weight: Floats
     share: Floats
-    residual: Doubles
-    mixed: Doubles
-    present: Floats
+    residuals: "Residuals"
     unseen: Bools
 
     def sums(
@@ -151,7 +151,8 @@ class _Pixels:
         for start in range(0, counted.size, BLOCK):
             pixels = run_of(counted[start : start + BLOCK])
             both = self.noise.pixels(pixels), self.planes.pixels(pixels)
-            rows = [self._rows(made, pixels, both, c, weights, pulled) for c in range(3)]
+            missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
+            rows = [self._rows(made, pixels, both, missed, c, weights, pulled) for c in range(3)]
             for c in range(3):
                 made.gradient[c, :, c] += rows[c] @ rows[c].T
             if is_coupled:
@@ -167,43 +168,73 @@ class _Pixels:
         made: _Sums,
         pixels: slice | Indices,
         both: tuple[Floats, Floats],
+        missed: tuple[Doubles, Doubles],
         c: int,
         weights: Doubles,
         pulled: Doubles,
     ) -> Doubles:
         """Return the noise in the gradient of a channel, (n, pixels); add all else to `made`.
 
-        both: (n, pixels, 3), noise and planes there.
+        both: (n, pixels, 3), noise and planes there. missed: (pixels, 3), residual and the noise of
+        the prediction.
         """
         D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
         h, lit = (x[..., c].astype(np.float64) for x in both)
-        residual, mixed = self.residual[pixels, c], self.mixed[pixels, c]
+        residual, mixed = (x[:, c] for x in missed)
         rows = D * (h * residual - lit * mixed)
         size = np.abs(residual) + weights[:, c, None] * lit
         made.peaks[c].add(D * lit * size, rows)
         if pulled.any():
             rows += pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
         made.power[c] += (D * h) @ h.T
-        shared = D * self.share[pixels, c % self.share.shape[1]]
-        made.target_noise[c] += h @ (shared * self.present[pixels, c])
+        if self.residuals.present is not None:
+            shared = D * self.share[pixels, c % self.share.shape[1]]
+            made.target_noise[c] += h @ (shared * self.residuals.present[pixels, c])
         return np.asarray(rows)
 
 
-def residual_and_noise(solution: Solution) -> tuple[Doubles, Doubles]:
-    """Return the residual of the answer, and the half difference of its prediction.
+@dataclass(frozen=True)
+class Residuals:
+    """The residual of an answer, and the noise of its prediction, of any pixels.
 
-    Returns two (pixels, 3): Ψ − Σ w_i Φ_i and Σ w_i h_i, less the noise that Ψ shares where
-    it is the current look.
+    The noise is Σ w_i h_i less what Ψ shares where it is the current look.
+
+    image: (p, 3), Ψ. predicted: (p, 3), Σ w_i Φ_i. half: (p, 3), Σ w_i h_i. present: (p, 3), noise
+    of the current look; None where nothing follows it. share: (p, 1) or (p, 3), as far as it does;
+    None where `half` has that already.
     """
-    basis, weights, r = solution.basis, solution.weights, solution.problem.refinement
-    residual = solution.image.astype(np.float64) - basis.mix(weights)
-    if r is not None:
-        noise = r.noise + basis.noise.mix(weights - r.before)
-    else:
-        noise = basis.noise.mix(weights).astype(np.float64)
-        present = basis.noise.mix(basis.present_weights)
-        noise = noise - solution.problem.squares.share * present
-    return residual.reshape(-1, 3), np.asarray(noise, np.float64).reshape(-1, 3)
+
+    image: Floats
+    predicted: Floats
+    half: Floats
+    present: Floats | None
+    share: Floats | None
+
+    @classmethod
+    def of(cls, solution: Solution) -> "Residuals":
+        """Return those of a solution."""
+        basis, weights, problem = solution.basis, solution.weights, solution.problem
+        predicted, r, share = basis.predict(weights), problem.refinement, problem.squares.share
+        half, present = predicted.half_difference, None
+        if share.any():
+            present = basis.noise.mix(basis.present_weights).reshape(-1, 3)
+        if r is not None:
+            half = r.noise + basis.noise.mix(weights - r.before)
+        image, mixed, half = (x.reshape(-1, 3) for x in (solution.image, predicted.image, half))
+        is_shared = present is not None and r is None
+        shared = share.reshape(-1, share.shape[2]) if is_shared else None
+        return cls(image, mixed, half, present, shared)
+
+    def residual(self, pixels: slice | Indices) -> Doubles:
+        """Return Ψ − Σ w_i Φ_i of some pixels, (p, 3)."""
+        return self.image[pixels].astype(np.float64) - self.predicted[pixels]
+
+    def noise(self, pixels: slice | Indices) -> Doubles:
+        """Return the half difference of the prediction at some pixels, (p, 3)."""
+        half = self.half[pixels].astype(np.float64)
+        if self.present is None or self.share is None:
+            return half
+        return half - self.share[pixels] * self.present[pixels]
 
 
 def gradient_bias(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:

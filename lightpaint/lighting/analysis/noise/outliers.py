@@ -46,7 +46,7 @@ def weakest_matrix(
     remove. Returns (3, n, n), positive semidefinite.
     """
     basis, M = solution.basis, solution.equations.M
-    weight = solution.problem.squares.weight.astype(np.float64)
+    weight = solution.problem.squares.weight
     made = corrected.copy()
     for k, c in np.argwhere(doubts > 0):
         D = weight[..., c % weight.shape[2]].ravel()
@@ -63,7 +63,7 @@ def weakest_matrix(
     return made
 
 
-def _least_power(image: Floats, half: Floats, D: Doubles) -> tuple[float, float]:
+def _least_power(image: Floats, half: Floats, D: Floats) -> tuple[float, float]:
     """Return the least ‖Φ‖² that a light may have without noise, by its light alone.
 
     That is ‖Φ‖² ≥ (Σ D Φ)² / Σ D. Also returns the standard error of Σ D h². All (pixels,).

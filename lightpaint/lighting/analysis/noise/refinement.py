@@ -18,10 +18,10 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.directions import free_directions
 from lightpaint.lighting.analysis.noise.noise import (
+    Residuals,
     gradient_bias,
     noise_sums,
     pseudo_inverse,
-    residual_and_noise,
 )
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Refinement
@@ -74,8 +74,7 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     # The error of the gradient there, and the error by the noise in M on the way here.
     remains = 1 - problem.noise_removed
     lacking = lacking + remains * np.einsum("cij,jc->ci", sums.power, w - before)
-    _, noise = residual_and_noise(solution)
-    noise = noise.reshape(mixed.image.shape)
+    noise = Residuals.of(solution).noise(slice(None)).reshape(mixed.image.shape)
     # The render does not change the noise of a painting that is the current look.
     t = _render_share(solution, lacking, noise, mixed.half_difference.astype(np.float64))
 

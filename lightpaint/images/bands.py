@@ -1,0 +1,66 @@
+"""Whole pictures computed by bands of rows, so that what is made on the way is of one band."""
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.threads import parallel_map
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+#: Pixels of a band, about.
+BAND_PIXELS = 2**18
+
+#: Pixels of a picture from which jobs that need several whole ones wait for each other.
+LARGE_PICTURE = 2**22
+
+
+def bands_of(size: tuple[int, ...]) -> Iterator[slice]:
+    """Yield the rows of each band of a picture of (height, width, …) pixels."""
+    step = max(1, BAND_PIXELS // max(size[1], 1))
+    return (slice(top, min(top + step, size[0])) for top in range(0, size[0], step))
+
+
+def by_bands(make: Callable[..., npt.NDArray[Any]], *pictures: npt.NDArray[Any]) -> Any:
+    """Return `make(*pictures)`, (h, …), of a function that makes each pixel of its own place.
+
+    pictures: (h, w, …) each. The result has the bits that all pixels at once would give.
+    """
+    top, *others = bands_of(pictures[0].shape)
+    if not others:
+        return make(*pictures)
+    first = make(*(x[top] for x in pictures))
+    made = np.empty((len(pictures[0]), *first.shape[1:]), first.dtype)
+    made[top] = first
+
+    def fill(rows: slice) -> None:
+        made[rows] = make(*(x[rows] for x in pictures))
+
+    parallel_map(fill, others)
+    return made
+
+
+def sum_by_bands(make: Callable[..., Any], *pictures: npt.NDArray[Any]) -> Any:
+    """Return Σ make(*bands), numbers or arrays, added in the order of the bands.
+
+    pictures: (h, w, …) each.
+    """
+
+    def part(rows: slice) -> Any:
+        return make(*(x[rows] for x in pictures))
+
+    return np.sum(parallel_map(part, bands_of(pictures[0].shape)), axis=0)
+
+
+def in_turns(
+    work: Callable[[Job], Result], jobs: Iterable[Job], size: tuple[int, ...]
+) -> list[Result]:
+    """Return work(job) of each job: side by side, or where pictures are large one by one.
+
+    size: (height, width) of the pictures, of which each job has several at a time.
+    """
+    is_large = size[0] * size[1] >= LARGE_PICTURE
+    return [work(job) for job in jobs] if is_large else parallel_map(work, jobs)
