@@ -19,18 +19,15 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, as_rgb
-from lightpaint.colour.color import luminance
-from lightpaint.images.bands import bands_of
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.bound_release import bounds_of
+from lightpaint.lighting.analysis.error_energies import ErrorEnergies, grain_power
 from lightpaint.lighting.analysis.noise.directions import all_columns
-from lightpaint.lighting.analysis.noise.grain import channel_grain
-from lightpaint.lighting.analysis.noise.noise import Residuals, pseudo_inverse
+from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
 from lightpaint.lighting.answer.active_bound import Bound
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
 from lightpaint.screen import short_repr
-from lightpaint.threads import parallel_map
 
 #: Blocks along each side of the image for finding where light is missing, and regions along each
 #: side that sentences name: left, middle, right.
@@ -150,11 +147,11 @@ def diagnose(solution: Solution) -> Diagnosis:
     # The difference of two mixes, so that both maps add up to the error exactly.
     forbidden = basis.mix(free - weights)
     unreachable, ignored = np.empty(predicted.shape), np.empty(predicted.shape[:2])
-    energies = _Energies.of(solution, predicted, forbidden, unreachable, ignored)
+    energies = ErrorEnergies.of(solution, predicted, forbidden, unreachable, ignored)
     total = energies.total
     out_of_reach = min(energies.out_of_reach, total)
     noise, painting_noise = (
-        min(power, out_of_reach) for power in (energies.noise, _grain_power(solution, unreachable))
+        min(power, out_of_reach) for power in (energies.noise, grain_power(solution, unreachable))
     )
     # The visible noise is that of both.
     painting_noise = max(painting_noise - noise, 0.0)
@@ -180,78 +177,6 @@ def diagnose(solution: Solution) -> Diagnosis:
         painting_noise=painting_noise,
         place=_place(solution, unreachable) if lacking > 0 else None,
     )
-
-
-@dataclass(frozen=True)
-class _Energies:
-    """Sums over pixels. total, out_of_reach, noise, ignored: as in `Diagnosis`, uncut. painted:
-    Σ D Ψ².
-    """
-
-    total: float
-    out_of_reach: float
-    noise: float
-    ignored: float
-    painted: float
-
-    @classmethod
-    def of(
-        cls,
-        solution: Solution,
-        predicted: Floats,
-        forbidden: Floats,
-        unreachable_map: Doubles,
-        ignored_map: Doubles,
-    ) -> "_Energies":
-        """Sum, band by band, and fill the maps: (h, w, 3) and (h, w)."""
-        [target] = solution.problem.views.targets
-        residuals, loss, width = Residuals.of(solution), solution.problem.loss, predicted.shape[1]
-
-        def sums(rows: slice) -> Doubles:
-            D, importance = (
-                x[rows].astype(np.float64) for x in (solution.weight, solution.importance)
-            )
-            image, mixed = solution.image[rows].astype(np.float64), predicted[rows]
-            missed = image - mixed
-            unreachable = missed - forbidden[rows]
-            # Not the noise that the painting shares where it is to look as it does now.
-            noise = residuals.noise(slice(rows.start * width, rows.stop * width))
-            uncounted = np.maximum(1 - importance, 0)
-            # Black target pixels have no colour to miss.
-            uncounted = np.where(np.any(target.image[rows] > 0, axis=-1), uncounted, 0)
-            outside = target.image[rows].astype(np.float64) - mixed
-            is_linear = solution.problem.is_linear
-            seen = outside if is_linear else loss.cut(lambda x: x[rows]).residual(mixed)
-            unreachable_map[rows] = unreachable
-            ignored_map[rows] = uncounted * luminance(outside)
-            return np.array(
-                [
-                    (D * np.square(missed)).sum(),
-                    (D * np.square(unreachable)).sum(),
-                    (D * np.square(noise.reshape(missed.shape))).sum(),
-                    (uncounted[..., None] * np.square(seen)).sum(),
-                    (D * np.square(image)).sum(),
-                ]
-            )
-
-        its = np.sum(parallel_map(sums, bands_of(predicted.shape)), axis=0).tolist()
-        total, out_of_reach, noise, ignored, painted = its
-        return cls(total, out_of_reach, noise, ignored, painted)
-
-
-def _grain_power(solution: Solution, unreachable: Doubles) -> float:
-    """Return the power of the painting's noise in the part out of reach.
-
-    Grain is measured with the weights of the fit: otherwise a mean would give dark pixels the grain
-    of bright neighbours, and more than the whole error.
-    """
-    counted, weight = solution.importance > 0, solution.weight
-    power = 0.0
-    for c in range(3):
-        its = np.sqrt(weight[..., c % weight.shape[2]].astype(np.float64))
-        its *= unreachable[..., c]
-        power += float(channel_grain(its, counted).sum())
-    return power
 
 
 def _relative_error(solution: Solution, total: float, norm2: float) -> float:

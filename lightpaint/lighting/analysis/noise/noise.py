@@ -13,6 +13,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK, FEW_LIGHTS, Planes, run_of
 from lightpaint.lighting.analysis.noise.peaks import Peaks
+from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.threads import one_thread, parallel_map
@@ -138,7 +139,7 @@ class _Pixels:
     noise: Planes
     weight: Floats
     share: Floats
-    residuals: "Residuals"
+    residuals: Residuals
     unseen: Bools
 
     def sums(
@@ -191,50 +192,6 @@ class _Pixels:
             shared = D * self.share[pixels, c % self.share.shape[1]]
             made.target_noise[c] += h @ (shared * self.residuals.present[pixels, c])
         return np.asarray(rows)
-
-
-@dataclass(frozen=True)
-class Residuals:
-    """The residual of an answer, and the noise of its prediction, of any pixels.
-
-    The noise is Σ w_i h_i less what Ψ shares where it is the current look.
-
-    image: (p, 3), Ψ. predicted: (p, 3), Σ w_i Φ_i. half: (p, 3), Σ w_i h_i. present: (p, 3), noise
-    of the current look; None where nothing follows it. share: (p, 1) or (p, 3), as far as it does;
-    None where `half` has that already.
-    """
-
-    image: Floats
-    predicted: Floats
-    half: Floats
-    present: Floats | None
-    share: Floats | None
-
-    @classmethod
-    def of(cls, solution: Solution) -> "Residuals":
-        """Return those of a solution."""
-        basis, weights, problem = solution.basis, solution.weights, solution.problem
-        predicted, r, share = basis.predict(weights), problem.refinement, problem.squares.share
-        half, present = predicted.half_difference, None
-        if share.any():
-            present = basis.noise.mix(basis.present_weights).reshape(-1, 3)
-        if r is not None:
-            half = r.noise + basis.noise.mix(weights - r.before)
-        image, mixed, half = (x.reshape(-1, 3) for x in (solution.image, predicted.image, half))
-        is_shared = present is not None and r is None
-        shared = share.reshape(-1, share.shape[2]) if is_shared else None
-        return cls(image, mixed, half, present, shared)
-
-    def residual(self, pixels: slice | Indices) -> Doubles:
-        """Return Ψ − Σ w_i Φ_i of some pixels, (p, 3)."""
-        return self.image[pixels].astype(np.float64) - self.predicted[pixels]
-
-    def noise(self, pixels: slice | Indices) -> Doubles:
-        """Return the half difference of the prediction at some pixels, (p, 3)."""
-        half = self.half[pixels].astype(np.float64)
-        if self.present is None or self.share is None:
-            return half
-        return half - self.share[pixels] * self.present[pixels]
 
 
 def gradient_bias(solution: Solution, noise: Noise) -> tuple[Doubles, Doubles]:

@@ -18,11 +18,11 @@ from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.noise.directions import free_directions
 from lightpaint.lighting.analysis.noise.noise import (
-    Residuals,
     gradient_bias,
     noise_sums,
     pseudo_inverse,
 )
+from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Refinement
 from lightpaint.lighting.solution import Solution
