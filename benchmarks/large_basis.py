@@ -4,15 +4,15 @@
 
 A basis of made-up lights is written plane by plane, none of which is kept, and a picture that other
 emissions of them make as a painting. Then `lightpaint solve` answers it from the file, report and
-all, in a process of its own, whose largest resident memory and time are printed. `--keep` leaves
-the files in the folder, where the next call finds the basis.
+all, in a process of its own, whose largest resident memory and time are printed, with how often it
+walked over all planes. A folder that is given keeps the files, where the next call finds the basis.
 """
 
 import argparse
+import ast
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -113,25 +113,38 @@ def write_files(folder: Path, count: int, size: tuple[int, int], noise: float) -
     (folder / "painting.png").write_bytes(png_bytes((255 * encoded + 0.5).astype(np.uint8), {}))
 
 
-def measured(command: list[str]) -> Iterator[str]:
+def measured(command: list[str], lights: int) -> Iterator[str]:
     """Run a command, and yield what it took."""
-    before = time.perf_counter()
     code = f"""
-import resource, runpy, sys
+import collections, resource, runpy, sys, time
+from lightpaint.images.formats.exr_rows import RowFile
 sys.argv = {command!r}
+rows, spent_s, plain = collections.Counter(), collections.Counter(), RowFile.read_rows
+def read_rows(self, part, top, bottom, names, into):
+    began_s = time.thread_time()
+    plain(self, part, top, bottom, names, into)
+    kind = "noise" if names[0].startswith("half") else "images"
+    rows[kind] += (bottom - top) / part.size[0]
+    spent_s[kind] += time.thread_time() - began_s
+RowFile.read_rows = read_rows
 try:
     runpy.run_path(sys.argv[0], run_name="__main__")
 finally:
-    print("peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    cpu_s = used.ru_utime + used.ru_stime
+    told = [(kind, rows[kind], spent_s[kind]) for kind in rows]
+    print("measured", repr((used.ru_maxrss, cpu_s, told)), file=sys.stderr)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    took_s = time.perf_counter() - before
     if done.returncode:
         raise SystemExit(done.stderr)
+    peak, cpu_s, told = ast.literal_eval(done.stderr.rsplit("measured", 1)[1].strip())
     # Linux counts in units of 1024 bytes, macOS in bytes.
     unit = 1 if sys.platform == "darwin" else 1024
-    peak = int(done.stderr.rsplit("peak", 1)[1]) * unit
-    yield f"{peak / GB:.2f} GB at most, {took_s:.0f} s"
+    yield f"{peak * unit / GB:.2f} GB at most, {cpu_s:.0f} s of the processor"
+    for kind, planes, spent_s in told:
+        walks = planes / lights
+        yield f"{walks:.1f} walks over all {kind}, {spent_s / walks:.1f} s of reading each"
 
 
 def main() -> None:
@@ -159,13 +172,13 @@ def run(folder: Path, options: argparse.Namespace, more: list[str]) -> None:
     print(f"{options.lights} lights, {options.size}, noise {options.noise}", flush=True)
     basis = folder / "made.basis.exr"
     if not basis.exists():
-        for told in measured(own):
+        for told in measured(own, options.lights):
             size = basis.stat().st_size / GB
             print(f"    written: {told}, a file of {size:.2f} GB", flush=True)
     lightpaint = str(Path(sys.executable).parent / "lightpaint")
     results = ["-o", str(folder / "results"), "--force"]
     solve = [lightpaint, "solve", str(basis), str(folder / "painting.png"), *results, *more]
-    for told in measured(solve):
+    for told in measured(solve, options.lights):
         print(f"    solved, predicted and reported: {told}", flush=True)
     print(f"    results: {', '.join(sorted(x.name for x in (folder / 'results').iterdir()))}")
 

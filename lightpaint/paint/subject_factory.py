@@ -30,6 +30,9 @@ from lightpaint.pipeline.sources import (
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 
+#: Bytes of half floats that a page can hold: of all planes of a view.
+MAX_PAGE_BYTES = 2**31
+
 #: What can be painted: files, which are read when they are needed, and what has been read.
 Paintable = SceneFile | BasisFile | GroupsFile | Scene | Basis | LightGroups
 
@@ -80,6 +83,7 @@ def make_subject(
         check_nothing_unused(settings, source)
         found = content(source)
         basis = found.basis if isinstance(found, LightGroups) else found
+        _check_size(basis, _name_of(source))
         _check_constraints(basis.lights, constraints)
         groups = found if isinstance(found, LightGroups) else None
         about = {"basis": basis, "groups": groups}
@@ -116,6 +120,17 @@ def _scene_on_film(
         _check_constraints(scene.record.lights, constraints)
     scene.checks.append(check)
     return scene
+
+
+def _check_size(basis: Basis, name: str) -> None:
+    """Raise PaintError for a basis whose planes are more than a page can hold."""
+    count, (height, width) = len(basis.lights), basis.size
+    if (held := 6 * count * height * width) > MAX_PAGE_BYTES:
+        raise PaintError(
+            f"{name} has {count} lights of {width}x{height}, for which a page would need "
+            f"{held / 1e9:.1f} GB: paint on a smaller film (lightpaint paint SCENE --resolution "
+            "1/4), export the painting, and solve it with this basis (lightpaint solve --resize)"
+        )
 
 
 def _check_constraints(lights: Lights, constraints: Constraints) -> None:

@@ -32,6 +32,8 @@ class Encoder(ViewTransform):
         """Return the display values of `ViewTransform.encode`, read-only."""
         if image.size >= 3 * LARGE_PICTURE:  # which would be kept as long as the report is made
             return np.asarray(by_bands(super().encode, image))
+        if isinstance(image.base, np.ndarray) and image.base.size > image.size:
+            return super().encode(image)  # a band of a large picture
         if id(image) not in self.encoded:
             shown = super().encode(image)
             shown.flags.writeable = False

@@ -18,6 +18,7 @@ from lightpaint.basis.render.render import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
+from lightpaint.paint import subject_factory
 from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.session_file import session_identity
 from lightpaint.paint.store.steps import Identity
@@ -140,3 +141,14 @@ def test_a_session_of_other_lights_is_refused_when_the_scene_tells(
     assert done.returncode == 2
     assert "session.db is a session of" in done.stderr
     assert "(--new)" in done.stderr
+
+
+def test_a_basis_that_no_page_can_hold_says_what_to_do(
+    path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    basis = make_basis(3, (12, 10))
+    monkeypatch.setattr(subject_factory, "MAX_PAGE_BYTES", 6 * 3 * 120)
+    assert make_subject(basis, path.parent / "s").basis is basis
+    monkeypatch.setattr(subject_factory, "MAX_PAGE_BYTES", 6 * 3 * 120 - 1)
+    with pytest.raises(PaintError, match=r"3 lights of 10x12.*--resolution 1/4.*--resize"):
+        make_subject(basis, path.parent / "s")

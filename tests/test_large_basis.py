@@ -1,0 +1,107 @@
+"""A basis that stays in its file: results as from memory, in the memory of a few pictures."""
+
+import json
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import lightpaint as lp
+from lightpaint.basis import clean, file, file_planes
+from lightpaint.images import bands, denoiser
+from lightpaint.images.formats.png import png_bytes
+from lightpaint.lighting.loss import loss
+from lightpaint.report import clean_pictures
+
+#: Bytes of memory for each pixel that a solve and its report may take, beside the planes: as many
+#: as 4 GB are at 3840 x 2160.
+BYTES_A_PIXEL = 480
+
+
+def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
+    """Let planes stay in their file, and pictures of so many pixels be large."""
+    patch.setattr(file, "IN_MEMORY", 0)
+    patch.setattr(file_planes, "STRIPS", large)
+    patch.setattr(file_planes, "PICKED", large)
+    patch.setattr(bands, "BAND_PIXELS", large // 8)
+    patch.setattr(loss, "MAX_KEPT_PIXELS", large)
+    patch.setattr(loss, "STRIP_PIXELS", min(loss.STRIP_PIXELS, large // 4))
+    for module in (bands, denoiser, clean_pictures):
+        patch.setattr(module, "LARGE_PICTURE", large)
+
+
+def written(folder: Path, make_basis: Any, size: tuple[int, int], n: int = 3) -> dict[str, Path]:
+    """Write pools of light with their noise, and a painting of other strengths of them."""
+    rng, (height, width) = np.random.default_rng(1), size
+    y, x = np.mgrid[:height, :width] / np.reshape(size, (2, 1, 1))
+    far = [np.square(x - a) + np.square(y - b) for a, b in rng.uniform(0.2, 0.8, (n, 2))]
+    pools = (np.exp(-20 * np.stack(far)) + 0.01)[..., None] * rng.uniform(0.3, 1, (n, 1, 1, 3))
+    noise = 0.02 * pools * rng.standard_normal(pools.shape)
+    basis = make_basis(images=pools + noise, half_differences=noise)
+    lp.write_basis(folder / "it.basis.exr", basis)
+    painted = np.einsum("nhwc,nc->hwc", pools, rng.uniform(0.1, 0.9, (n, 3)))
+    painted[: height // 3, :, 2] *= 0.7
+    codes = 255 * lp.ViewTransform("srgb").encode(np.clip(painted, 0, 1)) + 0.5
+    (folder / "painting.png").write_bytes(png_bytes(codes.astype(np.uint8), {}))
+    return {"painting": folder / "painting.png", "basis": folder / "it.basis.exr"}
+
+
+def test_results_are_those_of_planes_in_memory(
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = written(tmp_path, make_basis, (67, 90))
+    monkeypatch.chdir(tmp_path)
+    lp.paint_with_light(None, files["painting"], "memory", basis=files["basis"])
+    stay_in_the_file(monkeypatch, 2**9)
+    look = lp.paint_with_light(None, files["painting"], "file", basis=files["basis"])
+    assert isinstance(look.basis.planes, file_planes.FilePlanes)
+
+    def numbers(folder: str, name: str) -> list[Any]:
+        found: list[Any] = []
+
+        def walk(value: Any) -> None:
+            if isinstance(value, dict | list):
+                for its in value.values() if isinstance(value, dict) else value:
+                    walk(its)
+            else:
+                found.append(value)
+
+        told = json.loads((tmp_path / folder / name).read_text("utf-8"))
+        for key in ("command", "software", "versions"):
+            told.pop(key, None)
+        walk(told)
+        return found
+
+    for name in ("lighting.json", "report.json"):
+        mine, its = numbers("file", name), numbers("memory", name)
+        assert [x for x in mine if isinstance(x, str)] == [x for x in its if isinstance(x, str)]
+        floats = ([x for x in some if isinstance(x, float)] for some in (mine, its))
+        # Sums of the same numbers by bands: round-off, of which solves make a little more.
+        np.testing.assert_allclose(*floats, rtol=1e-9, atol=1e-11)
+    ends = [(tmp_path / folder / "predicted.exr").read_bytes() for folder in ("file", "memory")]
+    assert ends[0] == ends[1]
+    sheets = [
+        np.asarray(Image.open(tmp_path / folder / "comparison.png")).astype(int)
+        for folder in ("file", "memory")
+    ]
+    assert np.abs(sheets[0] - sheets[1]).max() <= 1
+
+
+def test_memory_of_a_large_film_is_that_of_a_few_pictures(
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = 360, 640
+    files = written(tmp_path, make_basis, size)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(clean, "MOST_WANTED", 0)
+    stay_in_the_file(monkeypatch, 2**15)
+    tracemalloc.start()
+    try:
+        lp.paint_with_light(None, files["painting"], "results", basis=files["basis"])
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < BYTES_A_PIXEL * size[0] * size[1]
