@@ -65,7 +65,7 @@ def measure(scene: Scene, pairs: list[tuple[int, ...]], spp: int, repeats: int) 
                 continue
             lessons[pair].append(taught_s - begun_s)
             seconds[pair].append((done_s - taught_s) / spp)
-            variances[pair].append(np.square(difference, dtype=np.float64).mean(axis=(1, 2)))
+            variances[pair].append(np.square(difference, dtype=np.float64).mean(axis=(1, 2, 3)))
     print(f"{'asked':>8s} {'lesson s':>9s} {'s per spp':>10s} {'variance':>9s} {'times time':>11s}")
     first = pairs[0]
     for pair in pairs:

@@ -120,11 +120,11 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
         return planes
     tracer = Tracer(scene, seed)
     tracer.end_lesson()
-    height, width = scene.size
-    traced = tracer.planes(range(height))
-    tracer.add(traced, 0, range(height), 0, spp)
+    rows = range(scene.size[0])
+    traced = tracer.planes(rows)
+    tracer.add(traced, 0, rows, 0, spp)
     tracer.close()
-    return traced.sums().reshape(-1, height, width, 3) / spp
+    return traced.sums() / spp
 
 
 def render_in_parts(scene: Scene, *, spp: int, seed: int = 0, start: Basis | None = None) -> Basis:

@@ -5,6 +5,7 @@ Import it once a variant is set and not a scalar one: its arrays do not exist be
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
+from collections.abc import Mapping
 from typing import Any
 
 import drjit as dr
@@ -17,16 +18,20 @@ from lightpaint.arrays import Floats
 class LightPlanes:
     """Sums of the samples of some pixels, undivided, light by light.
 
-    light_of: as `lights_by_instance` returns it. lights: how many there are. pixels: how many, for
-    which `add` takes indices. is_shared: whether several paths may add to one pixel at a time,
-    whose order then decides the last bits; else each pixel has one path, which adds in order.
+    light_of: as `lights_by_instance` returns it. lights: how many there are. size: rows and columns
+    of the pixels, which `add` counts row by row. is_shared: whether several paths may add to one
+    pixel at a time, whose order then decides the last bits; else each pixel has one path, which
+    adds in order.
 
     An object, and not arrays of the loop that traces: Dr.Jit refuses such an array once it finds
     that nothing can ever be added to it, as to `seen` where all lights are points.
     """
 
-    def __init__(self, light_of: Any, lights: int, pixels: int, *, is_shared: bool = False) -> None:
-        self.lights, self.pixels = lights, pixels
+    def __init__(
+        self, light_of: Any, lights: int, size: tuple[int, int], *, is_shared: bool = False
+    ) -> None:
+        self.lights, self.size = lights, size
+        pixels = size[0] * size[1]
         self._light_of = light_of
         self._keeps = dr.opaque(mi.Bool, True)
         self._mode = dr.ReduceMode.Auto if is_shared else dr.ReduceMode.NoConflicts
@@ -37,7 +42,7 @@ class LightPlanes:
     @classmethod
     def nowhere(cls, light_of: Any) -> "LightPlanes":
         """Return planes that keep nothing: for paths of which only what they learn counts."""
-        nothing = cls(light_of, 1, 1)
+        nothing = cls(light_of, 1, (1, 1))
         nothing._keeps = dr.opaque(mi.Bool, False)
         return nothing
 
@@ -68,9 +73,22 @@ class LightPlanes:
         dr.sync_thread()
 
     def sums(self) -> Floats:
-        """Return a copy of the sums, (lights, pixels, 3)."""
-        return np.array(self._sums).reshape(self.lights, self.pixels, 3)
+        """Return a copy of the sums, (lights, rows, columns, 3)."""
+        return np.array(self._sums).reshape(self.lights, *self.size, 3)
 
     def seen(self) -> Floats:
-        """Return how many camera rays of each pixel saw an emitter, (pixels,)."""
-        return np.array(self._seen)
+        """Return how many camera rays of each pixel saw an emitter, (rows, columns)."""
+        return np.array(self._seen).reshape(self.size)
+
+
+def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
+    """Return a UInt32 array from the Dr.Jit instance id of an emitter to its light's plane.
+
+    plane_of: index of the plane by the emitter's name. What belongs to no light is black, and does
+    no harm in the first plane.
+    """
+    instances = np.array(dr.reinterpret_array(mi.UInt32, scene.emitters_dr())).tolist()
+    table = np.zeros(max(instances) + 1, dtype=np.uint32)
+    for instance, emitter in zip(instances, scene.emitters(), strict=True):
+        table[instance] = plane_of.get(emitter.id(), 0)
+    return mi.UInt32(table)

@@ -15,17 +15,15 @@ Import it once a variant is set and not a scalar one: its arrays do not exist be
 
 # mypy: disable-error-code="no-untyped-call"
 
-from collections.abc import Mapping
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.render.guide import Guide
 from lightpaint.basis.render.integrators import depth_limit, needs_a_bounce
-from lightpaint.basis.render.light_planes import LightPlanes
+from lightpaint.basis.render.light_planes import LightPlanes, lights_by_instance
 from lightpaint.basis.render.paths import Rules, View, trace_paths, trace_samples
 from lightpaint.basis.render.sobol import SobolPairs
 from lightpaint.scene.runtime.kernel_threads import kernels
@@ -92,7 +90,8 @@ class Tracer:
 
     def planes(self, rows: range) -> LightPlanes:
         """Return planes of some rows, to which nothing is added yet."""
-        return LightPlanes(self.light_of, len(self.scene.lights), len(rows) * self.scene.size[1])
+        size = len(rows), self.scene.size[1]
+        return LightPlanes(self.light_of, len(self.scene.lights), size)
 
     def add(self, planes: LightPlanes, half: int, rows: range, first: int, spp: int) -> None:
         """Add the light of some samples of some rows, of one half, to `planes` of these rows.
@@ -150,19 +149,6 @@ def rules_of(scene: Scene) -> Rules:
     )
 
 
-def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
-    """Return a UInt32 array from the Dr.Jit instance id of an emitter to its light's plane.
-
-    plane_of: index of the plane by the emitter's name. What belongs to no light is black, and does
-    no harm in the first plane.
-    """
-    instances = np.array(dr.reinterpret_array(mi.UInt32, scene.emitters_dr())).tolist()
-    table = np.zeros(max(instances) + 1, dtype=np.uint32)
-    for instance, emitter in zip(instances, scene.emitters(), strict=True):
-        table[instance] = plane_of.get(emitter.id(), 0)
-    return mi.UInt32(table)
-
-
 def trace_plainly(scene: Scene, loaded: Any, *, seed: int, spp: int) -> Floats:
     """Render all planes with Mitsuba's own numbers and choices, (n, h, w, 3).
 
@@ -177,8 +163,9 @@ def trace_plainly(scene: Scene, loaded: Any, *, seed: int, spp: int) -> Floats:
     sampler.seed(seed, pixels * spp)
     pixel = dr.arange(mi.UInt32, pixels * spp) // dr.opaque(mi.UInt32, spp)
     light_of = lights_by_instance(loaded, scene.plane_of)
-    planes = LightPlanes(light_of, len(scene.lights), pixels, is_shared=True)
+    size = view.height, view.width
+    planes = LightPlanes(light_of, len(scene.lights), size, is_shared=True)
     rules = rules_of(scene)
     trace_paths(view, sampler, None, None, planes, rules, pixel, pixel, mi.UInt32(0))
     planes.evaluate()
-    return planes.sums().reshape(len(scene.lights), view.height, view.width, 3) / spp
+    return planes.sums() / spp

@@ -135,8 +135,7 @@ class PartRenderer:
                     its = min(step, part.spp - done)
                     self._tracer.add(planes, half, rows, part.first + done, its)
                     let_others_through()
-        sums = np.stack([planes.sums().reshape(-1, *size, 3) for planes in halves])
-        return sums, np.stack([planes.seen().reshape(size) for planes in halves])
+        return np.stack([x.sums() for x in halves]), np.stack([x.seen() for x in halves])
 
     def _of_light(self, part: Part, light: int) -> tuple[Floats, Floats]:
         if self._light != light:
@@ -178,7 +177,7 @@ class PartSums:
             return
         self._half = 0 if start is None else start.origin.halves[0]
         self._half += parts[0].spp if parts else 0
-        self._halves = np.zeros((2, len(scene.lights), *scene.size, 3), np.float32)
+        self._halves: Floats | None = None  # of as many planes and channels as parts have
         self._seen = np.zeros(scene.size, np.float32)
 
     def add(self, part: Part, planes: Floats, seen: Floats) -> None:
@@ -187,6 +186,9 @@ class PartSums:
         if self._lights is not None:
             self._lights.add(part, planes[0, 0])
             return
+        if self._halves is None:
+            halves, lights, _, _, channels = planes.shape
+            self._halves = np.zeros((halves, lights, *self._scene.size, channels), np.float32)
         self._halves[:, :, part.top : part.bottom] = planes
         self._seen[part.top : part.bottom] = seen.sum(axis=0)
 
@@ -199,6 +201,9 @@ class PartSums:
         scene, start = self._scene, self._start
         if self._lights is not None:
             made = self._lights.basis(self._seed)
+        elif self._halves is None:  # a start with all samples, to which no part was added
+            assert start is not None
+            made = start
         else:
             halves, seen = list(self._halves), self._seen > 0
             made = basis_of_sums(scene, self._seed, halves, seen, self._half, learned, start=start)

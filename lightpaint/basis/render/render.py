@@ -284,10 +284,10 @@ def _render_together(
     halves = [tracer.planes(rows) for _ in range(2)]
 
     def basis(*, is_last: bool = False, is_finished: bool = False) -> Basis:
-        seen = np.add(*(planes.seen() for planes in halves)).reshape(height, width) > 0
+        seen = np.add(*(planes.seen() for planes in halves)) > 0
         sums = []
         for half, planes in enumerate(halves):
-            sums.append(planes.sums().reshape(-1, height, width, 3))
+            sums.append(planes.sums())
             if is_last:  # saves as much memory again
                 halves[half] = tracer.planes(range(0))
         return basis_of_sums(
