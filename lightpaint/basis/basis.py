@@ -71,6 +71,17 @@ class Origin:
         return self.method.startswith(LIGHT_GROUPS)
 
 
+@dataclass(frozen=True)
+class IndirectLight:
+    """The part of the images that more than one surface has scattered.
+
+    planes, noise: as those of a `Basis`, of that part alone.
+    """
+
+    planes: Planes
+    noise: Planes
+
+
 @keywords()
 @dataclass(frozen=True)
 class Basis(Shown):
@@ -91,6 +102,8 @@ class Basis(Shown):
             emitter matters where, or None. Going on needs it, nobody else.
         features: Albedo and normals of what is seen, to denoise pictures by, or None.
         objects: Whose surfaces are seen, or None.
+        indirect: The indirect part of `planes` and `noise`, to denoise pictures by; None where it
+            was not kept apart.
         source: Path of the file that it was read from, or of the scene that it was rendered of, for
             people; of memory only.
         render_s: Seconds that all of it took to render in this process; None where that is not
@@ -111,6 +124,7 @@ class Basis(Shown):
     learned: Floats | None = None
     features: Features | None = None
     objects: Objects | None = None
+    indirect: IndirectLight | None = None
     source: str = field(default="", compare=False)
     render_s: float | None = field(default=None, compare=False)
 
@@ -131,6 +145,10 @@ class Basis(Shown):
             raise BasisError("albedo and normals have another size than the images")
         if self.objects is not None and self.objects.size != self.size:
             raise BasisError("the picture of objects has another size than the images")
+        if self.indirect is not None:
+            parts = self.indirect.planes, self.indirect.noise
+            if any((part.count, part.size) != (n, self.size) for part in parts):
+                raise BasisError("indirect light and images differ in shape")
         if len(self.origin.each_light) not in (0, n):
             raise BasisError(f"samples of {len(self.origin.each_light)} lights for {n} lights")
 

@@ -21,14 +21,15 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache_folder import CLEAN, is_own
+from lightpaint.basis.clean_mix import clean_plane
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
-from lightpaint.images.denoiser import denoised, denoiser_text, oidn_is_installed
+from lightpaint.images.denoiser import denoiser_text, oidn_is_installed
 from lightpaint.images.resampling import resampled
 from lightpaint.threads import parallel_map
 
-FORMAT, PARTS = "lightpaint-clean 1", ("halves", "scales", "present")
+FORMAT, PARTS = "lightpaint-clean 2", ("halves", "scales", "present")
 
 #: Pixels of all planes below which a sum is denoised as soon as planes are read, up to which they
 #: are made where they are wanted, and up to which a render is followed by them.
@@ -141,7 +142,7 @@ def clean_planes(
     if found is None and pixels <= most:
         halves, scales = np.empty(_shape(basis), np.float16), np.ones(len(basis.lights))
         for k in range(len(basis.lights)):
-            halves[k], scales[k] = clean_plane(basis, k)
+            halves[k], scales[k] = clean_halves(basis, k)
             if progress is not None:
                 progress(k + 1, len(basis.lights))
         found = CleanPlanes.of(basis, halves, scales)
@@ -149,11 +150,10 @@ def clean_planes(
     return found
 
 
-def clean_plane(basis: Basis, k: int) -> tuple[Halves, float]:
-    """Return the denoised plane of light k, as in `CleanPlanes`."""
-    plane = basis.planes.plane(k)
-    scale = scale_of(plane)
-    return as_halves(denoised(plane, basis.features), scale), scale
+def clean_halves(basis: Basis, k: int) -> tuple[Halves, float]:
+    """Return the denoised plane of light k as `CleanPlanes` holds it, and its scale."""
+    scale = scale_of(basis.planes.plane(k))
+    return as_halves(clean_plane(basis, k), scale), scale
 
 
 def kept_planes(basis: Basis) -> CleanPlanes | None:
@@ -208,7 +208,12 @@ def _made_of(basis: Basis) -> str:
         others += [basis.features.albedo, basis.features.normal]
 
     def digest(which: int | Floats) -> bytes:
-        plane = basis.planes.plane(which) if isinstance(which, int) else which
+        if not isinstance(which, int):
+            return hashlib.blake2b(np.ascontiguousarray(which).data).digest()
+        plane = basis.planes.plane(which)
+        if basis.indirect is not None:
+            # Both parts, so that it counts whether they are known.
+            plane = np.stack([plane, basis.indirect.planes.plane(which)])
         return hashlib.blake2b(np.ascontiguousarray(plane).data).digest()
 
     made = repr((FORMAT, denoiser_text(basis.features, raw=""), _shape(basis)))

@@ -11,25 +11,26 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.basis import Basis, IndirectLight, Origin
 from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.basis.file_parts import (
-    IMAGE,
+    INDIRECT_NAMES,
     LIGHT_KEY,
     NAMES,
-    NOISE,
+    PLANES,
     checked_text,
+    encodings_of_planes,
     features_of,
     learned_of,
     light_channels,
     light_texts,
     objects_of,
     other_parts,
+    planes_of,
     scales_of,
     stacked,
 )
 from lightpaint.basis.file_planes import FilePlanes
-from lightpaint.basis.half_floats import encodings_of
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
@@ -77,10 +78,10 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     # Light by light, twice: headers come before pixels, and say how these are stored.
     heads, stored, sums = [], [], {}
     for k, light in enumerate(basis.lights):
-        image, half = basis.planes.plane(k), basis.noise.plane(k)
-        stored.append(encodings_of(image, half))
+        planes = planes_of(basis, k)
+        stored.append(encodings_of_planes(planes))
         texts = light_texts(light, stored[-1])
-        channels = light_channels(image, half, stored[-1])
+        channels = light_channels(planes, stored[-1])
         heads.append(PartHead.of(light.name, channels, texts))
         sums[light.name] = checksum(checked_text(texts), channels)
     others = list(other_parts(basis))
@@ -97,7 +98,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
 
     def pixels() -> Iterator[Channels]:
         for k, encodings in enumerate(stored):
-            yield light_channels(basis.planes.plane(k), basis.noise.plane(k), encodings)
+            yield light_channels(planes_of(basis, k), encodings)
         yield from (part.channels for part in others)
 
     write_streamed(Path(path), heads, pixels())
@@ -109,10 +110,10 @@ def as_stored(basis: Basis) -> Basis:
     So that who solves what was just rendered finds what who reads it from its file finds. It is
     rounded in the memory of the planes that are given, which must be in memory.
     """
-    for image, half in zip(basis.planes, basis.noise, strict=True):
-        its = encodings_of(image, half)
-        image[...] = its[0].rounded(image)
-        half[...] = its[1].rounded(half)
+    for k in range(len(basis.lights)):
+        planes = planes_of(basis, k)
+        for plane, encoding in zip(planes, encodings_of_planes(planes), strict=True):
+            plane[...] = encoding.rounded(plane)
     return replace(basis)  # which knows nothing of what was computed before
 
 
@@ -185,15 +186,14 @@ def _of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
     scales = [scales_of(p.attributes) for p in lit]
 
-    def planes(order: Sequence[int]) -> tuple[Planes, Planes]:
-        its = [(lit[k], *scales[k]) for k in order]
-        return (
-            as_planes(stacked([(part, scale) for part, scale, _ in its], IMAGE)),
-            as_planes(stacked([(part, scale) for part, _, scale in its], NOISE)),
-        )
+    def planes(order: Sequence[int], number: int) -> Planes:
+        its = [(lit[k], scales[k][number]) for k in order]
+        return as_planes(stacked(its, PLANES[number]))
 
     stored = [partial(getattr, part, "channels") for part in lit]
-    return _assembled([p.attributes for p in lit], stored, others, head, planes)
+    has_indirect = all(p.channels.keys() >= INDIRECT_NAMES for p in lit)
+    texts = [p.attributes for p in lit]
+    return _assembled(texts, stored, others, head, planes, has_indirect=has_indirect)
 
 
 def _of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
@@ -209,14 +209,15 @@ def _of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
     def part(layout: PartLayout) -> ExrPart:
         return ExrPart("", file.channels(layout), layout.texts, layout.display)
 
-    def planes(order: Sequence[int]) -> tuple[Planes, Planes]:
-        its = [lit[k] for k in order]
-        images, noise = zip(*(scales[k] for k in order), strict=True)
-        return FilePlanes(file, its, IMAGE, images), FilePlanes(file, its, NOISE, noise)
+    def planes(order: Sequence[int], number: int) -> Planes:
+        its = [scales[k][number] for k in order]
+        return FilePlanes(file, [lit[k] for k in order], PLANES[number], its)
 
     stored = [partial(file.channels, p) for p in lit]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
-    return _assembled([p.texts for p in lit], stored, others, head, planes)
+    has_indirect = all({*p.channels} >= INDIRECT_NAMES for p in lit)
+    texts = [p.texts for p in lit]
+    return _assembled(texts, stored, others, head, planes, has_indirect=has_indirect)
 
 
 def _assembled(
@@ -224,12 +225,15 @@ def _assembled(
     stored: Sequence[Callable[[], Channels]],
     others: Sequence[ExrPart],
     head: Mapping[str, str],
-    planes: Callable[[Sequence[int]], tuple[Planes, Planes]],
+    planes: Callable[[Sequence[int], int], Planes],
+    *,
+    has_indirect: bool,
 ) -> Basis:
     """Return the basis of a file, checked.
 
     texts, stored: of the part of each light its attributes, and what reads its channels. planes:
-    makes images and noise of the parts in an order.
+    makes planes of the parts in an order, those of a number among `PLANES`. has_indirect: whether
+    the parts have planes of indirect light.
     """
     seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
     if not texts or not seen:
@@ -247,7 +251,7 @@ def _assembled(
         order = checksums.in_order([light.name for light in lights])
         check(checksums.origin, "origin", head[ORIGIN_KEY], {})
     try:
-        images, noise = planes(order)
+        images, noise = planes(order, 0), planes(order, 1)
         basis = Basis(
             lights=Lights(tuple(lights[k] for k in order)),
             planes=images,
@@ -257,12 +261,14 @@ def _assembled(
             learned=learned_of(others, checksums),
             features=features_of(others, images.size),
             objects=objects_of(others, images.size),
+            indirect=IndirectLight(planes(order, 2), planes(order, 3)) if has_indirect else None,
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
     for light, its, read in zip(lights, texts, stored, strict=True):
         channels = read()  # one light at a time: they may be larger than memory
-        if not all(np.isfinite(channels[name]).all() for name in NAMES):
+        names = NAMES | INDIRECT_NAMES if has_indirect else NAMES
+        if not all(np.isfinite(channels[name]).all() for name in names):
             raise BasisError("holds values that are not finite: make it again")
         if checksums is not None:
             check(

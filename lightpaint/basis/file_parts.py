@@ -9,7 +9,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, free_name
 from lightpaint.basis.checksums import Checksums, checksum
-from lightpaint.basis.half_floats import PlaneEncoding
+from lightpaint.basis.half_floats import PlaneEncoding, encodings_of
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import BasisError
 from lightpaint.files import one_line
@@ -30,13 +30,33 @@ LIGHT_KEY, SCALE_KEY = "lightpaint.light", "lightpaint.scale"
 IMAGE, NOISE = (*"RGB",), (*(f"{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
 NAMES = {*IMAGE, *NOISE}
 
+#: Channels of the indirect part of both, where it was kept apart.
+INDIRECT = (*(f"indirect.{c}" for c in "RGB"),)
+INDIRECT_NOISE = (*(f"indirect_{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
+INDIRECT_NAMES = {*INDIRECT, *INDIRECT_NOISE}
+
+#: All planes that a light may have, by their channels.
+PLANES = (IMAGE, NOISE, INDIRECT, INDIRECT_NOISE)
+
 #: What a plane may be multiplied by.
 LEAST_SCALE, LARGEST_SCALE = 2.0**-126, 2.0**126
 
 
-def light_texts(
-    light: BasisLight, encodings: tuple[PlaneEncoding, PlaneEncoding]
-) -> dict[str, str]:
+def planes_of(basis: Basis, k: int) -> list[Floats]:
+    """Return the planes of light k that are stored, (h, w, 3) each, in the order of `PLANES`."""
+    sets = [basis.planes, basis.noise]
+    if basis.indirect is not None:
+        sets += [basis.indirect.planes, basis.indirect.noise]
+    return [planes.plane(k) for planes in sets]
+
+
+def encodings_of_planes(planes: Sequence[Floats]) -> list[PlaneEncoding]:
+    """Return how each of `planes_of` is best stored."""
+    pairs = zip(planes[::2], planes[1::2], strict=True)
+    return [encoding for pair in pairs for encoding in encodings_of(*pair)]
+
+
+def light_texts(light: BasisLight, encodings: Sequence[PlaneEncoding]) -> dict[str, str]:
     """Return the attributes of the part of a light."""
     data = fields_of(light, "is_fixed", "unit_flux", "identity")
     if light.members == (light.name,):
@@ -47,12 +67,10 @@ def light_texts(
     return texts
 
 
-def light_channels(
-    image: Floats, half: Floats, encodings: tuple[PlaneEncoding, PlaneEncoding]
-) -> Channels:
-    """Return the channels of a light as they are stored."""
+def light_channels(planes: Sequence[Floats], encodings: Sequence[PlaneEncoding]) -> Channels:
+    """Return the channels of a light as they are stored. planes: as `planes_of` returns them."""
     made: dict[str, Any] = {}
-    for plane, encoding, names in zip((image, half), encodings, (IMAGE, NOISE), strict=True):
+    for plane, encoding, names in zip(planes, encodings, PLANES, strict=False):
         stored = encoding.encoded(plane)
         made |= {name: stored[..., k] for k, name in enumerate(names)}
     return made
@@ -63,17 +81,19 @@ def checked_text(texts: Mapping[str, str]) -> str:
     return texts[LIGHT_KEY] + texts.get(SCALE_KEY, "")
 
 
-def scales_of(texts: Mapping[str, str]) -> tuple[float, float]:
-    """Return what the stored image and noise of a light are to be multiplied by.
+def scales_of(texts: Mapping[str, str]) -> tuple[float, ...]:
+    """Return what the stored planes of a light are to be multiplied by, in the order of `PLANES`.
 
-    Raises BasisError for anything else than two numbers above 0.
+    Raises BasisError for anything else than two or four numbers above 0.
     """
-    scales = strict_json(texts.get(SCALE_KEY, "[1, 1]"))
-    if isinstance(scales, list) and [type(x) in (int, float) for x in scales] == [True, True]:
-        image, noise = scales
-        if all(LEAST_SCALE <= x <= LARGEST_SCALE for x in scales):
-            return float(image), float(noise)
+    scales = strict_json(texts.get(SCALE_KEY, "[1, 1, 1, 1]"))
+    if isinstance(scales, list) and len(scales) in (2, 4) and all(map(_is_scale, scales)):
+        return (*map(float, scales), 1.0, 1.0)[:4]
     raise BasisError(f"is damaged as a basis: {SCALE_KEY} is {one_line(repr(scales))}")
+
+
+def _is_scale(scale: object) -> bool:
+    return type(scale) in (int, float) and LEAST_SCALE <= scale <= LARGEST_SCALE  # type: ignore[operator]
 
 
 def stacked(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Floats:

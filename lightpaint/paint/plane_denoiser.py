@@ -7,8 +7,8 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes, clean_plane, keep_planes, kept_planes
-from lightpaint.images.denoiser import denoised
+from lightpaint.basis.clean import CleanPlanes, clean_halves, keep_planes, kept_planes
+from lightpaint.basis.clean_mix import clean_present
 from lightpaint.paint.session.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.store.steps import name_in_view
@@ -55,7 +55,7 @@ class PlaneDenoiser:
         for k, basis in enumerate(bases):
             cached = kept_planes(basis) if self._use_cache else None
             if cached is None:
-                presents.append(denoised(basis.present_look, basis.features))
+                presents.append(clean_present(basis))
             else:
                 self._by_view[k] = _ViewPlanes(basis, cached, is_cached=True)
                 presents.append(cached.present)
@@ -85,7 +85,7 @@ class PlaneDenoiser:
         for k in range(len(basis.lights)):
             if not self._is_needed() or view.basis is not basis:
                 return
-            planes.halves[k], planes.scales[k] = clean_plane(basis, k)
+            planes.halves[k], planes.scales[k] = clean_halves(basis, k)
             self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
         self._by_view[view.view] = _ViewPlanes(basis, planes)
 

@@ -1,11 +1,13 @@
 """Templates: what is rendered, or summed up of a basis, to be painted on."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from lightpaint.arrays import Floats
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, meter_exposure
+from lightpaint.basis.clean_mix import clean_plane, clean_present
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.basis.render.render import is_of, render_basis
 from lightpaint.basis.render.separate import emitters_seen
@@ -63,8 +65,7 @@ def render_template(
     listen = listener(progress)
     settings = Settings(spp=spp, time_s=time_s, seed=seed, use_cache=use_cache)
     basis = _basis_of(scene, settings, listen)
-    look, features = _look(scene, basis, settings, listen)
-    clean = denoised(look, features, quality="high")
+    look, clean, features = _look(scene, basis, settings, listen)
     surfaces = render_surfaces(scene, seed=seed, progress=progress)
     template = Template(
         look,
@@ -140,7 +141,7 @@ def _look_of_basis(basis: Basis) -> tuple[Floats, Floats | None, Features | None
     look = basis.present_look
     if not basis.knows_noise:
         return look, None, None
-    return look, denoised(look, basis.features, quality="high"), basis.features
+    return look, clean_present(basis, quality="high"), basis.features
 
 
 def render_look(
@@ -158,8 +159,7 @@ def render_look(
     listen = listener(progress)
     settings = Settings(spp=spp, time_s=time_s, seed=seed, use_cache=use_cache)
     basis = _basis_of(scene, settings, listen)
-    look, features = _look(scene, basis, settings, listen)
-    clean = denoised(look, features, quality="high")
+    look, clean, features = _look(scene, basis, settings, listen)
     shown = transform or ViewTransform("srgb", _exposure(scene, basis, clean))
     return write_look(path, look, shown, clean=clean, texts=denoiser_text(features, raw=path.name))
 
@@ -192,11 +192,13 @@ def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | Non
 
 def _look(
     scene: Scene, basis: Basis | None, settings: Settings, listen: Listener
-) -> tuple[Floats, Features]:
-    """Return the present look, (h, w, 3) linear, and features to denoise it."""
+) -> tuple[Floats, Floats, Features]:
+    """Return the present look, (h, w, 3) linear, the same denoised, and the features for that."""
     if basis is not None:
         features = basis.features or render_features(scene, seed=settings.seed)
-        return basis.mix(basis.present_weights), features
+        basis = replace(basis, features=features)
+        clean = clean_present(basis, quality="high")
+        return basis.present_look, clean, features
     image = render(
         scene,
         spp=settings.spp,
@@ -205,7 +207,8 @@ def _look(
         label="template",
         progress=listen,
     ).image
-    return image, render_features(scene, seed=settings.seed)
+    features = render_features(scene, seed=settings.seed)
+    return image, denoised(image, features, quality="high"), features
 
 
 def _exposure(scene: Scene, basis: Basis | None, look: Floats) -> float:
@@ -235,5 +238,7 @@ def _small_planes(basis: Basis, factor: int) -> dict[str, Floats]:
     }
     if not basis.knows_noise:
         return small
+    if factor == 1:
+        return {name: clean_plane(basis, k) for k, name in enumerate(basis.names)}
     features = None if basis.features is None else basis.features.reduced(factor)
     return {name: denoised(image, features) for name, image in small.items()}

@@ -44,13 +44,13 @@ def test_their_sum_is_a_clean_picture_of_any_lighting(make_basis: Any):
 
 def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
     basis, made = make_basis(2, (24, 32)), []
-    real = clean.denoised
+    real = clean.clean_plane
 
     def counted(*given: Any) -> Any:
         made.append(given)
         return real(*given)
 
-    monkeypatch.setattr(clean, "denoised", counted)
+    monkeypatch.setattr(clean, "clean_plane", counted)
     first, again = clean_planes(basis), clean_planes(replace(basis))
     assert len(made) == 2
     assert first is not None

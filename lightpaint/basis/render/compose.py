@@ -13,10 +13,11 @@ import numpy as np
 
 from lightpaint.arrays import Bools
 from lightpaint.basis import cache
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis import Basis, IndirectLight
 from lightpaint.basis.composed_planes import Pick, compose_planes
 from lightpaint.basis.file import is_large
 from lightpaint.basis.lights import Lights
+from lightpaint.basis.planes import Planes
 from lightpaint.basis.render.render import ONE_PASS, basis_lights, method_of, origin_of
 from lightpaint.basis.render.separate import emitters_seen
 from lightpaint.scene.emission import ENVIRONMENTS
@@ -43,6 +44,14 @@ class KeptPlane:
     def noise(self) -> Pick:
         """Half the difference of its halves."""
         return self.basis.noise, self.index
+
+    @property
+    def indirect(self) -> tuple[Pick, Pick] | None:
+        """Image and half difference of its indirect part; None where that is not known."""
+        parts = self.basis.indirect
+        if parts is None:
+            return None
+        return (parts.planes, self.index), (parts.noise, self.index)
 
     @property
     def counts(self) -> Counts:
@@ -166,13 +175,25 @@ def _composed(scene: Scene, seed: int, sources: Sequence[KeptPlane | None], seen
         [(0, 0, 0, 0) if its is None else its.counts for its in sources], is_one_pass=is_one_pass
     )
     origin = origin_of(scene, seed, methods[-1], counts["halves"], counts["passes"])
-    how: dict[str, Any] = {"size": size, "in_memory": not is_large(len(lights), size)}
+    in_memory = not is_large(len(lights), size)
+
+    def compose(picks: Sequence[Pick]) -> Planes:
+        return compose_planes(picks, size, in_memory=in_memory)
+
+    # Known of all lights or of none.
+    parts = [None if its is None else its.indirect for its in sources]
+    is_split = all(
+        (its is None) == (part is None) for its, part in zip(sources, parts, strict=True)
+    )
     return Basis(
         lights,
-        compose_planes([None if its is None else its.plane for its in sources], **how),
-        compose_planes([None if its is None else its.noise for its in sources], **how),
+        compose([None if its is None else its.plane for its in sources]),
+        compose([None if its is None else its.noise for its in sources]),
         seen,
         replace(origin, each_light=counts["each_light"], is_composed=True),
+        indirect=IndirectLight(*(compose([p and p[k] for p in parts]) for k in range(2)))
+        if is_split
+        else None,
         source=str(scene.path),
     )
 

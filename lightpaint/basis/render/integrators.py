@@ -13,6 +13,8 @@ from lightpaint.scene.scene import Scene
 DIRECT = ("direct", "direct_projective")
 #: They see surfaces alone, and whatever is inside of them as nothing.
 ON_SURFACES = ("path", "prb", "prb_projective", *DIRECT)
+#: Bytes of the planes of all lights in float32 up to which indirect light is kept apart.
+SPLIT_MAX_BYTES = 2**29
 #: They hide emitters from the camera otherwise than `path` does.
 HIDING_OTHERWISE = ("volpath", "prb_projective", "direct_projective")
 
@@ -56,6 +58,21 @@ def remark_on_separate_renders(scene: Scene) -> str | None:
 def depth_limit(integrator: Integrator) -> int:
     """Return the longest path in vertices after the camera. Mitsuba's −1 means no limit."""
     return 2 if integrator.plugin in DIRECT else integrator.max_depth % 2**32
+
+
+def has_indirect_planes(scene: Scene) -> bool:
+    """Return whether the one pass keeps indirect light apart from direct light.
+
+    It takes as much memory again, which small pictures have, and they are what people look at.
+    """
+    height, width = scene.size
+    is_small = 12 * len(scene.lights) * height * width <= SPLIT_MAX_BYTES
+    return is_small and depth_limit(scene.integrator) > 2
+
+
+def plane_count(scene: Scene) -> int:
+    """Return how many planes the one pass fills: one for each light, or two."""
+    return len(scene.lights) * (2 if has_indirect_planes(scene) else 1)
 
 
 def needs_a_bounce(scene: Scene) -> bool:

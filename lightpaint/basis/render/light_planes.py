@@ -21,22 +21,29 @@ class LightPlanes:
     light_of: as `lights_by_instance` returns it. lights: how many there are. size: rows and columns
     of the pixels, which `add` counts row by row. is_shared: whether several paths may add to one
     pixel at a time, whose order then decides the last bits; else each pixel has one path, which
-    adds in order.
+    adds in order. is_split: whether direct and indirect light have planes of their own.
 
     An object, and not arrays of the loop that traces: Dr.Jit refuses such an array once it finds
     that nothing can ever be added to it, as to `seen` where all lights are points.
     """
 
     def __init__(
-        self, light_of: Any, lights: int, size: tuple[int, int], *, is_shared: bool = False
+        self,
+        light_of: Any,
+        lights: int,
+        size: tuple[int, int],
+        *,
+        is_shared: bool = False,
+        is_split: bool = False,
     ) -> None:
-        self.lights, self.size = lights, size
+        self.count, self.size = lights * (2 if is_split else 1), size
+        self._first_indirect = lights if is_split else 0
         pixels = size[0] * size[1]
         self._light_of = light_of
         self._keeps = dr.opaque(mi.Bool, True)
         self._mode = dr.ReduceMode.Auto if is_shared else dr.ReduceMode.NoConflicts
         self._pixels = dr.opaque(mi.UInt32, pixels)
-        self._sums = dr.zeros(mi.Float, lights * pixels * 3)
+        self._sums = dr.zeros(mi.Float, self.count * pixels * 3)
         self._seen = dr.zeros(mi.Float, pixels)
 
     @classmethod
@@ -46,15 +53,18 @@ class LightPlanes:
         nothing._keeps = dr.opaque(mi.Bool, False)
         return nothing
 
-    def add(self, pixel, emitter, value, active):
+    def add(self, pixel, emitter, value, is_indirect, active):
         """Add RGB values to the plane of the light that `emitter` belongs to.
 
+        is_indirect: whether more than one surface has scattered them.
         What is no number, as one path in a hundred million carries, is left out: a pixel of it
         would make all sums over the picture none.
         """
         active = active & dr.all(dr.isfinite(value))
         instance = dr.reinterpret_array(mi.UInt32, emitter)
         light = dr.gather(mi.UInt32, self._light_of, instance, active)
+        if self._first_indirect:
+            light[is_indirect] += self._first_indirect
         place = dr.fma(light, self._pixels, pixel) * 3
         for channel in range(3):
             self._add_one(self._sums, value[channel], place + channel, active)
@@ -73,8 +83,11 @@ class LightPlanes:
         dr.sync_thread()
 
     def sums(self) -> Floats:
-        """Return a copy of the sums, (lights, rows, columns, 3)."""
-        return np.array(self._sums).reshape(self.lights, *self.size, 3)
+        """Return a copy of the sums, (lights, rows, columns, 3).
+
+        Split, (2 lights, rows, columns, 3): direct light of each, then indirect light of each.
+        """
+        return np.array(self._sums).reshape(self.count, *self.size, 3)
 
     def seen(self) -> Floats:
         """Return how many camera rays of each pixel saw an emitter, (rows, columns)."""

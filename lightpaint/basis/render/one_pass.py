@@ -22,7 +22,11 @@ import mitsuba as mi
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.render.guide import Guide
-from lightpaint.basis.render.integrators import depth_limit, needs_a_bounce
+from lightpaint.basis.render.integrators import (
+    depth_limit,
+    has_indirect_planes,
+    needs_a_bounce,
+)
 from lightpaint.basis.render.light_planes import LightPlanes, lights_by_instance
 from lightpaint.basis.render.paths import Rules, View, trace_paths, trace_samples
 from lightpaint.basis.render.sobol import SobolPairs
@@ -91,7 +95,8 @@ class Tracer:
     def planes(self, rows: range) -> LightPlanes:
         """Return planes of some rows, to which nothing is added yet."""
         size = len(rows), self.scene.size[1]
-        return LightPlanes(self.light_of, len(self.scene.lights), size)
+        is_split = has_indirect_planes(self.scene)
+        return LightPlanes(self.light_of, len(self.scene.lights), size, is_split=is_split)
 
     def add(self, planes: LightPlanes, half: int, rows: range, first: int, spp: int) -> None:
         """Add the light of some samples of some rows, of one half, to `planes` of these rows.

@@ -19,6 +19,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.budget import SHORTER, half_of
+from lightpaint.basis.render.integrators import plane_count
 from lightpaint.basis.render.render import (
     ONE_PASS,
     basis_lights,
@@ -80,7 +81,7 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
         return []
     # So few rows that they are some seconds of work, for all of the samples.
     by_work = SAMPLES // (2 * width * left)
-    by_memory = BYTES // (2 * len(scene.lights) * width * 12)
+    by_memory = BYTES // (2 * plane_count(scene) * width * 12)
     count = -(-height // max(1, min(by_work, by_memory)))
     edges = [height * k // count for k in range(count + 1)]
     return [Part(top, bottom, done, left) for top, bottom in pairwise(edges)]

@@ -147,7 +147,8 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
             pdf *= rules.questions_at(depth - 1)
         emission = emitter.eval(si, hit & (previous_pdf > 0))
         carried = weight * throughput
-        planes.add(place, emitter, carried * emission * _mis(previous_pdf, pdf), hit)
+        found = carried * emission * _mis(previous_pdf, pdf)
+        planes.add(place, emitter, found, depth > 1, hit)
         planes.note_seen(place, hit & (depth == 0))
 
         # Next-event estimation: emitters are asked for their light.
@@ -160,13 +161,13 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
             wo = si.to_local(ds.d)
             bsdf_value, bsdf_pdf = bsdf.eval_pdf(mi.BSDFContext(), si, wo, lit)
             mis = dr.select(ds.delta, 1, _mis(ds.pdf, bsdf_pdf))
-            planes.add(place, ds.emitter, carried * bsdf_value * radiance * mis, lit)
+            planes.add(place, ds.emitter, carried * bsdf_value * radiance * mis, depth > 0, lit)
         else:
             cell = guide.cell(si)
             number = numbers.at_vertex(term, depth, 0)
             count = rules.questions_at(depth)
             _ask_emitters(
-                scene, guide, planes, place, si, bsdf, carried, cell, number, count, smooth
+                scene, guide, planes, place, si, bsdf, carried, cell, number, count, depth, smooth
             )
 
         # The path goes on in a direction that the surface chooses.
@@ -223,7 +224,9 @@ def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
 
 
 @dr.syntax
-def _ask_emitters(scene, guide, planes, place, si, bsdf, carried, cell, number, count, active):
+def _ask_emitters(
+    scene, guide, planes, place, si, bsdf, carried, cell, number, count, depth, active
+):
     """Ask `count` emitters for their light, and add what is not in shadow to `planes`.
 
     One number, split systematically, chooses all of them: each share of the guide gets as many
@@ -248,7 +251,7 @@ def _ask_emitters(scene, guide, planes, place, si, bsdf, carried, cell, number, 
         lit &= dr.any(contribution != 0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
         guide.learn(cell, chosen, contribution, asked=asking, lit=lit)
-        planes.add(place, emitter, contribution * dr.rcp(expected), lit)
+        planes.add(place, emitter, contribution * dr.rcp(expected), depth > 0, lit)
         k += 1
         asking &= k < count
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.basis import Basis, IndirectLight, Origin
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.budget import Budget, Keeper, half_of, steps
-from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.render.integrators import has_indirect_planes, why_not_one_pass
 from lightpaint.basis.render.lessons import teach
 from lightpaint.basis.render.separate import (
     LightSums,
@@ -114,7 +114,8 @@ def memory_needed(scene: Scene) -> int:
     images = len(scene.lights) * height * width * 3 * 4
     # Sums of two halves, the images and half differences made of them, and a copy of both
     # where they are written to a file; passes are small beside that.
-    return 6 * images + 512 * SAMPLES_PER_PASS
+    sets = 12 if has_indirect_planes(scene) else 6
+    return sets * images + 512 * SAMPLES_PER_PASS
 
 
 def check_memory(scene: Scene) -> None:
@@ -239,18 +240,25 @@ def basis_of_sums(
 ) -> Basis:
     """Return the one-pass basis of what was rendered, and of `start`.
 
-    halves: undivided sums of two halves of the samples, (n, h, w, 3), which are overwritten. seen:
-    (h, w). half_spp: samples per pixel of each half in all. is_finished: whether there are as many
-    as were asked for.
+    halves: undivided sums of two halves of the samples, (n or 2n, h, w, 3), as `LightPlanes.sums`
+    returns them; they are overwritten. seen: (h, w). half_spp: samples per pixel of each half in
+    all. is_finished: whether there are as many as were asked for.
     """
+    n, spp = len(scene.lights), (half_spp, half_spp)
+    totals, indirect = [half[:n] for half in halves], [half[n:] for half in halves]
+    for total, part in zip(totals, indirect, strict=True):
+        total[: len(part)] += part
+    is_split = len(indirect[0]) == n and (start is None or start.indirect is not None)
     if start is not None:
-        add_halves(halves, start)
+        add_halves(totals, start.planes, start.noise, start.origin.halves)
         seen = seen | start.emitters_seen
-    images, half_differences = mean_and_half_difference(halves, (half_spp, half_spp))
+        if is_split and start.indirect is not None:
+            add_halves(indirect, start.indirect.planes, start.indirect.noise, start.origin.halves)
+    images, half_differences = map(as_planes, mean_and_half_difference(totals, spp))
     return Basis(
         basis_lights(scene),
-        as_planes(images),
-        as_planes(half_differences),
+        images,
+        half_differences,
         seen,
         origin_of(
             scene,
@@ -260,6 +268,9 @@ def basis_of_sums(
             FINISHED if is_finished else UNFINISHED,
         ),
         learned,
+        indirect=IndirectLight(*map(as_planes, mean_and_half_difference(indirect, spp)))
+        if is_split
+        else None,
         source=str(scene.path),
     )
 

@@ -5,18 +5,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import Planes
 
 
-def add_halves(halves: Sequence[Floats], basis: Basis) -> None:
-    """Add the undivided sums of both halves that made `basis`, up to round-off, to `halves`.
+def add_halves(
+    halves: Sequence[Floats], planes: Planes, noise: Planes, spp: tuple[int, int]
+) -> None:
+    """Add the undivided sums of both halves that made `planes`, up to round-off, to `halves`.
 
-    halves: (n, h, w, 3) each.
+    halves: (n, h, w, 3) each. noise: half the differences of the halves. spp: samples per pixel of
+    each half.
     """
-    a, b = basis.origin.halves
+    a, b = spp
     # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
     to_a, to_b = np.float32(2 * b / (a + b)), np.float32(2 * a / (a + b))
-    for k, (image, half_difference) in enumerate(zip(basis.planes, basis.noise, strict=True)):
+    for k, (image, half_difference) in enumerate(zip(planes, noise, strict=True)):
         halves[0][k] += a * (image + half_difference * to_a)
         halves[1][k] += b * (image - half_difference * to_b)
 

@@ -1,0 +1,91 @@
+"""Denoised mixes of lights.
+
+Direct light is nearly clean after few samples, and has the edges of shadows and highlights that a
+denoiser blurs; indirect light is noisy and smooth. So indirect light is denoised, and direct light
+only as far as its own noise asks for it.
+"""
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.images.denoiser import Quality, denoised
+from lightpaint.images.estimate import box_mean
+
+#: Pixels on either side over which noise and what a denoiser changed are averaged.
+RADIUS = 3
+
+
+def clean_mix(
+    basis: Basis,
+    weights: Doubles,
+    *,
+    mixed: Floats | None = None,
+    quality: Quality = "fast",
+) -> Floats:
+    """Return Σ w_i Φ_i without its grain, (h, w, 3) float32.
+
+    weights: (n, 3). mixed: the sum, where somebody has it already.
+    """
+    total = basis.mix(weights) if mixed is None else mixed
+    if basis.indirect is None:
+        return denoised(total, basis.features, quality=quality)
+    parts = basis.indirect
+    return _joined(
+        basis,
+        total,
+        basis.noise.mix(weights),
+        parts.planes.mix(weights),
+        parts.noise.mix(weights),
+        quality,
+    )
+
+
+def clean_present(basis: Basis, *, quality: Quality = "fast") -> Floats:
+    """Return the scene as it is without its grain, (h, w, 3) float32."""
+    mixed = basis.present_look
+    return clean_mix(basis, basis.present_weights, mixed=mixed, quality=quality)
+
+
+def clean_plane(basis: Basis, k: int, *, quality: Quality = "fast") -> Floats:
+    """Return the image of light k at unit emission without its grain, (h, w, 3) float32."""
+    total = basis.planes.plane(k)
+    if basis.indirect is None:
+        return denoised(total, basis.features, quality=quality)
+    parts = basis.indirect
+    noise = basis.noise.plane(k)
+    return _joined(basis, total, noise, parts.planes.plane(k), parts.noise.plane(k), quality)
+
+
+def _joined(
+    basis: Basis,
+    total: Floats,
+    noise: Floats,
+    indirect: Floats,
+    indirect_noise: Floats,
+    quality: Quality,
+) -> Floats:
+    """Return direct and indirect light, each denoised, as one picture; all (h, w, 3)."""
+    features = basis.features
+    smooth = denoised(indirect, features, quality=quality)
+    direct = np.maximum(total - indirect, 0)
+    clean = denoised(direct, features, quality=quality)
+    return smooth + blend_by_noise(direct, noise - indirect_noise, clean)
+
+
+def blend_by_noise(raw: Floats, half_difference: Floats, clean: Floats) -> Floats:
+    """Return the mean of a picture and its denoised form that has the least expected error.
+
+    raw: (h, w, 3), whose `half_difference` tells its variance V. clean: the same, denoised, which
+    has lost E[(clean − raw)²] − V =: B of it. All are averaged over a window of pixels and the
+    channels. With (1 − t) raw + t clean the error is (1 − t)² V + t² B, so t = V / (V + B).
+    """
+
+    def pooled(values: Floats) -> Floats:
+        return box_mean(np.square(values, dtype=np.float64).mean(axis=-1), RADIUS)
+
+    variance, change = pooled(half_difference), pooled(clean - raw)
+    lost = np.maximum(change - variance, 0)
+    total = variance + lost
+    share = np.divide(variance, total, out=np.zeros_like(total), where=total > 0)
+    return np.asarray(raw + share[..., None].astype(np.float32) * (clean - raw), np.float32)

@@ -1,0 +1,113 @@
+"""Denoised mixes: direct light keeps its edges, and no more is changed than noise asks for."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.basis.basis import Basis, IndirectLight, Origin
+from lightpaint.basis.clean_mix import blend_by_noise, clean_mix, clean_plane
+from lightpaint.basis.file import as_stored, read_basis, write_basis
+from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.planes import as_planes
+from lightpaint.errors import BasisError
+from lightpaint.images.denoiser import denoised, oidn_is_installed
+
+SIZE = (48, 64)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(5)
+
+
+def test_a_picture_without_noise_stays_as_it_is(rng: np.random.Generator):
+    raw = rng.random((*SIZE, 3), dtype=np.float32)
+    np.testing.assert_array_equal(blend_by_noise(raw, np.zeros_like(raw), raw * 0.5), raw)
+
+
+def test_a_denoiser_that_loses_nothing_is_believed(rng: np.random.Generator):
+    """Then it differs from the picture by the noise alone, and the share is V / (V + 0)."""
+    clean = np.full((96, 96, 3), 2, np.float32)
+    a, b = (clean + rng.normal(size=clean.shape).astype(np.float32) for _ in range(2))
+    blended = blend_by_noise((a + b) / 2, (a - b) / 2, clean)
+    # V and B each are means of 147 squares: their noise leaves an error of about B ≈ V / 10.
+    assert np.square(blended - clean).mean() < 0.1 * np.square((a + b) / 2 - clean).mean()
+
+
+@pytest.mark.parametrize("offset", [0.3, 1.0, 3.0])
+def test_the_share_is_that_of_the_least_error(offset: float, rng: np.random.Generator):
+    """Of a denoiser that is off by B everywhere: t = V / (V + B), and the error V B / (V + B)."""
+    truth = np.full((160, 160, 3), 10, np.float32)
+    a, b = (truth + rng.normal(size=truth.shape).astype(np.float32) for _ in range(2))
+    blended = blend_by_noise((a + b) / 2, (a - b) / 2, truth + np.float32(offset))
+    variance, lost = 0.5, offset**2
+    expected = variance * lost / (variance + lost)
+    # The windows' own noise costs a little; both rivals alone are worse where they differ.
+    error = np.square(blended - truth, dtype=np.float64).mean()
+    assert expected * 0.9 < error < expected * 1.15
+    assert error < min(variance, lost)
+
+
+def split_basis(direct: np.ndarray, indirect: np.ndarray, rng: np.random.Generator) -> Basis:
+    """Return a basis of one light with clean direct light and indirect light of few samples."""
+    a, b = (indirect * rng.exponential(size=(*SIZE, 1)).astype(np.float32) for _ in range(2))
+    light = BasisLight("spot", "spot", "intensity", "", (1, 1, 1))
+    mean, half = ((a + b) / 2)[None], ((a - b) / 2)[None]
+    parts = IndirectLight(as_planes(mean), as_planes(half))
+    origin = Origin("made", "", "", 0, "", (4, 4), (1, 1))
+    seen = np.zeros(SIZE, bool)
+    return Basis((light,), direct[None] + mean, half, seen, origin, indirect=parts)
+
+
+@pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
+def test_edges_of_direct_light_survive(rng: np.random.Generator):
+    """A grid of sharp pools in smooth indirect light, against the denoised sum of both."""
+    y, x = np.mgrid[: SIZE[0], : SIZE[1]]
+    pools = ((x // 2 + y // 2) % 2 * np.float32(0.2))[..., None] * np.ones(3, np.float32)
+    smooth = np.full((*SIZE, 3), 0.3, np.float32)
+    basis, truth = split_basis(pools, smooth, rng), pools + smooth
+    whole = denoised(basis.planes.plane(0), None)
+    error = {
+        "split": np.square(clean_plane(basis, 0) - truth).mean(),
+        "whole": np.square(whole - truth).mean(),
+        "raw": np.square(basis.planes.plane(0) - truth).mean(),
+    }
+    assert error["split"] < 0.3 * error["whole"]
+    assert error["split"] < 0.1 * error["raw"]
+    twice = clean_mix(basis, np.full((1, 3), 2.0))
+    np.testing.assert_allclose(twice, 2 * clean_plane(basis, 0), rtol=2e-3, atol=1e-4)
+
+
+def test_without_indirect_light_all_of_it_is_denoised(make_basis: Any):
+    basis = make_basis(2, SIZE)
+    expected = denoised(basis.planes.plane(1), basis.features)
+    np.testing.assert_array_equal(clean_plane(basis, 1), expected)
+
+
+def test_indirect_light_is_of_the_lights_of_its_basis(make_basis: Any):
+    basis = make_basis(2, SIZE)
+    other = as_planes(np.zeros((3, *SIZE, 3), np.float32))
+    with pytest.raises(BasisError, match="indirect light and images differ in shape"):
+        replace(basis, indirect=IndirectLight(other, other))
+
+
+def test_a_file_keeps_it(tmp_path: Path, rng: np.random.Generator):
+    """Rounded as `as_stored` says, which is far below its noise."""
+    y = np.linspace(0, 1, SIZE[0], dtype=np.float32)[:, None, None]
+    ramp = y + np.zeros((*SIZE, 3), np.float32)
+    basis = split_basis(ramp, np.float32(1e-6) * (1 + ramp), rng)
+    before = basis.indirect
+    assert before is not None
+    images, noise = before.planes.array().copy(), before.noise.array().copy()
+    write_basis(tmp_path / "a.basis.exr", basis)
+    again, stored = read_basis(tmp_path / "a.basis.exr").indirect, as_stored(basis).indirect
+    assert again is not None
+    assert stored is not None
+    np.testing.assert_array_equal(again.planes.array(), stored.planes.array())
+    np.testing.assert_array_equal(again.noise.array(), stored.noise.array())
+    power = np.square(noise, dtype=np.float64).sum()
+    for read, its in ((again.planes, images), (again.noise, noise)):
+        assert np.square(read.array() - its, dtype=np.float64).sum() < power / 100
