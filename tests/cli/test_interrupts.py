@@ -69,14 +69,19 @@ def samples(basis: Basis) -> int:
     return sum(a + b for a, b, _, _ in each)
 
 
+def three_lights(folder: Path, method: str) -> Path:
+    """A room that is rendered by this method."""
+    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
+    return write_room(folder, lights=lights, integrator=INTEGRATORS[method])
+
+
 @pytest.fixture(scope="module", params=INTEGRATORS)
 def never_stopped(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[str, Path, Basis]:
     """(method, a room, the basis that nothing interrupted)."""
     method, folder = str(request.param), tmp_path_factory.mktemp("whole")
-    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["sun"]
-    room = write_room(folder, lights=lights, integrator=INTEGRATORS[method])
+    room = three_lights(folder, method)
     with start(folder, room, SPP[method], "whole") as process:
         assert process.wait(timeout=120) == 0
     return method, room, read_basis(folder / "whole.exr")
@@ -143,7 +148,7 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
 
 
 @pytest.mark.parametrize(
-    ("never_stopped", "number", "delay_s"),
+    ("method", "number", "delay_s"),
     [
         (ONE_PASS, signal.SIGINT, 0),
         (ONE_PASS, signal.SIGTERM, 0.1),
@@ -154,15 +159,15 @@ def test_stopped_and_gone_on_is_as_if_never_stopped(
         at_night(SEPARATE, signal.SIGTERM, 0.1),
         at_night(SEPARATE, signal.SIGHUP, 0.1),
     ],
-    indirect=["never_stopped"],
 )
 def test_interrupted_before_much_is_done(
     tmp_path: Path,
-    never_stopped: tuple[str, Path, Basis],
+    tmp_path_factory: pytest.TempPathFactory,
+    method: str,
     number: signal.Signals,
     delay_s: float,
 ) -> None:
-    _, room, _ = never_stopped
+    room = three_lights(tmp_path_factory.mktemp("room"), method)
     with start(tmp_path, room, 1_000_000, "cache") as process:
         assert process.stderr is not None
         while not process.stderr.readline().startswith("basis"):
