@@ -74,6 +74,7 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
         # These belong to single views.
         features=None,
         objects=None,
+        indirect=None,
     )
     views = tuple(
         replace(basis, planes=its, noise=its_noise)
