@@ -229,6 +229,24 @@ class Basis(Shown):
         """The noise of all planes as one array, (n, h, w, 3) float32."""
         return self.noise.array()
 
+    def on_pixels(
+        self, planes: Planes | Floats, noise: Planes | Floats, emitters_seen: Bools
+    ) -> "Basis":
+        """Return a basis of the same lights on other pixels: some, or those of several views.
+
+        It has no part that describes the pixels as one picture. Parameters are the attributes.
+        """
+        return replace(
+            self,
+            planes=as_planes(planes),
+            noise=as_planes(noise),
+            emitters_seen=emitters_seen,
+            learned=None,
+            features=None,
+            objects=None,
+            indirect=None,
+        )
+
     def with_requests(self, requests: SceneRequests) -> "Basis":
         """Return this basis with other requests for its lights."""
         return (

@@ -65,17 +65,7 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
         check_same_lights(first, basis)
     planes, views_planes = joined_planes([basis.planes for basis in bases], ROW_PIXELS)
     noise, views_noise = joined_planes([basis.noise for basis in bases], ROW_PIXELS)
-    joint = replace(
-        first,
-        planes=planes,
-        noise=noise,
-        emitters_seen=join_rows([basis.emitters_seen for basis in bases]),
-        learned=None,
-        # These belong to single views.
-        features=None,
-        objects=None,
-        indirect=None,
-    )
+    joint = first.on_pixels(planes, noise, join_rows([basis.emitters_seen for basis in bases]))
     views = tuple(
         replace(basis, planes=its, noise=its_noise)
         for basis, its, its_noise in zip(bases, views_planes, views_noise, strict=True)

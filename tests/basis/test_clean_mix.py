@@ -111,3 +111,14 @@ def test_a_file_keeps_it(tmp_path: Path, rng: np.random.Generator):
     power = np.square(noise, dtype=np.float64).sum()
     for read, its in ((again.planes, images), (again.noise, noise)):
         assert np.square(read.array() - its, dtype=np.float64).sum() < power / 100
+
+
+def test_other_pixels_are_no_picture_to_denoise(rng: np.random.Generator):
+    basis = split_basis(np.zeros((*SIZE, 3), np.float32), np.ones((*SIZE, 3), np.float32), rng)
+    some = np.array([3, 5, 8])
+    row = basis.on_pixels(
+        basis.planes.picked(some), basis.noise.picked(some), np.zeros((1, 3), bool)
+    )
+    assert row.indirect is None
+    assert row.size == (1, 3)
+    np.testing.assert_array_equal(row.images, basis.images.reshape(1, 1, -1, 3)[:, :, some])

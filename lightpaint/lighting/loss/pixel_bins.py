@@ -8,14 +8,13 @@ as the display shows it, determines the size of blocks.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import as_planes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -149,13 +148,6 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
         return None
     images, halves = (x[0] if len(x) == 1 else np.concatenate(x, axis=1) for x in planes)
     images, halves = images[:, None], halves[:, None]
-    basis = replace(
-        views.bases[0],
-        planes=as_planes(images),
-        noise=as_planes(halves),
-        emitters_seen=np.zeros(images.shape[1:3], dtype=bool),
-        learned=None,
-        features=None,
-        objects=None,
-    )
+    none_seen = np.zeros(images.shape[1:3], dtype=bool)
+    basis = views.bases[0].on_pixels(images, halves, none_seen)
     return BinnedPixels(basis, blocks, side)

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.planes import as_planes
 from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
@@ -229,16 +228,7 @@ def _average_blocks(views: Views, side: int) -> Views:
         for means, planes in ((images, basis.planes), (halves, basis.noise)):
             for mean, image in zip(means, planes, strict=True):
                 mean[...] = block_sums(image[:height, :width] * counts, side) / safe
-        made = replace(
-            basis,
-            planes=as_planes(images),
-            noise=as_planes(halves),
-            emitters_seen=total == 0,
-            learned=None,
-            features=None,
-            objects=None,
-        )
-        bases.append(made)
+        bases.append(basis.on_pixels(images, halves, total == 0))
         targets.append(its)
     return Views(tuple(bases), tuple(targets))
 
@@ -249,14 +239,8 @@ def _pixel_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tu
     def cut(image: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return image.reshape(1, -1, *image.shape[2:])[:, chosen]
 
-    row = replace(
-        basis.with_requests(type(basis.requests)()),
-        planes=basis.planes.picked(chosen),
-        noise=basis.noise.picked(chosen),
-        emitters_seen=cut(basis.emitters_seen),
-        learned=None,
-        features=None,
-        objects=None,
+    row = basis.with_requests(type(basis.requests)()).on_pixels(
+        basis.planes.picked(chosen), basis.noise.picked(chosen), cut(basis.emitters_seen)
     )
     its = replace(
         target,
