@@ -24,7 +24,7 @@ PINK = -0.025
 
 @pytest.fixture(scope="module")
 def gallery() -> lp.Basis:
-    return render_basis(lp.load_scene(ROOT / "scenes/gallery/scene.xml").reduced("80x45"), spp=32)
+    return render_basis(lp.load_scene(ROOT / "scenes/gallery/scene.xml").reduced("80x45"), spp=128)
 
 
 def _duv(basis: lp.Basis, target: lp.Target, **how: Any) -> np.ndarray:

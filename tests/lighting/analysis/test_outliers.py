@@ -103,7 +103,7 @@ def test_a_light_that_cannot_be_told_is_so_in_words(make_basis: Any):
     errors = spoken_errors(found, 3)
     assert errors[2] == "undetermined"
     assert all(error.endswith(" %") for error in errors[:2])
-    assert untold_lights(solution.lighting).startswith(f"Light c {UNTOLD_HERE}: ")
+    assert untold_lights(solution.lighting).startswith(f"Light c is {UNTOLD_HERE}: ")
     assert untold_lights(solution.lighting) in uncertainty_sentence(basis, solution, found)
     for shown in (
         lights_table(basis, solution, found),
