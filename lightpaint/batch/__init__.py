@@ -1,1 +1,1 @@
-"""Many looks in one run: a manifest is read, planned, done and shown."""
+"""Many looks in one run: read a manifest, plan its steps, run them, and show the results."""

@@ -11,7 +11,7 @@ from lightpaint.errors import OutputError
 
 @contextmanager
 def lock_folder(folder: Path, *, shared: bool) -> Iterator[None]:
-    """Lock `folder`. Raises OutputError where another batch works in it.
+    """Lock `folder`. Raises OutputError if another batch works in it.
 
     shared: whether other batches with a shared lock may work there at the same time.
     """
@@ -31,7 +31,7 @@ def lock_folder(folder: Path, *, shared: bool) -> Iterator[None]:
                     "(folder=...)"
                 ) from None
             except OSError:
-                pass  # a disk that knows no locks
+                pass  # the file system has no locks
         yield
     finally:
         os.close(descriptor)

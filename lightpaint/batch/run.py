@@ -1,4 +1,4 @@
-"""A run of a plan: bases first, then the looks that share each, then final renders."""
+"""A run of a plan: each basis with the looks that share it, then final renders and exports."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -41,29 +41,29 @@ def run_batch(
     *,
     on_step: Callable[[PlannedLook, ItemResult], None] | None = None,
 ) -> BatchOutcome:
-    """Do what is left of `plan`. Results are written at once, and are not computed again.
+    """Run the remaining steps of `plan`. Each result is written at once, and not computed again.
 
     Args:
-        plan: As `plan` made it.
-        options: Workers, and what a failure stops.
+        plan: The result of `plan`.
+        options: Workers, and whether a failure stops the rest.
         progress: Receives progress and, if it is a `Listener`, remarks.
-        on_step: Called after each step that was done or failed.
+        on_step: Called after each step that is done or has failed.
 
     Raises:
-        OutputError: Where the disk is full, or another batch works in the folder.
-        Interrupted: For Ctrl-C; the same call continues from there.
+        OutputError: If the disk is full, or another batch works in the folder.
+        Interrupted: On Ctrl-C; the same call continues from there.
     """
     options = options or RunOptions()
     with lock_folder(plan.folder, shared=options.apart), ExitStack() as stack:
         if not options.apart:
-            for place in (plan.folder, plan.folder / THUMBNAILS):
-                sweep(place)
+            for swept_folder in (plan.folder, plan.folder / THUMBNAILS):
+                sweep(swept_folder)
         run = _Run(plan, options, listener(progress), on_step or (lambda look, done: None))
         try:
             run.run_all(stack)
         except KeyboardInterrupt:
-            left = len(run.outcome.waiting)
-            raise Interrupted(f"{left} looks are left; the same command goes on") from None
+            remaining = len(run.outcome.waiting)
+            raise Interrupted(f"{remaining} looks are left; the same command goes on") from None
         finally:
             with suppress(LightpaintError):
                 if not options.apart:
@@ -95,7 +95,7 @@ class _Run:
         self._finished = 0
 
     def run_all(self, stack: ExitStack) -> None:
-        """Run every remaining step, in an order in which each has its inputs."""
+        """Run every remaining step after the steps that it depends on."""
         for look in self._plan.chosen_looks:
             if look.failure:
                 self._fail(look, look.steps[0], look.failure)
@@ -105,13 +105,13 @@ class _Run:
                 self.outcome.waiting.append(look.entry.name)
         if self._is_stopped():
             return
-        left = [
+        remaining = [
             s for x in self._plan.chosen_looks if not x.failure for s in x.steps if not s.is_done
         ]
-        self._total = len(left)
+        self._total = len(remaining)
         self._listen("steps", 0, self._total, "steps")
         self._engine = self._start_engine(stack)
-        answers = [step for step in left if step.task.kind == "answer"]
+        answers = [step for step in remaining if step.task.kind == "answer"]
         by_sums = [x for x in answers if x.task.is_by_sums and not has_basis(x.task, self._cache)]
         answers = [step for step in answers if step not in by_sums]
         for keys in dict.fromkeys(step.task.bases for step in by_sums):
@@ -120,10 +120,10 @@ class _Run:
             self._run_with_bases(together)
         self._cache.keep_only(())
         for kind in ("render", "export"):
-            self._run_steps([x for x in left if x.task.kind == kind])
+            self._run_steps([x for x in remaining if x.task.kind == kind])
 
     def _start_engine(self, stack: ExitStack) -> Engine:
-        """Return the engine that does the work, until `stack` is closed."""
+        """Return the engine that runs the steps until `stack` is closed."""
         options = self._options
         if options.cluster is not None:
             cluster = Cluster(
@@ -138,15 +138,15 @@ class _Run:
         return self._engine
 
     def _solve_by_sums(self, steps: Sequence[PlanStep]) -> None:
-        """Solve looks that share a basis which nobody keeps."""
+        """Solve looks that share a basis which is never stored."""
         by_look = {step.task.look: step for step in steps if self._can_begin(step)}
         tasks = [step.task for step in by_look.values()]
         if self._is_stopped():
             return
-        for done in solve_by_sums(tasks, self._engine, self._cache, self._listen):
-            if done.is_disk_full:
-                raise OutputError(f"{done.failure}: make room; the same command goes on")
-            self._record(by_look[done.look], done)
+        for result in solve_by_sums(tasks, self._engine, self._cache, self._listen):
+            if result.is_disk_full:
+                raise OutputError(f"{result.failure}: make room; the same command goes on")
+            self._record(by_look[result.look], result)
 
     def _run_with_bases(self, steps: Sequence[PlanStep]) -> None:
         """Run looks that share their bases; those combined from others come after them."""
@@ -159,43 +159,41 @@ class _Run:
                 if not all(step.task.is_by_sums for step in steps):
                     write_task_planes(self._plan.folder, task, obtained, self._cache)
                 if self._engine.is_apart:
-                    # Workers read what this process rendered, and is done with.
+                    # Workers read the bases that this process rendered and no longer needs.
                     files = save_bases(obtained, stack) if obtained else files
                     self._cache.keep_only(())
             except (LightpaintError, MemoryError) as error:
                 if is_disk_full(error):
                     raise
-                why = OUT_OF_MEMORY_TEXT if isinstance(error, MemoryError) else str(error)
+                reason = OUT_OF_MEMORY_TEXT if isinstance(error, MemoryError) else str(error)
                 for step in steps:
-                    self._fail(self._looks[step.task.look], step, why)
+                    self._fail(self._looks[step.task.look], step, reason)
                 return
             for wave in waves(steps, self._looks):
-                given = [replace(step, task=replace(step.task, files=files)) for step in wave]
-                self._run_steps(given)
+                wave_steps = [replace(step, task=replace(step.task, files=files)) for step in wave]
+                self._run_steps(wave_steps)
                 if self._is_stopped():
                     return
 
     def _run_steps(self, steps: Sequence[PlanStep]) -> None:
-        """Run steps that do not wait for each other, and retry those that failed and may be
-        retried.
-        """
+        """Run steps that do not depend on each other, and retry failed ones as often as allowed."""
         by_look = {step.task.look: step for step in steps}
         waiting = [step for step in steps if self._can_begin(step)]
         while waiting and not self._is_stopped():
-            again = []
+            retries = []
             tasks = [self._with_expected_time(step.task) for step in waiting]
-            for done in _close_after(self._results(tasks)):
-                step = by_look[done.look]
-                if done.is_disk_full:
-                    raise OutputError(f"{done.failure}: make room; the same command goes on")
-                if done.failure and self._may_retry(done):
-                    self._listen.say(f"{done.look}: {done.failure}; trying again")
-                    again.append(step)
+            for result in _close_after(self._results(tasks)):
+                step = by_look[result.look]
+                if result.is_disk_full:
+                    raise OutputError(f"{result.failure}: make room; the same command goes on")
+                if result.failure and self._may_retry(result):
+                    self._listen.say(f"{result.look}: {result.failure}; trying again")
+                    retries.append(step)
                     continue
-                self._record(step, done)
+                self._record(step, result)
                 if self._is_stopped():
                     return
-            waiting = again
+            waiting = retries
 
     def _with_expected_time(self, task: Task) -> Task:
         """Return the task with a rough estimate of its time on one thread."""
@@ -204,8 +202,8 @@ class _Run:
         return replace(task, expected_s=times * look_seconds(self._looks[task.look], self._plan))
 
     def _results(self, tasks: Sequence[Task]) -> Iterator[ItemResult]:
-        """Yield the results of tasks; of few final renders each is done by all workers."""
-        if tasks[0].kind == "export":  # texts, of files that are here: none is worth sending
+        """Yield the results of tasks. If final renders are few, all workers share each of them."""
+        if tasks[0].kind == "export":  # short texts from local files: not worth sending
             yield from InProcess(self._cache, self._listen).run(tasks)
             return
         are_few = len(tasks) < self._engine.workers and self._engine.is_apart
@@ -218,62 +216,62 @@ class _Run:
             yield attempt(task, partial(final_render, task, self._cache, self._listen, by_all))
 
     def _can_begin(self, step: PlanStep) -> bool:
-        """Return whether neither the look nor any that it combines has failed by now."""
+        """Return whether neither the look nor any look that it combines has failed."""
         look = self._looks[step.task.look]
-        gone = [name for name in look.entry.of if name in self.outcome.failed]
-        if gone:
-            self._fail(look, step, f"it is made of {gone[0]}, which failed")
+        failed = [name for name in look.entry.of if name in self.outcome.failed]
+        if failed:
+            self._fail(look, step, f"it is made of {failed[0]}, which failed")
         return look.entry.name not in self.outcome.failed
 
-    def _may_retry(self, done: ItemResult) -> bool:
-        key = (done.look, done.kind)
+    def _may_retry(self, result: ItemResult) -> bool:
+        key = (result.look, result.kind)
         self._tries[key] = self._tries.get(key, 0) + 1
         return self._tries[key] <= self._options.retry
 
-    def _record(self, step: PlanStep, done: ItemResult) -> None:
+    def _record(self, step: PlanStep, result: ItemResult) -> None:
         """Record the result of a step, and report it."""
-        look = self._looks[done.look]
-        if done.failure:
-            self._fail(look, step, done.failure, done)
+        look = self._looks[result.look]
+        if result.failure:
+            self._fail(look, step, result.failure, result)
         else:
-            self.journal.add(JournalLine(done.look, step.task.kind, "done", step.made_of))
+            self.journal.add(JournalLine(result.look, step.task.kind, "done", step.made_of))
             if step.task.kind == look.steps[-1].task.kind:
-                self.outcome.done.append(done.look)
-                self.outcome.waiting.remove(done.look)
+                self.outcome.done.append(result.look)
+                self.outcome.waiting.remove(result.look)
             self._finished += 1
-            self._on_step(look, replace(done, left_s=self._seconds_left))
+            self._on_step(look, replace(result, left_s=self._seconds_left))
         self._listen("steps", self._finished, self._total, "steps")
 
     def _fail(
-        self, look: PlannedLook, step: PlanStep, why: str, done: ItemResult | None = None
+        self, look: PlannedLook, step: PlanStep, reason: str, result: ItemResult | None = None
     ) -> None:
         if self._engine.is_gone:
-            raise BatchError(why)
+            raise BatchError(reason)
         name = look.entry.name
         if name in self.outcome.failed:
             return
-        self.outcome.failed[name] = why
+        self.outcome.failed[name] = reason
         if name in self.outcome.waiting:
             self.outcome.waiting.remove(name)
-        self.journal.add(JournalLine(name, step.task.kind, "failed", step.made_of, why))
-        self._on_step(look, done or ItemResult(name, step.task.kind, why))
+        self.journal.add(JournalLine(name, step.task.kind, "failed", step.made_of, reason))
+        self._on_step(look, result or ItemResult(name, step.task.kind, reason))
 
     def _is_stopped(self) -> bool:
         return bool(self.outcome.failed) and not self._options.keep_going
 
     @property
     def _seconds_left(self) -> float | None:
-        """Seconds that are left, at the pace of the steps so far; None before the first."""
+        """Remaining seconds at the pace of the steps so far; None before the first."""
         if not self._finished:
             return None
         spent_s = time.monotonic() - self._start_s
         return spent_s / self._finished * (self._total - self._finished)
 
 
-def _close_after(done: Iterator[ItemResult]) -> Iterator[ItemResult]:
+def _close_after(results: Iterator[ItemResult]) -> Iterator[ItemResult]:
     """Yield results, and close the iterator when the caller stops."""
     try:
-        yield from done
+        yield from results
     finally:
-        if hasattr(done, "close"):
-            done.close()
+        if hasattr(results, "close"):
+            results.close()

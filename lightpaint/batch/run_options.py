@@ -9,9 +9,9 @@ from lightpaint.batch.gallery.summary import SummaryRow
 class RunOptions:
     """Options of a run.
 
-    workers: processes; 1 for none beside this one. keep_going: whether a failure stops nothing
-    else. retry: how often a failed step is tried again. apart: whether other processes do the other
-    looks of the plan at the same time, in the same folder; the last one writes the gallery.
+    workers: processes; 1 for this process alone. keep_going: whether the other looks go on after a
+    failure. retry: how often a failed step is tried again. apart: whether other processes do other
+    looks of the plan at the same time in the same folder; the last one writes the gallery.
     cluster: address of a Dask scheduler whose workers do the work. shared_fs: whether they see the
     same files under the same paths. task_limit_s: seconds after which a worker counts as hung.
     """

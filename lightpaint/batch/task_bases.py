@@ -21,46 +21,48 @@ from lightpaint.progress import Listener
 from lightpaint.scene.quality_presets import on_film, samples
 
 
-def has_basis(task: Task, known: WorkerCache) -> bool:
-    """Return whether the basis of a task is saved or cached, so that nothing is to be
-    rendered.
-    """
-    fields = job_fields(task, known)
+def has_basis(task: Task, worker_cache: WorkerCache) -> bool:
+    """Return whether the basis of a task is saved or cached, so that it need not be rendered."""
+    fields = job_fields(task, worker_cache)
     if fields["basis"] is not None:
         return True
     settings: Settings = fields["settings"]
     [scene] = fields["scenes"]
     film = on_film(scene.content, settings.quality, settings.resolution)
-    asked = samples(settings.quality, spp=settings.spp, time_s=None)
+    requested_spp = samples(settings.quality, spp=settings.spp, time_s=None)
     sensor = film.sensor_names[film.sensor]
-    kept = cache.spp_of(film.identity, sensor, settings.seed, film.size)
+    cached_spp = cache.spp_of(film.identity, sensor, settings.seed, film.size)
     exact = settings.exact_spp or not settings.use_cache
-    return not exact and kept >= (film.spp if asked is None else asked)
+    return not exact and cached_spp >= (film.spp if requested_spp is None else requested_spp)
 
 
-def obtain_bases(task: Task, engine: Engine, known: WorkerCache, listen: Listener) -> list[Basis]:
-    """Return the bases of a task that are no files already: cached or rendered, once for all
-    looks.
+def obtain_bases(
+    task: Task, engine: Engine, worker_cache: WorkerCache, listen: Listener
+) -> list[Basis]:
+    """Return the bases of a task from the cache or a render, once for all looks.
+    The list is empty if the basis is a file already.
     """
-    fields = job_fields(task, known)
+    fields = job_fields(task, worker_cache)
     if fields["basis"] is not None:
         return []
     settings: Settings = fields["settings"]
     bases = []
     for key, scene in zip(task.bases, fields["scenes"], strict=True):
         film = on_film(scene.content, settings.quality, settings.resolution)
-        basis = known.basis(key)
+        basis = worker_cache.basis(key)
         if basis is None:
-            its = SceneFilm(scene, settings.quality, settings.resolution, _scene_files(scene))
-            render = PartwiseRender(engine, its)
+            scene_film = SceneFilm(
+                scene, settings.quality, settings.resolution, _scene_files(scene)
+            )
+            render = PartwiseRender(engine, scene_film)
             basis = obtain(film, settings, listen, render=render)
-            known.put(key, basis)
+            worker_cache.put(key, basis)
         bases.append(basis)
     return bases
 
 
 def save_bases(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
-    """Save these bases to files, as long as `stack` is open."""
+    """Save the bases to files that exist as long as `stack` is open, and return their paths."""
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lightpaint-")))
     files = [folder / f"{k}.basis.exr" for k in range(len(bases))]
     for file, basis in zip(files, bases, strict=True):

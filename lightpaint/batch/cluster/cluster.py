@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster, wherever they are: dask-jobqueue's, dask-kubernetes', one's own.
+"""An engine whose workers belong to a Dask cluster: dask-jobqueue's, dask-kubernetes', one's own.
 
 Dask carries work items to workers and back, and knows which workers live. This module decides which
 worker does what, so that every item has a known worker: one that dies, or takes too long over it,
@@ -29,10 +29,10 @@ POLL_S = 0.02
 #: Seconds for the last events of workers, at the end.
 FINAL_EVENTS_S = 2.0
 
-#: Items that a worker has at a time: while one is done, the next is there already.
+#: Items that a worker has at a time: the next one arrives while it works on the first.
 ITEMS_PER_WORKER = 2
 
-#: Limit of an item: so many times its expected time on one thread, and so many seconds at least.
+#: Time limit of an item: a multiple of its expected time on one thread, and a minimum in seconds.
 LIMIT_FACTOR, MIN_LIMIT_S = 20.0, 300.0
 
 
@@ -70,13 +70,13 @@ class Cluster:
         self._workers: ClusterWorkers
         self._assignments: list[_Assignment] = []
         self._failed_at: dict[str, set[str]] = {}
-        #: Which worker has begun what, in turn; an item that stands there twice was lost once.
+        #: Pairs of item and worker in the order of starts; an item that occurs twice was lost once.
         self.begun: list[tuple[str, str]] = []
         self._returned = Counter[tuple[str, str]]()
 
     @property
     def is_gone(self) -> bool:
-        """True once the scheduler is gone, as of `Engine`."""
+        """True once the scheduler is gone; see `Engine`."""
         return self._workers.is_gone
 
     @property
@@ -90,7 +90,7 @@ class Cluster:
 
     def __exit__(self, *_: object) -> None:
         self._cancel_all()
-        # What came back was begun; who says so may be slower.
+        # The events of items that have already returned may still be on their way.
         deadline_s = time.monotonic() + FINAL_EVENTS_S
         while self._returned - Counter(self.begun) and time.monotonic() < deadline_s:
             time.sleep(POLL_S)
@@ -98,7 +98,7 @@ class Cluster:
         self._workers.close()
 
     def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
-        """Run the items, as of `Engine`."""
+        """Run the items; see `Engine`."""
         waiting, tries = deque(items), Counter[str]()
         readers = Counter(
             os.path.abspath(file) for item in items for file in {*item.needs, *item.carried}
@@ -124,7 +124,7 @@ class Cluster:
         self._assignments = []
 
     def _assign(self, waiting: deque[WorkItem], common: set[str]) -> Iterator[ItemResult]:
-        """Give every worker something to do, and the next thing where there is enough for all."""
+        """Give every worker an item, and a second one where there are enough for all."""
         loads = Counter(assignment.worker for assignment in self._assignments)
         for depth in range(1, ITEMS_PER_WORKER + 1):
             for worker in self._workers.addresses:
@@ -156,17 +156,17 @@ class Cluster:
 
     def _start_clocks(self) -> None:
         """Start the clock of each worker's first item."""
-        seen = set()
+        workers = set()
         for assignment in self._assignments:
-            if assignment.worker not in seen and assignment.since_s is None:
+            if assignment.worker not in workers and assignment.since_s is None:
                 assignment.since_s = time.monotonic()
-            seen.add(assignment.worker)
+            workers.add(assignment.worker)
 
     def _read_events(self) -> None:
         """Read which items workers have begun."""
         while self._workers.events:
             event = self._workers.events.popleft()
-            if not _is_event(event):  # of whoever else knows the scheduler
+            if not _is_event(event):  # another client of the scheduler sent it
                 continue
             self.begun.append((event["item"], event["worker"]))
             for assignment in self._assignments:
@@ -193,13 +193,13 @@ class Cluster:
             self._returned[item_label(assignment.item), assignment.worker] += not isinstance(
                 result, list
             )
-            if isinstance(result, list):  # a worker that was begun anew at the same address
+            if isinstance(result, list):  # the worker restarted at the same address
                 self._workers.forget_files(assignment.worker, result)
                 waiting.appendleft(assignment.item)
                 continue
             if (
                 result.is_lost and tries[result.look] + 1 < MAX_TRIES
-            ):  # memory, which others may have
+            ):  # it ran out of memory, and another worker may have more
                 tries[result.look] += 1
                 self._failed_at.setdefault(result.look, set()).add(assignment.worker)
                 waiting.append(assignment.item)
@@ -217,8 +217,8 @@ class Cluster:
         try:
             result: ItemResult | list[str] = assignment.future.result(timeout=ANSWER_S)
             if not _is_answer(result, item):
-                said = f"worker {assignment.worker} answers with something else"
-                return ItemResult(item.name, item.kind, said)
+                failure = f"worker {assignment.worker} answers with something else"
+                return ItemResult(item.name, item.kind, failure)
             return result
         except DASK_ERRORS as error:
             if isinstance(error, OSError) or not self._workers.is_known(assignment.worker):
@@ -245,7 +245,7 @@ class Cluster:
                 assignment.future.cancel(force=True)
             self._assignments.remove(assignment)
             self._note_idle(assignment.worker)
-            if assignment.since_s is not None:  # it was at work on that
+            if assignment.since_s is not None:  # the worker had begun it
                 tries[assignment.item.name] += 1
                 name = item_label(assignment.item)
                 self._listen.say(f"{name}: worker {assignment.worker} is lost; trying elsewhere")
@@ -274,16 +274,16 @@ class Cluster:
 
 
 def _is_event(event: Any) -> bool:
-    """Return whether it says what a worker has begun."""
+    """Return whether an event reports the item that a worker has begun."""
     return isinstance(event, dict) and all(
         isinstance(event.get(key), str) for key in ("item", "worker")
     )
 
 
 def _is_answer(result: Any, item: WorkItem) -> bool:
-    """Return whether it is what a worker answers to an item."""
+    """Return whether a result has the form of a worker's answer to an item."""
     if isinstance(result, list):
-        return all(isinstance(its, str) for its in result)
+        return all(isinstance(digest, str) for digest in result)
     if not isinstance(result, ItemResult) or (result.look, result.kind) != (item.name, item.kind):
         return False
     files = result.files or {}

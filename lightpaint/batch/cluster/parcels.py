@@ -1,4 +1,4 @@
-"""Work items for other machines: their files travel by content, and what is written comes back.
+"""Work items for other machines: their files travel by content, and the results come back.
 
 On a shared disk only the content is checked. Otherwise each worker has a store of files by their
 SHA-256, so that none is sent to it twice, and an item finds them under a root of its own, at their
@@ -64,8 +64,8 @@ class FileHashes:
 def pack(item: WorkItem, contents: FileHashes, *, run: str, is_shared: bool) -> Parcel:
     """Return the item with its files. Raises BatchError for a file that cannot be read."""
 
-    def summed(some: Iterable[str]) -> tuple[tuple[str, str], ...]:
-        whole = dict.fromkeys(os.path.abspath(file) for file in some)
+    def summed(paths: Iterable[str]) -> tuple[tuple[str, str], ...]:
+        whole = dict.fromkeys(os.path.abspath(file) for file in paths)
         return tuple((file, contents.sha256(file)) for file in whole)
 
     files, carried = summed(item.needs), summed(item.carried)
@@ -73,7 +73,7 @@ def pack(item: WorkItem, contents: FileHashes, *, run: str, is_shared: bool) -> 
 
 
 class ParcelStore:
-    """Files of a worker, in `folder`, which nobody else uses."""
+    """The file store of one worker, in a `folder` of its own."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -85,20 +85,20 @@ class ParcelStore:
         return [digest for _, digest in files_to_send(parcel) if not self._file(digest).is_file()]
 
     def put(self, digest: str, data: bytes, *, is_first: bool, is_last: bool) -> None:
-        """Take a piece of the file of that SHA-256. Raises BatchError if it comes to another."""
+        """Store a piece of the file with that SHA-256. Raises BatchError if the sum differs."""
         self._folder.mkdir(parents=True, exist_ok=True)
-        half = self._file(f"{digest}.half")
-        with half.open("wb" if is_first else "ab") as file:
+        temporary = self._file(f"{digest}.half")
+        with temporary.open("wb" if is_first else "ab") as file:
             file.write(data)
         if is_last:
-            if self._contents.sha256(str(half)) != digest:
-                half.unlink()
+            if self._contents.sha256(str(temporary)) != digest:
+                temporary.unlink()
                 raise BatchError("a file came otherwise than it was sent")
-            half.chmod(0o444)
-            half.replace(self._file(digest))
+            temporary.chmod(0o444)
+            temporary.replace(self._file(digest))
 
     def run_parcel(self, parcel: Parcel, run_item: Callable[[WorkItem], ItemResult]) -> ItemResult:
-        """Run an item here by `do`; all its files have to be in the store."""
+        """Run an item here by `run_item`; all its files have to be in the store."""
         before = os.getcwd()
         try:
             if parcel.is_shared:
@@ -132,8 +132,8 @@ class ParcelStore:
         if self._run != parcel.run:
             shutil.rmtree(root.parent, ignore_errors=True)
             self._run = parcel.run
-        item, addresses = parcel.item, f"{root}{parcel.place}"
-        os.makedirs(addresses, exist_ok=True)
+        item, start_folder = parcel.item, f"{root}{parcel.place}"
+        os.makedirs(start_folder, exist_ok=True)
         target = None
         if item.writes:
             target = Path(f"{root}{_absolute(parcel, item.writes)}")
@@ -145,10 +145,10 @@ class ParcelStore:
             place.unlink(missing_ok=True)
             os.link(self._file(digest), place)
             links[place] = self._file(digest)
-        os.chdir(addresses)
+        os.chdir(start_folder)
         result = run_item(item.with_paths(self._path_map(parcel, root)))
         if target is None or result.failure:
-            # A disk that is full is this worker's, and others have others.
+            # The full disk is this worker's own; another worker may have room.
             failure, is_lost = (
                 result.failure.replace(str(root), ""),
                 result.is_lost or result.is_disk_full,
@@ -165,23 +165,25 @@ class ParcelStore:
         )
 
     def _path_map(self, parcel: Parcel, root: Path | None = None) -> Callable[[str], str]:
-        """Return the map from local paths to the store's and, given a root, to paths under that."""
+        """Return a function from local paths to paths in the store and, given a root, under it."""
         carried = {file: str(self._file(digest)) for file, digest in parcel.carried}
-        known: set[str] = set()
+        moved_paths: set[str] = set()
         if root is not None:
-            known |= {file for file, _ in parcel.files}
+            moved_paths |= {file for file, _ in parcel.files}
             if parcel.item.writes:
-                known.add(_absolute(parcel, parcel.item.writes))
-            known |= {str(folder) for file in tuple(known) for folder in Path(file).parents}
-            known.discard("/")
-        # What is left out of a folder is left out there, too, where others had it sent.
-        folders = {os.path.dirname(file) for file, _ in parcel.files} & known
+                moved_paths.add(_absolute(parcel, parcel.item.writes))
+            moved_paths |= {
+                str(folder) for file in tuple(moved_paths) for folder in Path(file).parents
+            }
+            moved_paths.discard("/")
+        # Files that this item leaves out of a folder stay out, even if other items sent them.
+        folders = {os.path.dirname(file) for file, _ in parcel.files} & moved_paths
 
         def move(text: str) -> str:
             if (whole := _absolute(parcel, text)) in carried:
                 return carried[whole]
-            is_there = whole in known or os.path.dirname(whole) in folders
-            return f"{root}{text}" if os.path.isabs(text) and is_there else text
+            is_moved = whole in moved_paths or os.path.dirname(whole) in folders
+            return f"{root}{text}" if os.path.isabs(text) and is_moved else text
 
         return move
 
@@ -224,11 +226,11 @@ def pieces(data: bytes) -> Iterable[tuple[bytes, bool, bool]]:
 def unpack(item: WorkItem, files: dict[str, bytes]) -> None:
     """Write a worker's files where they belong, all at once.
 
-    Raises OutputError for what must not be replaced, as for files written here.
+    Raises OutputError for files that must not be replaced, like those that are written locally.
     """
     folder = Path(item.writes)
-    if odd := [name for name in files if not is_below(name)]:
-        raise OutputError(f"a worker would write {some_names(odd)} beside {folder}")
+    if outside := [name for name in files if not is_below(name)]:
+        raise OutputError(f"a worker would write {some_names(outside)} beside {folder}")
     answers = _recorded_answers(files[RECORD]) if RECORD in files else ()
     adds_to = folder / "lighting.json" if item.kind == "render" else None
     results = ResultFolder(

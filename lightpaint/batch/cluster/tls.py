@@ -1,7 +1,7 @@
 """Trust between this machine and a scheduler at a `tls://` address, checked before Dask connects.
 
 Dask finds certificates by its own configuration (`distributed.comm.tls`), as its schedulers and
-workers do. A client of it that is not let in says so late, or waits for half a minute.
+workers do. A Dask client that is refused reports it late, or waits for half a minute.
 """
 
 import socket
@@ -19,10 +19,10 @@ CONFIGURE_HINT = (
 
 
 def check_trust(address: str, connection: socket.socket) -> None:
-    """Raise BatchError, with what to do, unless Dask's configuration lets it speak to `address`.
+    """Raise BatchError, with advice, unless Dask's configuration can connect to `address`.
 
-    connection: a new one to the scheduler there, which is used up where it is one of TLS. Raises
-    OSError where it breaks off.
+    connection: a new connection to the scheduler there; a TLS handshake uses it up. Raises OSError
+    if it breaks off.
     """
     security = _security(address)
     if not address.startswith("tls://"):
@@ -35,22 +35,22 @@ def check_trust(address: str, connection: socket.socket) -> None:
     context = _context(address, security)
     try:
         with context.wrap_socket(connection) as secure:
-            # A certificate that is refused is told with the first word after the greeting.
+            # The scheduler reports a refused certificate in its first message after the handshake.
             secure.recv(1)
     except ssl.SSLCertVerificationError as error:
-        why = error.verify_message
+        reason = error.verify_message
     except ssl.SSLError as error:
         if error.reason in ("WRONG_VERSION_NUMBER", "RECORD_LAYER_FAILURE", "HTTP_REQUEST"):
             raise BatchError(
                 f"no TLS is spoken at {address}: a scheduler that was started without certificates "
                 f"is at {address.replace('tls://', 'tcp://', 1)}"
             ) from None
-        why = (error.reason or first_line(error)).replace("_", " ").lower()
+        reason = (error.reason or first_line(error)).replace("_", " ").lower()
     else:
         return
     raise BatchError(
         f"the scheduler at {address} and this machine do not trust each other's certificates "
-        f"({why}): both have to be signed by an authority that the other one names; "
+        f"({reason}): both have to be signed by an authority that the other one names; "
         f"{CONFIGURE_HINT}"
     )
 
@@ -66,16 +66,16 @@ def _security(address: str) -> Any:
 
 def _context(address: str, security: Any) -> ssl.SSLContext:
     try:
-        found = security.get_connection_args("client")["ssl_context"]
+        context = security.get_connection_args("client")["ssl_context"]
     except (OSError, ValueError) as error:
         # Python does not say which of the files it is.
         files = security.get_tls_config_for_role("client")
-        named = ", ".join(str(files[x])[:200] for x in ("ca_file", "cert", "key") if files[x])
-        why = error.strerror if isinstance(error, FileNotFoundError) else first_line(error)
+        names = ", ".join(str(files[x])[:200] for x in ("ca_file", "cert", "key") if files[x])
+        reason = error.strerror if isinstance(error, FileNotFoundError) else first_line(error)
         raise BatchError(
-            f"the certificates for {address} cannot be used: {why} ({named}); each is a PEM file, "
-            "and a certificate needs its key"
+            f"the certificates for {address} cannot be used: {reason} ({names}); each is a PEM "
+            "file, and a certificate needs its key"
         ) from None
-    if not isinstance(found, ssl.SSLContext):
+    if not isinstance(context, ssl.SSLContext):
         raise BatchError(f"{address} needs certificates: {CONFIGURE_HINT}")
-    return found
+    return context

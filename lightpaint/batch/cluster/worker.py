@@ -1,6 +1,6 @@
 """Functions that a worker of a Dask cluster runs for a batch, all in one thread.
 
-A process has one Mitsuba: of several tasks that Dask gives a worker at a time one runs.
+A process has one Mitsuba, so a worker runs one task at a time, however many Dask gives it.
 """
 
 import ctypes
@@ -24,15 +24,15 @@ MALLOPT_VALUES = {-1: 2**26, -3: 2**25}  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
 
 
 def _keep_memory() -> None:
-    """Keep what arrays of a few hundred kilobytes have been in for the next ones.
+    """Keep the memory of arrays of a few hundred kilobytes for the next ones.
 
-    Dask has its workers give it back at once (MALLOC_TRIM_THRESHOLD_): the system then clears it
-    for each block of pixels anew, which takes longer than the arithmetic.
+    Dask's workers return it to the system at once (MALLOC_TRIM_THRESHOLD_). The system then clears
+    it anew for each block of pixels, which takes longer than the arithmetic.
     """
     with suppress(AttributeError, OSError):
         mallopt = ctypes.CDLL(None).mallopt
-        for what, size in MALLOPT_VALUES.items():
-            mallopt(what, size)
+        for parameter, size in MALLOPT_VALUES.items():
+            mallopt(parameter, size)
 
 
 class _WorkerState:
@@ -56,8 +56,8 @@ def versions() -> dict[str, str]:
     """Return the versions of packages that decide the last bit of a result."""
     from importlib.metadata import version
 
-    found = {name: version(name) for name in ("mitsuba", "drjit", "numpy")}
-    return {"lightpaint": __version__, **found}
+    packages = {name: version(name) for name in ("mitsuba", "drjit", "numpy")}
+    return {"lightpaint": __version__, **packages}
 
 
 def put(digest: str, data: bytes, is_first: bool, is_last: bool, dask_worker: Any = None) -> None:
@@ -77,7 +77,7 @@ def _do(parcel: Parcel, worker: Any) -> ItemResult | list[str]:
     if missing := store.missing(parcel):
         return missing
     if _STATE.run != parcel.run:
-        # Files of another batch may have the same names, and are others.
+        # Files of another batch may have the same names and other contents.
         _STATE.cache.release_renderer()
         _STATE.cache, _STATE.run = WorkerCache(), parcel.run
         threadpool_limits(worker.state.nthreads, "blas")

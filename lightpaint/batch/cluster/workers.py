@@ -43,24 +43,24 @@ INSTALL = "pip install 'lightpaint[cluster]'"
 
 
 class ClusterWorkers:
-    """Workers that the scheduler at `address` knows. topic: of the events in which they report."""
+    """The workers of the scheduler at `address`. topic: of the events that they report."""
 
     def __init__(self, address: str, listen: Listener, topic: str) -> None:
         self._address, self._listen = address, listen
         self._client: Any = _connect(address)
-        #: Addresses of those that can be given work.
+        #: Addresses of the workers that can be given work.
         self.addresses: list[str] = []
-        #: Whether the scheduler is.
+        #: Whether the scheduler is gone.
         self.is_gone = False
-        #: What they tell.
+        #: Events that workers have reported, oldest first.
         self.events: deque[dict[str, str]] = deque()
         self._left_out: dict[str, str] = {}
         self._files_at: dict[str, set[str]] = {}
         self._looked_s = 0.0
         self._is_waiting = False
         try:
-            hear = self._client.subscribe_topic
-            self._ask(lambda: hear(topic, lambda event: self.events.append(event[1])))
+            subscribe = self._client.subscribe_topic
+            self._ask(lambda: subscribe(topic, lambda event: self.events.append(event[1])))
             self.refresh()
         except BaseException:
             self.close()
@@ -85,13 +85,13 @@ class ClusterWorkers:
         self._files_at.get(worker, set()).difference_update(sums)
 
     def refresh(self) -> None:
-        """Update the list of workers; each new one is asked for its versions."""
+        """Update the list of workers, and ask each new one for its versions."""
         if time.monotonic() - self._looked_s < LOOK_S:
             return
         addresses = [x for x in self._all_addresses() if x not in self._left_out]
-        for worker, why in self._unfit(sorted(set(addresses) - set(self.addresses))).items():
-            self._left_out[worker] = why
-            self._listen.say(f"worker {worker} is left out: {why}")
+        for worker, reason in self._unfit(sorted(set(addresses) - set(self.addresses))).items():
+            self._left_out[worker] = reason
+            self._listen.say(f"worker {worker} is left out: {reason}")
         self.addresses = [worker for worker in addresses if worker not in self._left_out]
         self._files_at = {worker: self._files_at.get(worker, set()) for worker in self.addresses}
         if not self.addresses and not self._is_waiting:
@@ -100,17 +100,19 @@ class ClusterWorkers:
         self._looked_s = time.monotonic()
 
     def _all_addresses(self) -> list[str]:
-        """Return the addresses of all workers. Raises BatchError where the scheduler is gone."""
+        """Return the addresses of all workers. Raises BatchError if the scheduler is gone."""
         return list(self._ask(self._client.nthreads))
 
     def _ask(self, work: Callable[[], _Result]) -> _Result:
-        """Ask the scheduler, and return its answer. Raises BatchError where it is gone."""
+        """Call `work`, which asks the scheduler, and return the answer.
+        Raises BatchError if the scheduler is gone.
+        """
         import dask
 
         status = self._client.status
         if status == "running":
             try:
-                # Dask would try to reach one that has ended for 30 s.
+                # Dask would try for 30 s to reach a scheduler that has ended.
                 with dask.config.set({"distributed.comm.timeouts.connect": f"{GONE_S}s"}):
                     return call_with_timeout(work, SILENT_S)
             except DASK_ERRORS as error:
@@ -131,14 +133,15 @@ class ClusterWorkers:
         for worker, reply in replies.items():
             if isinstance(reply, Exception):
                 unfit[worker] = f"lightpaint does not run there ({first_line(reply)})"
-            elif others := [name for name in own if reply.get(name) != own[name]]:
+            elif differing := [name for name in own if reply.get(name) != own[name]]:
                 unfit[worker] = ", ".join(
-                    f"it has {name} {reply.get(name)}, and here is {own[name]}" for name in others
+                    f"it has {name} {reply.get(name)}, and here is {own[name]}"
+                    for name in differing
                 )
         return unfit
 
     def send_files(self, parcel: Parcel, worker: str, common: set[str]) -> None:
-        """Send the files that a worker lacks; those that others will need go to all at once."""
+        """Send a worker the files that it lacks; those in `common` go to all workers at once."""
         for file, digest in files_to_send(parcel):
             if digest in self._files_at.get(worker, set()):
                 continue
@@ -159,9 +162,9 @@ class ClusterWorkers:
             for receiver in receivers:
                 self._files_at.setdefault(receiver, set()).add(digest)
 
-    def end(self, worker: str, why: str) -> None:
+    def end(self, worker: str, reason: str) -> None:
         """End a worker's process; its nanny starts another."""
-        self._left_out[worker] = why
+        self._left_out[worker] = reason
         if worker in self.addresses:
             self.addresses.remove(worker)
         try:
@@ -172,7 +175,7 @@ class ClusterWorkers:
 
 
 def _reason(error: BaseException) -> str:
-    """Return what an error says, without the system's number for it."""
+    """Return the message of an error, without the system's error number."""
     return str(getattr(error, "strerror", None) or first_line(error))
 
 
@@ -186,17 +189,17 @@ def _connect(address: str) -> Any:
     for name in SILENCED_LOGGERS:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
-        # A client that finds nobody, or is not let in, takes its time, and has last words.
+        # Dask's client is slow to report that nobody listens or that it is refused, and logs more.
         place = get_address_host_port(address, strict=True)
         with socket.create_connection(place, timeout=ANSWER_S) as connection:
             check_trust(address, connection)
-        # One that takes the connection and says nothing would be waited for without end.
+        # Dask would wait for ever for a server that accepts the connection and stays silent.
         make = partial(Client, address, timeout=ANSWER_S, set_as_default=False)
         return call_with_timeout(make, ANSWER_S + GONE_S)
     except LightpaintError:
         raise
     except DASK_ERRORS as error:
         raise BatchError(
-            f"no scheduler answers at {address}: {_reason(error) or 'none is addresses'}; give its "
+            f"no scheduler answers at {address}: {_reason(error) or 'none is there'}; give its "
             "address, like tcp://host:8786 or tls://host:8786 (dask scheduler tells it)"
         ) from error

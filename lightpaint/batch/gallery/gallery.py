@@ -34,7 +34,7 @@ from lightpaint.screen import visible
 from lightpaint.version import __version__
 from lightpaint.viewer.bundle import bundled, styles
 
-#: Pictures of the sheet, at most, and in a row; width of each, gap, and height of its caption.
+#: Contact sheet: most pictures, pictures in a row, width of each, gap and height of a caption.
 MAX_PICTURES, COLUMNS, WIDTH, GAP, CAPTION_HEIGHT = 120, 6, 240, 14, 22
 
 #: Colours of the sheet: background, text, faint text, warnings.
@@ -76,8 +76,8 @@ def gallery_page(
 
     folder: of the small pictures and planes. bases: planes of each row, by its folder.
     """
-    shown = [row for row in rows if row.state == "done"]
-    mixers = mixers_html(folder, shown, bases or {})
+    finished = [row for row in rows if row.state == "done"]
+    mixers = mixers_html(folder, finished, bases or {})
     records = []
     for row in rows:
         record = {k: v for k, v in asdict(row).items() if v not in (None, "", ())}
@@ -95,7 +95,7 @@ def gallery_page(
         about=escape(counts_text(rows)),
         failed=" failed" if any(row.state == "failed" for row in rows) else "",
         looks=script_json(records),
-        transforms=script_json(transforms_of(shown) if mixers else {}),
+        transforms=script_json(transforms_of(finished) if mixers else {}),
         mixers="\n".join(mixers.values()),
         style=styles("batch/gallery/gallery.css", "viewer/mixer/mixer.css"),
         script=bundled("batch/gallery/gallery.js"),
@@ -113,14 +113,14 @@ def counts_text(rows: Sequence[SummaryRow]) -> str:
 
 
 def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
-    """Return small pictures side by side with their names, (H, W, 3) uint8; of very many
-    the first.
+    """Return small pictures side by side with their names, (H, W, 3) uint8.
+    Only the first MAX_PICTURES are drawn.
     """
-    shown = rows[:MAX_PICTURES]
-    columns = max(1, min(COLUMNS, len(shown)))
-    height = max([round(WIDTH * row.size[1] / row.size[0]) for row in shown], default=WIDTH)
+    pictured = rows[:MAX_PICTURES]
+    columns = max(1, min(COLUMNS, len(pictured)))
+    height = max([round(WIDTH * row.size[1] / row.size[0]) for row in pictured], default=WIDTH)
     height = min(height, 2 * WIDTH)
-    count = -(-len(shown) // columns)
+    count = -(-len(pictured) // columns)
     size = (
         columns * (WIDTH + GAP) + GAP,
         count * (height + CAPTION_HEIGHT + GAP) + 2 * GAP + CAPTION_HEIGHT,
@@ -131,7 +131,7 @@ def contact_sheet(folder: Path, rows: list[SummaryRow]) -> Any:
     if len(rows) > MAX_PICTURES:
         title += f"; the first {MAX_PICTURES} are shown"
     draw.text((GAP, GAP), shorten_to_width(title, font, size[0] - 2 * GAP), FAINT, font)
-    for k, row in enumerate(shown):
+    for k, row in enumerate(pictured):
         x = GAP + k % columns * (WIDTH + GAP)
         y = 2 * GAP + CAPTION_HEIGHT + k // columns * (height + CAPTION_HEIGHT + GAP)
         _draw(sheet, folder, row, (x, y, WIDTH, height), font)

@@ -14,7 +14,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.report.page.mixer import kelvin_colors, lighting_data, transform_data
 
-#: Mixers of a page, at most: each may be two megabytes. Lights of one that have sliders.
+#: Most mixers of a page (each may take two megabytes), and most lights of a mixer with sliders.
 MAX_MIXERS, MAX_LIGHTS = 8, 40
 
 
@@ -23,20 +23,20 @@ def mixers_html(
 ) -> dict[str, str]:
     """Return the first mixers as sections of HTML, by their names.
 
-    folder: of the batch. rows: that can be mixed. bases: name of the planes of each, by its folder.
+    folder: of the batch. rows: candidates. bases: name of each row's planes, by the row's folder.
     """
-    found: dict[str, list[SummaryRow]] = {}
+    rows_by_basis: dict[str, list[SummaryRow]] = {}
     for row in rows:
         if row.lights and row.folder in bases:
-            found.setdefault(bases[row.folder], []).append(row)
-    made: dict[str, str] = {}
-    for name, its in found.items():
+            rows_by_basis.setdefault(bases[row.folder], []).append(row)
+    sections: dict[str, str] = {}
+    for name, basis_rows in rows_by_basis.items():
         record = read_planes(folder / THUMBNAILS / f"{name}{SUFFIX}")
-        if len(made) < MAX_MIXERS and record:
-            # A file that is damaged costs the mixer, and not the gallery.
+        if len(sections) < MAX_MIXERS and record:
+            # A damaged file costs its mixer, but not the gallery.
             with suppress(LightpaintError, AttributeError, LookupError, TypeError, ValueError):
-                made[name] = _mixer(folder, name, record, its)
-    return made
+                sections[name] = _mixer(folder, name, record, basis_rows)
+    return sections
 
 
 def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> str:
@@ -64,7 +64,7 @@ def _mixer(folder: Path, name: str, record: Mapping[str, Any], rows: Sequence[Su
 
 
 def _strongest_lights(record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> list[int]:
-    """Return the lights that deserve sliders, by their index in the basis; of few lights all."""
+    """Return the lights that get sliders, by their index in the basis; all, if they are few."""
     names = [light["name"] for light in record["lights"]]
     if len(names) <= MAX_LIGHTS:
         return list(range(len(names)))
@@ -79,14 +79,14 @@ def _strongest_lights(record: Mapping[str, Any], rows: Sequence[SummaryRow]) -> 
 
 def transforms_of(rows: Sequence[SummaryRow]) -> dict[str, Any]:
     """Return the looks' view transforms by name; the exposure belongs to each look."""
-    made = {"srgb": transform_data(ViewTransform())}
+    transforms = {"srgb": transform_data(ViewTransform())}
     for name in dict.fromkeys(row.view[0] for row in rows if row.view):
         with suppress(LightpaintError):
-            made.setdefault(name, transform_data(ViewTransform(name)))
-    return made
+            transforms.setdefault(name, transform_data(ViewTransform(name)))
+    return transforms
 
 
 def script_json(record: Any) -> str:
-    """Return JSON for a script element, where nothing is escaped and only `<` can end it."""
+    """Return JSON for a script element, which only `<` can end, and which allows no escapes."""
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")

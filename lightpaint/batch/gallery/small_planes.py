@@ -1,4 +1,4 @@
-"""Small planes of a basis, kept beside the looks, once for all of them.
+"""Small planes of a basis, kept beside the looks and shared by all of them.
 
 The gallery's mixer uses them when the basis is gone.
 """
@@ -25,17 +25,17 @@ from lightpaint.report.page.mixer import light_data, planes_for_page
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 
-#: Suffix of their names.
+#: Suffix of the files' names.
 SUFFIX = ".planes.json"
 
-#: Longest that is read, in bytes.
+#: Longest file that is read, in bytes.
 MAX_BYTES = 2**27
 
 
 def planes_name(folder: Path, key: str) -> str:
-    """Return the name of a basis' small planes in the folder of a batch. key: as of `bases_of`.
+    """Return the name of a basis' small planes in the folder of a batch. key: of `bases_of`.
 
-    Paths count from the folder, so that a batch that is moved with its files finds its own.
+    Paths are relative to the folder, so that a batch finds its planes after a move with its files.
     """
     base = os.path.realpath(folder)
     record = json.dumps(_relative_paths(json.loads(key), base))
@@ -43,7 +43,7 @@ def planes_name(folder: Path, key: str) -> str:
 
 
 def write_planes(folder: Path, key: str, basis: Basis) -> None:
-    """Write a basis' small planes for the gallery in `folder`, unless they are there."""
+    """Write a basis' small planes for the gallery in `folder`, unless they exist."""
     path = folder / THUMBNAILS / f"{planes_name(folder, key)}{SUFFIX}"
     identity = _identity(basis)
     if read_planes(path).get("identity") == identity:
@@ -68,32 +68,32 @@ def write_planes(folder: Path, key: str, basis: Basis) -> None:
 def write_task_planes(
     folder: Path, task: Task, obtained: Sequence[Basis], cache: WorkerCache
 ) -> None:
-    """Write the small planes of a task's bases. obtained: bases that are no files already."""
+    """Write the small planes of a task's bases. obtained: those that were not read from files."""
     bases = list(obtained)
     if not bases:
-        given = content(job_fields(task, cache)["basis"])
-        bases = [given.basis if isinstance(given, LightGroups) else given]
+        source = content(job_fields(task, cache)["basis"])
+        bases = [source.basis if isinstance(source, LightGroups) else source]
     for key, basis in zip(task.bases, bases, strict=True):
         write_planes(folder, key, basis)
 
 
 def read_planes(path: Path) -> dict[str, Any]:
-    """Return what `write_planes` wrote; {} where nothing can be read."""
+    """Return the record that `write_planes` wrote; {} if it cannot be read."""
     with suppress(LightpaintError, ValueError):
         record = strict_json(read_text(path, "planes", LightpaintError, limit=MAX_BYTES))
         return record if isinstance(record, dict) else {}
     return {}
 
 
-def drop_planes(folder: Path, kept: Collection[str]) -> None:
-    """Delete small planes that no look uses. kept: names."""
+def drop_planes(folder: Path, used_names: Collection[str]) -> None:
+    """Delete small planes that no look uses. used_names: of the others."""
     for path in (folder / THUMBNAILS).glob(f"*{SUFFIX}"):
-        if path.name.removesuffix(SUFFIX) not in kept:
+        if path.name.removesuffix(SUFFIX) not in used_names:
             path.unlink(missing_ok=True)
 
 
 def _identity(basis: Basis) -> str:
-    """Return a hash of all that is shown of a basis: equal hashes, equal samples."""
+    """Return a hash of everything that is shown of a basis: equal hashes mean equal samples."""
     lights = [(light.name, light.unit, list(light.emission)) for light in basis.lights]
     record = [__version__, basis.origin.scene_identity, basis.origin.halves, lights]
     text = json.dumps([*record, basis.totals.tolist()], default=str)

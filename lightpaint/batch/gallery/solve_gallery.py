@@ -20,8 +20,8 @@ from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
 def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookEntry:
     """Return a gallery's entry for a look.
 
-    It was solved by `job` or, where there is a `folder`, derived from its answer. variation: its
-    word.
+    `job` solved the look or, if `folder` is given, the look was derived from the job's answer.
+    variation: its word.
     """
     scenes = tuple(scene for scene in job.scenes if isinstance(scene, SceneFile))
     basis = job.basis if isinstance(job.basis, BasisFile | GroupsFile) else None
@@ -41,7 +41,7 @@ def write_solve_gallery(
 ) -> list[SummaryRow]:
     """Write the gallery of the looks in `folder`, by the names of their folders there.
 
-    failed: reasons by name. bases: of their views, which all looks share.
+    failed: reasons by name. bases: one for each view, shared by all looks.
     """
     looks, lines = [], {}
     keys = tuple(json.dumps({"view": k}) for k in range(len(bases)))
@@ -52,9 +52,9 @@ def write_solve_gallery(
         made_of = "" if name in failed else _content(folder / name / "lighting.json")
         step = PlanStep(Task(name, "answer", "", bases=keys), made_of, True)
         looks.append(PlannedLook(entry, folder / name, (step,)))
-        its: tuple[str, Kind] = (name, "answer")
+        line_key: tuple[str, Kind] = (name, "answer")
         state = "failed" if name in failed else "done"
-        lines[its] = JournalLine(name, "answer", state, made_of, failed.get(name, ""))  # type: ignore[arg-type]
+        lines[line_key] = JournalLine(name, "answer", state, made_of, failed.get(name, ""))  # type: ignore[arg-type]
     names = frozenset(entry.name for entry in entries)
     plan = Plan(Path(folder.resolve().name), folder, tuple(looks), {}, names)
     return write_gallery(folder, plan, lines)

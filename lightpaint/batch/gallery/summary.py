@@ -33,8 +33,8 @@ from lightpaint.relit.export.exports import plain_cell
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__
 
-#: Pixels of a picture in the gallery from left to right, at most: of a few looks, which are
-#: compared as large as a window, and of more of them; quality of its JPEG.
+#: Greatest width of a gallery picture in pixels: WIDE for at most WIDE_LOOKS looks, which are
+#: compared as large as a window, else NARROW; and the quality of its JPEG.
 WIDE, WIDE_LOOKS, NARROW, QUALITY = 960, 64, 320, 82
 
 #: Columns of summary.csv before those of the lights.
@@ -76,8 +76,8 @@ class LightRow:
 class SummaryRow:
     """A look, or one view of it.
 
-    folder: of its results, relative to the batch's. delta_e, noise, share_met: as of report.json;
-    None where nothing was painted. agrees: whether a render confirms it; None where there was none.
+    folder: of its results, relative to the batch's. delta_e, noise, share_met: as in report.json;
+    None if nothing was painted. agrees: whether a render confirms it; None if there was none.
     files: to open. picture: small, relative to the batch's folder; "" where there is none.
     """
 
@@ -106,20 +106,20 @@ def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[S
     widest = WIDE if len(plan.looks) <= WIDE_LOOKS else NARROW
     views: dict[str, tuple[str, float] | None] = {}
     for look in plan.looks:
-        state, why = state_of(look, lines)
+        state, reason = state_of(look, lines)
         for folder in view_folders(look):
-            row = _row(plan, look, folder, state, why)
-            # What was made of others is shown as they are.
-            like = row.view or next((views[x] for x in look.entry.of if views.get(x)), None)
-            views.setdefault(look.entry.name, like)
+            row = _row(plan, look, folder, state, reason)
+            # A look that combines others is shown through their view transform.
+            view = row.view or next((views[x] for x in look.entry.of if views.get(x)), None)
+            views.setdefault(look.entry.name, view)
             if state == "done":
-                row = _with_picture(row, plan.folder, folder, like, _key(look, lines), widest)
+                row = _with_picture(row, plan.folder, folder, view, _key(look, lines), widest)
             rows.append(row)
     return rows
 
 
 def state_of(look: PlannedLook, lines: Mapping[tuple[str, Kind], JournalLine]) -> tuple[State, str]:
-    """Return whether all steps are done as they are requested now; and why not."""
+    """Return whether all steps are done as they are requested now, and why one failed."""
     state: State = "done"
     for step in look.steps:
         line = lines.get((step.task.look, step.task.kind))
@@ -141,7 +141,7 @@ def view_folders(look: PlannedLook) -> list[Path]:
     return [look.folder / str(scene.sensor) for scene in look.entry.scenes]
 
 
-def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) -> SummaryRow:
+def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, reason: str) -> SummaryRow:
     entry, report = look.entry, {}
     if state == "done":
         report = _json(folder / "report.json")
@@ -152,13 +152,13 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) ->
     scene = entry.scenes[0].path if entry.scenes else entry.basis.path if entry.basis else ""
     names = ("report.html", "comparison.png", "relit.png", "relit.exr", "lighting.json")
     places = dict.fromkeys((folder, look.folder))
-    there = [place / x for place in places for x in names if (place / x).is_file()]
+    result_files = [place / x for place in places for x in names if (place / x).is_file()]
     if any(step.task.kind == "export" for step in look.steps):
-        there += sorted(x for x in (look.folder / EXPORT).glob("*") if x.name != RECORD)
+        result_files += sorted(x for x in (look.folder / EXPORT).glob("*") if x.name != RECORD)
     return SummaryRow(
         entry.name,
         state,
-        why,
+        reason,
         folder.relative_to(plan.folder).as_posix(),
         sensor,
         Path(scene).name,
@@ -170,7 +170,9 @@ def _row(plan: Plan, look: PlannedLook, folder: Path, state: State, why: str) ->
         (report.get("verification") or {}).get("agrees"),
         (view["name"], view["stops"]) if "name" in view else None,
         _lights(look.folder, report) if state == "done" else (),
-        tuple(x.relative_to(plan.folder).as_posix() for x in there) if state == "done" else (),
+        tuple(x.relative_to(plan.folder).as_posix() for x in result_files)
+        if state == "done"
+        else (),
     )
 
 
@@ -179,16 +181,16 @@ def _lights(folder: Path, report: Mapping[str, Any]) -> tuple[LightRow, ...]:
         lighting = read_lighting(folder / "lighting.json")
         rows = []
         for light in lighting.lights:
-            seen = lighting.photometry(light)
+            measures = lighting.photometry(light)
             stops = (report.get("lights") or {}).get(light.name, {}).get("stops")
-            values = (light.emission, seen.hex, seen.kelvin, seen.duv, stops)
-            rows.append(LightRow(light.name, seen.y, *values))
+            values = (light.emission, measures.hex, measures.kelvin, measures.duv, stops)
+            rows.append(LightRow(light.name, measures.y, *values))
         return tuple(rows)
     return ()
 
 
 def _json(path: Path) -> dict[str, Any]:
-    """Return the object in a JSON file; {} where there is none, or another kind of value."""
+    """Return the object in a JSON file; {} if there is none, or a value that is no object."""
     with suppress(LightpaintError, ValueError):
         report = strict_json(read_text(path, "report", LightpaintError))
         return report if isinstance(report, dict) else {}
@@ -198,8 +200,8 @@ def _json(path: Path) -> dict[str, Any]:
 def _with_picture(
     row: SummaryRow, base: Path, folder: Path, view: tuple[str, float] | None, key: str, widest: int
 ) -> SummaryRow:
-    """Return the row with a picture of the prediction, made once for each answer. widest: in
-    pixels.
+    """Return the row with a picture of the prediction, which is made once for each answer.
+    widest: width limit in pixels.
     """
     of_view = f"-{folder.name}" if row.folder != row.look else ""
     name = f"{THUMBNAILS}/{key}{of_view}-{widest}.jpg"
@@ -212,17 +214,17 @@ def _with_picture(
                 small = denoised(small)
             stops = choose_exposure(predicted.image)
             transform = ViewTransform(*view) if view else ViewTransform("srgb", stops)
-            with replacing(path) as beside:
-                shown = Image.fromarray(to_8_bit(np.clip(transform.encode(small), 0, 1)))
+            with replacing(path) as temporary:
+                picture = Image.fromarray(to_8_bit(np.clip(transform.encode(small), 0, 1)))
                 options = {"quality": QUALITY, "subsampling": 0}
-                shown.save(
-                    beside, "JPEG", **options, comment=f"{transform.name} {transform.stops!r}"
+                picture.save(
+                    temporary, "JPEG", **options, comment=f"{transform.name} {transform.stops!r}"
                 )
         with Image.open(path) as opened:
             size, comment = opened.size, opened.info.get("comment", b"").decode()
-        # What it is seen through, chosen here or not, a mixer needs as well.
-        seen, _, stops = comment.partition(" ")
-        view = (seen, float(stops)) if stops else view
+        # A mixer needs the view transform as well, whether or not it was chosen here.
+        transform_name, _, stops = comment.partition(" ")
+        view = (transform_name, float(stops)) if stops else view
         return SummaryRow(**{**vars(row), "picture": name, "size": size, "view": view})
     return row
 
@@ -240,9 +242,9 @@ def _is_whole(path: Path) -> bool:
 
 def drop_pictures(folder: Path, rows: Iterable[SummaryRow]) -> None:
     """Delete small pictures of earlier answers."""
-    kept = {row.picture for row in rows}
+    used_names = {row.picture for row in rows}
     for path in (folder / THUMBNAILS).glob("*.jpg"):
-        if f"{THUMBNAILS}/{path.name}" not in kept:
+        if f"{THUMBNAILS}/{path.name}" not in used_names:
             path.unlink(missing_ok=True)
 
 
@@ -261,8 +263,8 @@ def summary_json(rows: Iterable[SummaryRow]) -> str:
 def summary_csv(rows: list[SummaryRow]) -> str:
     """Return summary.csv: a line for each row, and five columns for each light.
 
-    These are the luminance of its emission, under its name, that in R, G and B, and its colour
-    temperature in kelvin, where it has one.
+    These are the luminance of its emission, under its name, the emission in R, G and B, and its
+    colour temperature in kelvin, if it has one.
     """
     names = list(dict.fromkeys(light.name for row in rows for light in row.lights))
     text = io.StringIO()

@@ -21,7 +21,7 @@ from lightpaint.relit.export.usd import check_usd
 from lightpaint.relit.export_forms import FORMS
 from lightpaint.screen import some_names
 
-#: Default steps of a look; and of a given lighting, or a frame.
+#: Default steps of a look that is solved, and of a given lighting or a frame.
 SOLVE_STEPS, GIVEN_LIGHTING_STEPS = ("solve", "predict", "verify", "report"), ("predict",)
 
 #: Keys that stand for a scene that is already rendered.
@@ -33,65 +33,65 @@ CONSTRAINT_KEYS = ("light", "tie", "prefer_current", "sparse")
 
 def check_combination(mistakes: Mistakes, table: Table) -> None:
     """Add keys that are missing or contradict each other to the mistakes."""
-    where, look = table.where, table.values
+    label, look = table.where, table.values
     subjects = subject_keys(look)
     if not table.has(*SUBJECT_KEYS):
         mistakes.add(
-            where, "nothing to show: give painting, paintings, views, lighting or lightings"
+            label, "nothing to show: give painting, paintings, views, lighting or lightings"
         )
     elif len(subjects) > 1:
-        mistakes.add(where, f"{' and '.join(subjects)} at once: give one of them")
-    given = [key for key in BASES if key in look]
+        mistakes.add(label, f"{' and '.join(subjects)} at once: give one of them")
+    basis_keys = [key for key in BASES if key in look]
     if not table.has("scene", *BASES):
-        mistakes.add(where, "no scene and no basis: give one, here or in [defaults]")
-    elif len(given) > 1 or ("scene" in look and "light_groups" in look):
-        mistakes.add(where, "light_groups stand for scene and basis: give them alone")
+        mistakes.add(label, "no scene and no basis: give one, here or in [defaults]")
+    elif len(basis_keys) > 1 or ("scene" in look and "light_groups" in look):
+        mistakes.add(label, "light_groups stand for scene and basis: give them alone")
     if "pattern" in look and not table.has("light_groups"):
-        mistakes.add(where, "pattern is of light_groups: leave it out, or give them")
+        mistakes.add(label, "pattern is of light_groups: leave it out, or give them")
     several = "views" in look or "sensors" in look
     if "sensor" in look and "sensors" in look:
-        mistakes.add(where, "sensor and sensors at once: give one of them")
+        mistakes.add(label, "sensor and sensors at once: give one of them")
     elif "views" in look and ("sensor" in look or "sensors" in look):
-        mistakes.add(where, "views name their sensors: leave sensor and sensors out")
-    elif several and given:
-        mistakes.add(where, "a basis has only one view: give the scene to solve for several")
-    elif given and not table.has("scene"):
-        _check_basis_keys(mistakes, where, look)
+        mistakes.add(label, "views name their sensors: leave sensor and sensors out")
+    elif several and basis_keys:
+        mistakes.add(label, "a basis has only one view: give the scene to solve for several")
+    elif basis_keys and not table.has("scene"):
+        _check_basis_keys(mistakes, label, look)
     want, is_given = look.get("want", ()), "lighting" in look or "lightings" in look
     if is_given and (idle := [x for x in ("solve", "verify", "report", "lights") if x in want]):
-        mistakes.add(where, f"want has {idle[0]!r}, and its lighting is given: leave it out")
+        mistakes.add(label, f"want has {idle[0]!r}, and its lighting is given: leave it out")
     elif "lights" in want:
         check_by_sums(mistakes, table)
     if is_given and (idle := [word for word in look.get("variations", ()) if word in SOLVED_WORDS]):
-        mistakes.add(where, f"variations has {idle[0]!r}, and its lighting is given")
+        mistakes.add(label, f"variations has {idle[0]!r}, and its lighting is given")
 
 
 def check_by_sums(mistakes: Mistakes, table: Table) -> None:
     """Add what contradicts a request for the lighting alone to the mistakes."""
-    where, look = table.where, table.values
+    label, look = table.where, table.values
     if len(look["want"]) > 1:
-        mistakes.add(where, "want has 'lights', which is the lighting alone: leave the rest out")
+        mistakes.add(label, "want has 'lights', which is the lighting alone: leave the rest out")
     if "views" in look or "variations" in look:
-        mistakes.add(where, "want has 'lights', which is of one view, without variations")
+        mistakes.add(label, "want has 'lights', which is of one view, without variations")
     settings = look.get("settings", {})
     if settings.get("literal") is not True and "settings" not in table.unclear:
-        mistakes.add(where, "want has 'lights': settings need literal = true, or images are needed")
+        mistakes.add(label, "want has 'lights': settings need literal = true, or images are needed")
     for key in ("time_s", "noise_correction", "refine", "suggest"):
         if settings.get(key):
-            mistakes.add(where, f"want has 'lights', and {key} needs images: leave it out")
+            mistakes.add(label, f"want has 'lights', and {key} needs images: leave it out")
 
 
-def _check_basis_keys(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> None:
+def _check_basis_keys(mistakes: Mistakes, label: str, look: Mapping[str, Any]) -> None:
     """Add keys that a saved basis cannot use to the mistakes."""
     for step in ("verify", "render"):
         if step in look.get("want", ()):
-            mistakes.add(where, f"want has {step!r}, which needs the scene: give scene = ...")
+            mistakes.add(label, f"want has {step!r}, which needs the scene: give scene = ...")
     if idle := [key for key in SOURCE_KEYS if key in look and key not in (*BASES, "pattern")]:
-        mistakes.add(where, f"{some_names(idle)} cannot change a saved basis: leave it out")
+        mistakes.add(label, f"{some_names(idle)} cannot change a saved basis: leave it out")
 
 
 def check_step_tables(mistakes: Mistakes, table: Table) -> None:
-    """Add a [render] or [export] table whose step is not wanted to the mistakes."""
+    """Add a [render] or [export] table whose step `want` lacks to the mistakes."""
     for step in ("render", "export"):
         if (
             step in table.values
@@ -103,128 +103,126 @@ def check_step_tables(mistakes: Mistakes, table: Table) -> None:
             )
 
 
-def check_handover(mistakes: Mistakes, where: str, requests: Handover, entry: Any) -> None:
+def check_handover(mistakes: Mistakes, label: str, handover: Handover, entry: Any) -> None:
     """Add exports that a look cannot have to the mistakes. entry: one of its looks."""
     has_groups = isinstance(entry.basis, GroupsFile)
-    for form in requests.to:
+    for form in handover.to:
         if FORMS[form][has_groups] is None:
             needed = "light groups" if form == "nuke" else "a scene, and no light groups"
-            mistakes.add(f"{where}, export", f"{form!r} is of {needed}: leave it out")
+            mistakes.add(f"{label}, export", f"{form!r} is of {needed}: leave it out")
         elif not has_groups and not entry.scenes and form not in ("csv", "json"):
-            mistakes.add(f"{where}, export", f"{form!r} needs the scene: give scene = ...")
-    if requests.stage and "usd" in requests.to and not Path(requests.stage).is_file():
-        mistakes.add(f"{where}, export", f"stage: no such file: {requests.stage}")
-    elif "usd" in requests.to:
+            mistakes.add(f"{label}, export", f"{form!r} needs the scene: give scene = ...")
+    if handover.stage and "usd" in handover.to and not Path(handover.stage).is_file():
+        mistakes.add(f"{label}, export", f"stage: no such file: {handover.stage}")
+    elif "usd" in handover.to:
         try:
             check_usd()
         except LightpaintError as error:
-            mistakes.add(f"{where}, export", str(error))
+            mistakes.add(f"{label}, export", str(error))
 
 
 def check_sequence(mistakes: Mistakes, table: Table) -> None:
-    """Add what keeps a sequence from its frames to the mistakes: it needs looks, or a path of
-    sensors.
-    """
-    where, values = table.where, table.values
+    """Add a sequence's errors to the mistakes: it needs looks and frames, or a path of sensors."""
+    label, values = table.where, table.values
     path, frames = values.get("sensors"), values.get("frames")
     lacking = [key for key in ("name", "through") if not table.has(key)]
     lacking += ["frames"] if not table.has("frames", "sensors") else []
     if lacking:
-        mistakes.add(where, f"{lacking[0]} is missing: give name, through and frames (or sensors)")
+        mistakes.add(label, f"{lacking[0]} is missing: give name, through and frames (or sensors)")
     if "name" in values and not is_name(values["name"]):
-        mistakes.add(where, f"{values['name']!r} is no name for a folder: say name = ...")
+        mistakes.add(label, f"{values['name']!r} is no name for a folder: say name = ...")
     if len(values.get("through", "..")) < 2 and not table.has("sensors"):
-        mistakes.add(where, f"through is {values['through']}: expected at least two names of looks")
+        mistakes.add(label, f"through is {values['through']}: expected at least two names of looks")
     if path is not None and frames not in (None, len(path)):
-        mistakes.add(where, f"{frames} frames of {len(path)} sensors: leave frames out")
+        mistakes.add(label, f"{frames} frames of {len(path)} sensors: leave frames out")
     elif path is not None and len(path) < 2:
-        mistakes.add(where, "sensors has one: a path goes through two or more")
+        mistakes.add(label, "sensors has one: a path goes through two or more")
 
 
-def settings_of(mistakes: Mistakes, where: str, look: Mapping[str, Any]) -> Settings:
-    values = mistakes.settings(look.get("settings", {}), where)
+def settings_of(mistakes: Mistakes, label: str, look: Mapping[str, Any]) -> Settings:
+    values = mistakes.settings(look.get("settings", {}), label)
     want = look.get("want", SOLVE_STEPS)
     return Settings(**values, verify="verify" in want, report="report" in want)
 
 
-def constraints_of(manifest: Manifest, where: str, look: Mapping[str, Any]) -> Constraints:
+def constraints_of(manifest: Manifest, label: str, look: Mapping[str, Any]) -> Constraints:
     """Return the constraints of tables and files; later ones override earlier ones."""
-    requests, mistakes = Constraints(), manifest.mistakes
-    for given in look["constraints"]:
+    constraints, mistakes = Constraints(), manifest.mistakes
+    for source in look["constraints"]:
         try:
-            if isinstance(given, str):
-                requests = requests.and_then(read_constraints(manifest.folder / given))
+            if isinstance(source, str):
+                constraints = constraints.and_then(read_constraints(manifest.folder / source))
             else:
-                requests = requests.and_then(_constraints(mistakes, f"{where}, constraints", given))
+                constraints = constraints.and_then(
+                    _constraints(mistakes, f"{label}, constraints", source)
+                )
         except LightpaintError as error:
-            mistakes.add(f"{where}, constraints", str(error))
-    return requests
+            mistakes.add(f"{label}, constraints", str(error))
+    return constraints
 
 
-def _constraints(mistakes: Mistakes, where: str, given: Mapping[str, Any]) -> Constraints:
+def _constraints(mistakes: Mistakes, label: str, table: Mapping[str, Any]) -> Constraints:
     """Return the constraints of a table; errors are added light by light and key by key."""
-    values = {key: value for key, value in given.items() if key in CONSTRAINT_KEYS}
-    for key in (key for key in given if key not in values):
+    values = {key: value for key, value in table.items() if key in CONSTRAINT_KEYS}
+    for key in (key for key in table if key not in values):
         near = near_key(key, CONSTRAINT_KEYS)
         hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(CONSTRAINT_KEYS)}"
-        mistakes.add(where, f"unknown key {key!r}{hint}")
+        mistakes.add(label, f"unknown key {key!r}{hint}")
     lights = values.pop("light", None)
     if isinstance(lights, dict):
         lights = {
-            name: requests
-            for name, requests in lights.items()
-            if _is_light(mistakes, where, name, requests)
+            name: values_of_light
+            for name, values_of_light in lights.items()
+            if _is_light(mistakes, label, name, values_of_light)
         }
     for key, value in list(values.items()):
-        if not _is_valid(mistakes, where, **{key: value}):
+        if not _is_valid(mistakes, label, **{key: value}):
             del values[key]
     return Constraints.of(lights, **values)
 
 
-def _is_light(mistakes: Mistakes, where: str, name: str, requests: Any) -> bool:
-    """Return whether a light's constraints are valid; each key by itself, and then together."""
-    # A Duv alone says nothing.
-    each = requests if isinstance(requests, dict) else {}
-    lock_folder = [{name: {key: value}} for key, value in each.items() if key != "duv"]
-    wrong = [one for one in lock_folder if not _is_valid(mistakes, where, light=one)]
-    return not wrong and _is_valid(mistakes, where, light={name: requests})
+def _is_light(mistakes: Mistakes, label: str, name: str, values: Any) -> bool:
+    """Return whether a light's constraints are valid: each key by itself, then all together."""
+    # A Duv alone is incomplete.
+    fields = values if isinstance(values, dict) else {}
+    single_keys = [{name: {key: value}} for key, value in fields.items() if key != "duv"]
+    wrong = [single for single in single_keys if not _is_valid(mistakes, label, light=single)]
+    return not wrong and _is_valid(mistakes, label, light={name: values})
 
 
-def _is_valid(mistakes: Mistakes, where: str, **requests: Any) -> bool:
+def _is_valid(mistakes: Mistakes, label: str, **arguments: Any) -> bool:
     try:
-        Constraints.of(**requests)
+        Constraints.of(**arguments)
     except LightpaintError as error:
-        mistakes.add(where, str(error))
+        mistakes.add(label, str(error))
         return False
     return True
 
 
 def check_files(manifest: Manifest, table: Table) -> None:
-    """Add files that do not exist to the mistakes, so that a misspelt name fails now and not at
-    midnight.
-    """
-    where, look = table.where, table.values
+    """Add files that do not exist to the mistakes, so that a misspelt name fails at once."""
+    label, look = table.where, table.values
     groups = look.get("light_groups")
     if groups is not None and not (manifest.folder / groups).exists():
-        manifest.mistakes.add(where, f"light_groups: no such file or folder: {groups}")
+        manifest.mistakes.add(label, f"light_groups: no such file or folder: {groups}")
     for key in ("scene", "basis", "mask", "lights_file"):
         if key in look and not (manifest.folder / look[key]).is_file():
-            manifest.mistakes.add(where, f"{key}: no such file: {look[key]}")
+            manifest.mistakes.add(label, f"{key}: no such file: {look[key]}")
     if "template" in look and not (manifest.folder / look["template"]).is_dir():
-        manifest.mistakes.add(where, f"template: no such folder: {look['template']}")
+        manifest.mistakes.add(label, f"template: no such folder: {look['template']}")
     for key in ("painting", "lighting"):
-        given = [look[key]] if key in look else look.get(f"{key}s", [])
-        for path in given:
+        patterns = [look[key]] if key in look else look.get(f"{key}s", [])
+        for path in patterns:
             if not matching(manifest.folder, path):
-                manifest.mistakes.add(where, f"{key}: no such file: {path}")
+                manifest.mistakes.add(label, f"{key}: no such file: {path}")
     for sensor, path in look.get("views", {}).items():
         if not (manifest.folder / path).is_file():
-            manifest.mistakes.add(where, f"views.{sensor}: no such file: {path}")
+            manifest.mistakes.add(label, f"views.{sensor}: no such file: {path}")
 
 
 def matching(base: Path, path: str) -> list[str]:
     """Return the files that a path or a pattern names, in the order of their names."""
-    given = str(base / path)
-    if not has_magic(path) or Path(given).is_file():
-        return [given] if Path(given).is_file() else []
+    full_path = str(base / path)
+    if not has_magic(path) or Path(full_path).is_file():
+        return [full_path] if Path(full_path).is_file() else []
     return sorted(files_matching(path, base))

@@ -44,10 +44,10 @@ MAX_LOOKS = 10_000
 class LookEntry:
     """A look with all its inputs and options.
 
-    name: of its folder. where: its name in errors. scenes, basis: that it is lit in. paintings: of
-    each view; none where a lighting is given. variation: the word by which it varies another.
-    lighting: a file with the lighting. of: names of looks whose lightings it combines; share,
-    space: between two of them. want: steps.
+    name: of its folder. where: its name in errors. scenes, basis: to light. paintings: one for each
+    view; none if a lighting is given. variation: its word, if it varies another look. lighting: a
+    file with the lighting. of: names of looks whose lightings it combines; share, space: between
+    two of them. want: steps.
     """
 
     name: str
@@ -69,12 +69,12 @@ class LookEntry:
 
     @property
     def is_solved(self) -> bool:
-        """True if its lighting is solved for, and not given or combined."""
+        """True if its lighting is solved for, not given or combined."""
         return bool(self.paintings)
 
     @property
     def is_by_sums(self) -> bool:
-        """True if only its lighting is wanted, which needs no pictures."""
+        """True if only its lighting is requested, which needs no pictures."""
         return self.want == ("lights",)
 
 
@@ -82,8 +82,8 @@ class LookEntry:
 class LookEntries:
     """Looks of all tables.
 
-    complete: those that can be planned, in their order. incomplete: of each table with mistakes,
-    the scenes, constraints and settings that can be checked all the same, without a painting.
+    complete: those that can be planned, in their order. incomplete: for each table with mistakes,
+    the scenes, constraints and settings that can still be checked without a painting.
     """
 
     complete: list[LookEntry] = field(default_factory=list)
@@ -91,11 +91,11 @@ class LookEntries:
 
 
 def looks_of(manifest: Manifest) -> LookEntries:
-    """Return the looks of all tables; errors are added to the mistakes."""
+    """Return the looks of all tables, and add errors to the mistakes."""
     sources, looks = _Sources(manifest), LookEntries()
     for table in manifest.looks:
-        made, entry = _table_looks(manifest, sources, table)
-        looks.complete.extend(made)
+        table_looks, entry = _table_looks(manifest, sources, table)
+        looks.complete.extend(table_looks)
         if len(looks.complete) > MAX_LOOKS:
             raise BatchError(
                 f"{manifest.path} asks for more than {MAX_LOOKS} looks: make several batches of it"
@@ -106,7 +106,7 @@ def looks_of(manifest: Manifest) -> LookEntries:
 
 
 class _Sources:
-    """Scenes and bases, equal ones shared, so that each is loaded once."""
+    """Scenes and bases; equal ones are shared, so that each is loaded once."""
 
     def __init__(self, manifest: Manifest) -> None:
         self._base = manifest.folder
@@ -121,63 +121,65 @@ class _Sources:
         if "lights_file" in values:
             values["lights_file"] = str(self._base / values["lights_file"])
         values["parameters"] = {k: str(v) for k, v in values.get("parameters", {}).items()}
-        made = SceneFile(path, **{**values, "sensor": sensor})
-        return self._scenes.setdefault(repr(made), made)
+        file = SceneFile(path, **{**values, "sensor": sensor})
+        return self._scenes.setdefault(repr(file), file)
 
     def basis(self, look: Mapping[str, Any]) -> BasisFile | GroupsFile | None:
-        made: BasisFile | GroupsFile
+        file: BasisFile | GroupsFile
         if "light_groups" in look:
-            # In a folder of them may lie what is painted with.
+            # The folder of light groups may hold paintings and masks as well.
             pictures = [look[key] for key in ("painting", "mask") if key in look]
             pictures += look.get("paintings", [])
-            aside = [x for path in pictures for x in matching(self._base, path)]
+            painted_files = [x for path in pictures for x in matching(self._base, path)]
             path = str(self._base / look["light_groups"])
-            leave_out = tuple(aside) if Path(path).is_dir() else ()
-            made = GroupsFile(path, look.get("pattern"), leave_out)
+            leave_out = tuple(painted_files) if Path(path).is_dir() else ()
+            file = GroupsFile(path, look.get("pattern"), leave_out)
         elif "basis" in look:
-            made = BasisFile(str(self._base / look["basis"]))
+            file = BasisFile(str(self._base / look["basis"]))
         else:
             return None
-        return self._bases.setdefault(repr(made), made)
+        return self._bases.setdefault(repr(file), file)
 
 
 def _table_looks(
     manifest: Manifest, sources: _Sources, table: Table
 ) -> tuple[list[LookEntry], LookEntry | None]:
-    """Return the looks of one table; or, of one with mistakes, the part that is clear."""
-    mistakes, where, look = manifest.mistakes, table.where, table.values
-    before = len(mistakes.lines)
+    """Return the looks of one table or, if it has mistakes, the part of it that is clear."""
+    mistakes, label, look = manifest.mistakes, table.where, table.values
+    mistakes_before = len(mistakes.lines)
     check_combination(mistakes, table)
     check_files(manifest, table)
     check_step_tables(mistakes, table)
     is_given = table.has("lighting", "lightings")
     entry = LookEntry(
         look.get("name", ""),
-        where,
-        constraints=constraints_of(manifest, where, look),
-        settings=settings_of(mistakes, where, look),
+        label,
+        constraints=constraints_of(manifest, label, look),
+        settings=settings_of(mistakes, label, look),
         want=tuple(look.get("want", GIVEN_LIGHTING_STEPS if is_given else SOLVE_STEPS)),
-        final=mistakes.final(look.get("render", {}), where),
-        handover=mistakes.handover(look.get("export", {}), where, manifest.folder),
+        final=mistakes.final(look.get("render", {}), label),
+        handover=mistakes.handover(look.get("export", {}), label, manifest.folder),
     )
-    made: list[LookEntry] = []
+    expanded: list[LookEntry] = []
     try:
-        _painting(manifest, look, "")  # its view is looked at, whatever else is wrong
-        if len(mistakes.lines) == before and not table.unclear:
+        _painting(manifest, look, "")  # checks the view transform, whatever else is wrong
+        if len(mistakes.lines) == mistakes_before and not table.unclear:
             entry = replace(entry, basis=sources.basis(look))
-            made = list(islice(_subject_looks(manifest, sources, entry, look), MAX_LOOKS + 1))
-            made += [_variation_entry(x, word) for word in look.get("variations", ()) for x in made]
+            expanded = list(islice(_subject_looks(manifest, sources, entry, look), MAX_LOOKS + 1))
+            expanded += [
+                _variation_entry(x, word) for word in look.get("variations", ()) for x in expanded
+            ]
     except LightpaintError as error:
-        mistakes.add(where, str(error))
-    shown = made[0] if made else _partial_entry(manifest, sources, table, entry)
-    if "export" in entry.want and (shown.scenes or shown.basis):
-        check_handover(mistakes, where, entry.handover, shown)
-    for name in {one.name for one in made} or {entry.name} - {""}:
+        mistakes.add(label, str(error))
+    example = expanded[0] if expanded else _partial_entry(manifest, sources, table, entry)
+    if "export" in entry.want and (example.scenes or example.basis):
+        check_handover(mistakes, label, entry.handover, example)
+    for name in {one.name for one in expanded} or {entry.name} - {""}:
         if not is_name(name):
-            mistakes.add(where, f"{name!r} is no name for a folder: say name = ...")
-    if len(mistakes.lines) == before and not table.unclear:
-        return made, None
-    return [], shown
+            mistakes.add(label, f"{name!r} is no name for a folder: say name = ...")
+    if len(mistakes.lines) == mistakes_before and not table.unclear:
+        return expanded, None
+    return [], example
 
 
 def _partial_entry(
@@ -185,15 +187,15 @@ def _partial_entry(
 ) -> LookEntry:
     """Return the scenes and the basis of a table with mistakes, as far as they are known."""
     look, base = table.values, manifest.folder
-    # Another sensor, or none, is as good to look at the lights of a scene.
+    # Any sensor, or none, will do to check the lights of a scene.
     if table.unclear & (set(SOURCE_KEYS) - {"sensor", "sensors"}):
         return entry
     if "scene" in look and (base / look["scene"]).is_file():
         sensors = [*look.get("views", ()), *look.get("sensors", ())]
         sensors += [look["sensor"]] if "sensor" in look else []
         return replace(entry, scenes=tuple(sources.scene(look, x) for x in sensors or [None]))
-    named = [look[key] for key in BASES if key in look]
-    if len(named) == 1 and (base / named[0]).exists():
+    paths = [look[key] for key in BASES if key in look]
+    if len(paths) == 1 and (base / paths[0]).exists():
         return replace(entry, basis=sources.basis(look))
     return entry
 
@@ -215,11 +217,11 @@ def _subject_looks(
         )
         return
     key = "lighting" if "lighting" in look or "lightings" in look else "painting"
-    given = [look[key]] if key in look else look[f"{key}s"]
+    patterns = [look[key]] if key in look else look[f"{key}s"]
     is_one = key in look and not has_magic(look[key])
     sensors: Sequence[Any] = look.get("sensors") or [look.get("sensor")]
-    for file in (file for path in given for file in matching(manifest.folder, path)):
-        # Answers are all called lighting.json, and go by their folders.
+    for file in (file for path in patterns for file in matching(manifest.folder, path)):
+        # Answers are all called lighting.json: their folders tell them apart.
         stem = Path(file).parent.name if Path(file).name == "lighting.json" else Path(file).stem
         name = look.get("name", "")
         name = (name or stem) if is_one else f"{name}-{stem}" if name else stem
@@ -246,16 +248,16 @@ def _painting(manifest: Manifest, look: Mapping[str, Any], file: str) -> Paintin
 
 def _variation_entry(entry: LookEntry, word: str) -> LookEntry:
     """Return a variation of a look: solved with other settings, or derived from its answer."""
-    named = replace(entry, name=f"{entry.name}-{word.replace(' ', '-')}", variation=word)
+    variation = replace(entry, name=f"{entry.name}-{word.replace(' ', '-')}", variation=word)
     if word not in SHIFTED_WORDS:
         if not entry.is_solved:
             raise LightpaintError(f"variations has {word!r}, and its lighting is given")
-        return named
+        return variation
     return replace(
-        named, paintings=(), lighting="", of=(entry.name,), want=_lighting_steps(entry.want)
+        variation, paintings=(), lighting="", of=(entry.name,), want=_lighting_steps(entry.want)
     )
 
 
 def _lighting_steps(want: Sequence[str]) -> tuple[str, ...]:
-    """Return the wanted steps that apply to a lighting that is combined from others."""
+    """Return the requested steps that apply to a lighting that is combined from others."""
     return tuple(step for step in want if step in LIGHTING_STEPS) or GIVEN_LIGHTING_STEPS

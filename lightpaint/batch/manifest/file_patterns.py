@@ -1,6 +1,6 @@
 """The files that a pattern of a manifest names, found within bounds.
 
-A pattern may name any folder, and one that names the root would visit every file of the machine.
+A pattern may name any folder; without bounds, one at the root would visit every file.
 """
 
 import os
@@ -13,25 +13,27 @@ from re import Pattern, compile
 
 from lightpaint.errors import BatchError
 
-#: Files and folders that one pattern may visit, and the depth of `**`.
+#: Most files and folders that one pattern may visit, and the greatest depth of `**`.
 MAX_VISITED, MAX_DEPTH = 20_000, 32
 
 
 def files_matching(pattern: str, base: Path = Path()) -> list[str]:
-    """Return the files that a pattern names, relative to a folder, each once, in no order.
+    """Return the files that match a pattern, relative to a folder, each once, in no order.
 
-    `*`, `?` and `[...]` stand for characters of a name, and `**` for folders; neither for a name
-    that begins with a dot, nor `**` for a link; in `base` they are themselves. Raises BatchError
-    where there is too much to look at.
+    `*`, `?` and `[...]` match characters of a name, and `**` matches folders; neither matches a
+    name that begins with a dot, and `**` follows no links. In `base` they stand for themselves.
+    Raises BatchError if there are too many files to visit.
     """
     parts = Path(pattern).parts
     fixed = next(k for k, part in enumerate(parts) if has_magic(part))
-    # Several in a row say no more than one.
+    # Several `**` in a row mean the same as one.
     whole = parts[fixed:]
-    rest = [x for k, x in enumerate(whole) if x != "**" or whole[max(k - 1, 0) : k] != ("**",)]
+    pattern_parts = [
+        x for k, x in enumerate(whole) if x != "**" or whole[max(k - 1, 0) : k] != ("**",)
+    ]
     start = os.path.join("" if base == Path() else base, *parts[:fixed])
-    found = dict.fromkeys(_Search(pattern).walk(start, tuple(rest), 0))
-    return [path for path in found if os.path.isfile(path)]
+    paths = dict.fromkeys(_Search(pattern).walk(start, tuple(pattern_parts), 0))
+    return [path for path in paths if os.path.isfile(path)]
 
 
 class _Search:
@@ -46,25 +48,25 @@ class _Search:
         if (folder, len(parts)) in self._visited:
             return
         self._visited.add((folder, len(parts)))
-        first, *others = parts
-        rest = tuple(others)
+        first, *remaining_list = parts
+        remaining = tuple(remaining_list)
         if first == "**":
-            if rest:
-                yield from self.walk(folder, rest, depth)
+            if remaining:
+                yield from self.walk(folder, remaining, depth)
             for name, is_folder in self._list_folder(folder):
                 path = os.path.join(folder, name)
                 if name.startswith("."):
                     continue
-                if not rest:
+                if not remaining:
                     yield path
                 if is_folder and depth < MAX_DEPTH:
                     yield from self.walk(path, parts, depth + 1)
         elif not has_magic(first):
             path = os.path.join(folder, first)
-            if not rest:
+            if not remaining:
                 yield path
             elif os.path.isdir(path):
-                yield from self.walk(path, rest, depth)
+                yield from self.walk(path, remaining, depth)
         else:
             for name, _ in self._list_folder(folder):
                 if not _regex(first).match(name):
@@ -72,14 +74,14 @@ class _Search:
                 if name.startswith(".") and not first.startswith("."):
                     continue
                 path = os.path.join(folder, name)
-                if not rest:
+                if not remaining:
                     yield path
                 elif os.path.isdir(path):
-                    yield from self.walk(path, rest, depth)
+                    yield from self.walk(path, remaining, depth)
 
     def _list_folder(self, folder: str) -> list[tuple[str, bool]]:
-        """Return names in a folder, and which are folders; none where it cannot be read."""
-        found = []
+        """Return the names in a folder, and which are folders; none if it cannot be read."""
+        listing = []
         try:
             with os.scandir(folder or ".") as entries:
                 for entry in entries:
@@ -89,10 +91,10 @@ class _Search:
                             f"the pattern {self._pattern!r} has more than {MAX_VISITED} files "
                             "to look at: name a folder nearer to them"
                         )
-                    found.append((entry.name, entry.is_dir(follow_symlinks=False)))
+                    listing.append((entry.name, entry.is_dir(follow_symlinks=False)))
         except OSError:
             return []
-        return found
+        return listing
 
 
 @cache

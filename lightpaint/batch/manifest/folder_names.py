@@ -23,14 +23,14 @@ THUMBNAILS = "thumbnails"
 
 
 def folded(name: str) -> str:
-    """Return what two names have in common that some disks take for one: Mac's and Windows'."""
+    """Return the form that two names share if macOS or Windows takes them for the same file."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 
 def is_reserved(name: str) -> bool:
-    """Return whether a look of that name would lie where the batch writes files of its own.
+    """Return whether the batch reserves a name for its own files.
 
-    Hidden names are the batch's, too: a file that is being written, and the cache of a farm.
+    Hidden names are reserved, too: for files that are being written, and for the cache of a farm.
     """
     name = folded(name)
     if name.startswith(JOURNAL_PART) and name.endswith(".jsonl"):
@@ -39,9 +39,9 @@ def is_reserved(name: str) -> bool:
 
 
 def name_clashes(names: Iterable[str]) -> list[list[str]]:
-    """Return the names that some disks take for one, together, each once; [] where there are none.
+    """Return groups of names that some disks take for the same, each name once.
 
-    A name that stands twice clashes with itself, and is a list of one.
+    A name that occurs twice clashes with itself, and is a group of one.
     """
     alike: dict[str, list[str]] = {}
     for name in names:
@@ -50,12 +50,12 @@ def name_clashes(names: Iterable[str]) -> list[list[str]]:
 
 
 def check_gallery(folder: Path, *, force: bool = False) -> None:
-    """Raise OutputError where a gallery would take the place of somebody else's files."""
-    there = [folder / name for name in FILES if (folder / name).exists()]
-    if there and not force and not _is_summary(folder / SUMMARY):
+    """Raise OutputError if a gallery would replace files that no batch has written."""
+    existing = [folder / name for name in FILES if (folder / name).exists()]
+    if existing and not force and not _is_summary(folder / SUMMARY):
         raise OutputError(
-            f"{there[0]} is there, and of no batch: name another folder (folder=...), or replace "
-            "it (force=True)"
+            f"{existing[0]} is there, and of no batch: name another folder (folder=...), or "
+            "replace it (force=True)"
         )
 
 

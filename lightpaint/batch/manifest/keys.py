@@ -21,7 +21,7 @@ Step = Literal["solve", "predict", "verify", "report", "render", "export", "ligh
 #: Steps of a given lighting.
 LIGHTING_STEPS: tuple[Step, ...] = ("predict", "render", "export")
 
-#: Scale in which a sequence is even: stops of brightness, or perceived lightness and colour.
+#: Scale in which a sequence has even steps: stops of brightness, or perceived colour.
 Space = Literal["log", "oklab"]
 
 #: Frames of one sequence, at most.
@@ -47,12 +47,12 @@ def _is_number(value: Any) -> bool:
 
 
 def _some_of(words: Iterable[str]) -> Check:
-    known = tuple(words)
+    allowed = tuple(words)
 
     def fits(value: Any) -> bool:
-        return _texts(value) and set(value) <= set(known) and len(set(value)) == len(value)
+        return _texts(value) and set(value) <= set(allowed) and len(set(value)) == len(value)
 
-    return fits, f"a list of some of {', '.join(map(repr, known))}, each once"
+    return fits, f"a list of some of {', '.join(map(repr, allowed))}, each once"
 
 
 TEXT: Check = (lambda value: isinstance(value, str) and value != "", "a text")
@@ -136,8 +136,8 @@ SETTINGS = tuple(
 
 @dataclass(frozen=True)
 class Final:
-    """Options of a final render. spp: samples per pixel, by default the scene's. resolution: of the
-    film.
+    """Options of a final render.
+    spp: samples per pixel, by default the scene's. resolution: of the film.
     """
 
     spp: int | None = None
@@ -150,9 +150,7 @@ FINAL_KEYS: dict[str, Check] = {"spp": whole(2, MAX_SPP), "resolution": TEXT, "s
 
 @dataclass(frozen=True)
 class Handover:
-    """Exports for other programs. to: forms, as of `lightpaint export`. stage: path of a
-    USD stage.
-    """
+    """Exports for other programs. to: forms of `lightpaint export`. stage: path of a USD stage."""
 
     to: tuple[str, ...] = ("csv", "json")
     stage: str = ""
@@ -163,76 +161,76 @@ HANDOVER_KEYS: dict[str, Check] = {"to": _some_of(FORMS), "stage": TEXT}
 
 @dataclass
 class Mistakes:
-    """Errors in a manifest, one line each, as they are found."""
+    """Errors in a manifest, one line each, in the order they are found."""
 
     source: str
     lines: list[str] = field(default_factory=list)
 
-    def add(self, where: str, text: str) -> None:
-        """Add an error. where: the look and the key; "" for the manifest as a whole."""
-        line = one_line(f"{self.source}: {where}{': ' if where else ''}{text}", limit=1000)
+    def add(self, label: str, text: str) -> None:
+        """Add an error. label: the look and the key; "" for the manifest as a whole."""
+        line = one_line(f"{self.source}: {label}{': ' if label else ''}{text}", limit=1000)
         if line not in self.lines:
             self.lines.append(line)
 
     def check_keys(
-        self, given: Mapping[str, Any], known: Mapping[str, Check], where: str
+        self, table: Mapping[str, Any], keys: Mapping[str, Check], label: str
     ) -> set[str]:
-        """Return the keys of `given` with valid values; errors in others are added."""
-        right = set()
-        for key, value in given.items():
-            if key not in known:
-                near = near_key(key, known)
-                hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(known)}"
-                self.add(where, f"unknown key {key!r}{hint}")
+        """Return the keys of `table` with valid values, and add errors in the others."""
+        valid = set()
+        for key, value in table.items():
+            if key not in keys:
+                near = near_key(key, keys)
+                hint = f": did you mean {near!r}?" if near else f"; known are {', '.join(keys)}"
+                self.add(label, f"unknown key {key!r}{hint}")
                 continue
-            fits, words = known[key]
+            fits, words = keys[key]
             if fits(value):
-                right.add(key)
+                valid.add(key)
             else:
-                self.add(where, f"{key} is {one_line(repr(value), limit=120)}: expected {words}")
-        return right
+                self.add(label, f"{key} is {one_line(repr(value), limit=120)}: expected {words}")
+        return valid
 
     def unclear_keys(
-        self, given: Mapping[str, Any], known: Mapping[str, Check], right: Collection[str]
+        self, table: Mapping[str, Any], keys: Mapping[str, Check], valid: Collection[str]
     ) -> frozenset[str]:
-        """Return the keys that were meant where `given` is wrong. right: as of `check_keys`."""
-        wrong = [key for key in given if key not in right]
-        return frozenset(key if key in known else near_key(key, known) for key in wrong) - {""}
+        """Return the known keys that misspelt or wrong ones stand for. valid: of `check_keys`."""
+        wrong = [key for key in table if key not in valid]
+        return frozenset(key if key in keys else near_key(key, keys) for key in wrong) - {""}
 
-    def settings(self, given: Mapping[str, Any], where: str) -> dict[str, Any]:
+    def settings(self, table: Mapping[str, Any], label: str) -> dict[str, Any]:
         """Return the valid settings of a table, by name."""
-        known = {name: Settings.expected[name] for name in SETTINGS}
-        right = self.check_keys(given, known, f"{where}, settings")
-        values = {name: value for name, value in given.items() if name in right}
+        keys = {name: Settings.expected[name] for name in SETTINGS}
+        valid = self.check_keys(table, keys, f"{label}, settings")
+        values = {name: value for name, value in table.items() if name in valid}
         try:
             Settings(**values)
         except LightpaintError as error:
-            self.add(f"{where}, settings", str(error))
+            self.add(f"{label}, settings", str(error))
             return {}
         return values
 
-    def final(self, given: Mapping[str, Any], where: str) -> Final:
+    def final(self, table: Mapping[str, Any], label: str) -> Final:
         """Return the final render of a table."""
-        right = self.check_keys(given, FINAL_KEYS, f"{where}, render")
-        values = {name: value for name, value in given.items() if name in right}
+        valid = self.check_keys(table, FINAL_KEYS, f"{label}, render")
+        values = {name: value for name, value in table.items() if name in valid}
         try:
             if "resolution" in values:
                 check_resolution(values["resolution"])
         except LightpaintError as error:
-            self.add(f"{where}, render", str(error))
+            self.add(f"{label}, render", str(error))
             return Final()
         return Final(**values)
 
-    def handover(self, given: Mapping[str, Any], where: str, base: Path) -> Handover:
+    def handover(self, table: Mapping[str, Any], label: str, base: Path) -> Handover:
         """Return the exports of a table. base: folder that its paths are relative to."""
-        right = self.check_keys(given, HANDOVER_KEYS, f"{where}, export")
-        values = {name: value for name, value in given.items() if name in right}
-        made = Handover(tuple(values.get("to", Handover.to)), values.get("stage", ""))
-        if made.stage and "usd" not in made.to:
-            self.add(f"{where}, export", "stage is of the form 'usd': add that, or leave it out")
-        return replace(made, stage=str(base / made.stage) if made.stage else "")
+        valid = self.check_keys(table, HANDOVER_KEYS, f"{label}, export")
+        values = {name: value for name, value in table.items() if name in valid}
+        request = Handover(tuple(values.get("to", Handover.to)), values.get("stage", ""))
+        if request.stage and "usd" not in request.to:
+            self.add(f"{label}, export", "stage is of the form 'usd': add that, or leave it out")
+        return replace(request, stage=str(base / request.stage) if request.stage else "")
 
 
-def near_key(key: str, known: Iterable[str]) -> str:
+def near_key(key: str, keys: Iterable[str]) -> str:
     """Return the known key that a misspelt one probably stands for; "" where none is near."""
-    return next(iter(difflib.get_close_matches(key, list(known), 1)), "")
+    return next(iter(difflib.get_close_matches(key, list(keys), 1)), "")

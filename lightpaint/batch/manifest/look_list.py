@@ -20,7 +20,7 @@ from lightpaint.screen import some_names
 
 
 def entries_of(manifest: Manifest) -> LookEntries:
-    """Return all looks in the order of the manifest; errors are added to its mistakes."""
+    """Return all looks in the order of the manifest, and add errors to its mistakes."""
     looks = looks_of(manifest)
     for table in manifest.sequences:
         looks.complete.extend(_sequence_looks(manifest, looks, table))
@@ -29,8 +29,8 @@ def entries_of(manifest: Manifest) -> LookEntries:
                 f"{manifest.path} asks for more than {MAX_LOOKS} looks and {MAX_FRAMES} frames: "
                 "make several batches of it"
             )
-    named = [entry for _, entry in looks.incomplete if entry.name]
-    _check_names(manifest, [*looks.complete, *named])
+    named_entries = [entry for _, entry in looks.incomplete if entry.name]
+    _check_names(manifest, [*looks.complete, *named_entries])
     return looks
 
 
@@ -44,7 +44,7 @@ def _check_names(manifest: Manifest, looks: Sequence[LookEntry]) -> None:
                 "say name = ...",
             )
     for same in name_clashes(look.name for look in looks):
-        wheres = some_names(dict.fromkeys(x.where for x in looks if x.name in same), " and ")
+        labels = some_names(dict.fromkeys(x.where for x in looks if x.name in same), " and ")
         names = " and ".join(map(repr, same))
         text = f"more than one look would be called {names}: say name = ... in one of them"
         if len(same) > 1:
@@ -52,51 +52,51 @@ def _check_names(manifest: Manifest, looks: Sequence[LookEntry]) -> None:
                 f"{names} would be one folder on disks that do not tell case: say name = ... "
                 "in one of them"
             )
-        manifest.mistakes.add(wheres, text)
+        manifest.mistakes.add(labels, text)
 
 
 def _sequence_looks(manifest: Manifest, looks: LookEntries, table: Table) -> list[LookEntry]:
-    """Return a look for each frame; none of a sequence with mistakes."""
-    mistakes, where, values = manifest.mistakes, table.where, table.values
+    """Return a look for each frame; none if the sequence has mistakes."""
+    mistakes, label, values = manifest.mistakes, table.where, table.values
     by_name = {look.name: look for look in looks.complete}
     before = len(mistakes.lines)
     check_sequence(mistakes, table)
     check_step_tables(mistakes, table)
-    final = mistakes.final(values.get("render", {}), where)
-    handover = mistakes.handover(values.get("export", {}), where, manifest.folder)
+    final = mistakes.final(values.get("render", {}), label)
+    handover = mistakes.handover(values.get("export", {}), label, manifest.folder)
     ends = [by_name[name] for name in values.get("through", ()) if name in by_name]
     for name in (name for name in values.get("through", ()) if name not in by_name):
         if not any(_may_become(name, entry) for _, entry in looks.incomplete):
-            mistakes.add(where, f"through: no look is called {name!r}")
+            mistakes.add(label, f"through: no look is called {name!r}")
     if ends:
-        _check_ends(mistakes, where, ends, values)
+        _check_ends(mistakes, label, ends, values)
     if len(mistakes.lines) > before or table.unclear or len(ends) < len(values["through"]):
         return []
     want = tuple(values.get("want", GIVEN_LIGHTING_STEPS))
     options: dict[str, Any] = {"want": want, "final": final, "handover": handover}
-    made = [replace(frame, where=where, **options) for frame in _frames(values, ends)]
+    looks_of_frames = [replace(frame, where=label, **options) for frame in _frames(values, ends)]
     if "render" in want and not ends[0].scenes:
-        mistakes.add(where, "want has 'render', which needs the scene of its looks")
+        mistakes.add(label, "want has 'render', which needs the scene of its looks")
     if "export" in want:
-        check_handover(mistakes, where, handover, made[0])
-    return made
+        check_handover(mistakes, label, handover, looks_of_frames[0])
+    return looks_of_frames
 
 
 def _check_ends(
-    mistakes: Mistakes, where: str, ends: Sequence[LookEntry], values: Mapping[str, Any]
+    mistakes: Mistakes, label: str, ends: Sequence[LookEntry], values: Mapping[str, Any]
 ) -> None:
-    """Add what keeps looks from being the ends of a sequence to the mistakes."""
+    """Add reasons why looks cannot be the ends of a sequence to the mistakes."""
     path = values.get("sensors")
     if any(_view_key(end, path) != _view_key(ends[0], path) for end in ends):
-        mistakes.add(where, "through: its looks are of different scenes, sensors or bases")
+        mistakes.add(label, "through: its looks are of different scenes, sensors or bases")
     elif path and not ends[0].scenes:
-        mistakes.add(where, "sensors: its looks are of no scene, which other sensors could see")
+        mistakes.add(label, "sensors: its looks are of no scene, which other sensors could see")
     elif not path and any(end.by_sensor for end in ends):
-        mistakes.add(where, "through: a look of several views has no one picture: take single ones")
+        mistakes.add(label, "through: a look of several views has no one picture: take single ones")
 
 
 def _may_become(name: str, entry: LookEntry) -> bool:
-    """Return whether a table might make a look of that name without its mistakes."""
+    """Return whether a table would expand to a look of that name if its mistakes were mended."""
     if not entry.name:
         return True
     return name == entry.name or name.startswith(f"{entry.name}-")
@@ -125,8 +125,8 @@ def _frames(values: Mapping[str, Any], ends: Sequence[LookEntry]) -> Iterator[Lo
 
 
 def _view_key(entry: LookEntry, path: Sequence[str] | None) -> tuple[Any, ...]:
-    """Return what the looks of one sequence must share. path: of sensors, which replace
-    their own.
+    """Return the inputs that all looks of a sequence must share.
+    path: sensors that replace the looks' own.
     """
     if path:
         return tuple(replace(scene, sensor=None) for scene in entry.scenes[:1]), entry.basis

@@ -19,7 +19,7 @@ from lightpaint.files import one_line
 from lightpaint.storage.json_records import strict_toml
 from lightpaint.validation import Check, a
 
-#: Longest manifest that is read, in bytes; and its tables.
+#: Longest manifest that is read, in bytes.
 MAX_BYTES = 2**22
 
 TABLES: Mapping[str, Check] = {
@@ -31,7 +31,7 @@ TABLES: Mapping[str, Check] = {
 #: Tables whose keys in a look are merged with the defaults.
 MERGED_TABLES = ("settings", "parameters", "render", "export")
 
-#: Groups of keys of which a look's own replace all defaults.
+#: Groups of keys: if a look has any key of a group, it replaces all defaults of that group.
 SOURCE_GROUPS = ("scene", "basis", "light_groups", "pattern"), ("sensor", "sensors")
 
 
@@ -48,7 +48,7 @@ class Table:
     unclear: frozenset[str] = frozenset()
 
     def has(self, *keys: str) -> bool:
-        """Return whether any of these keys was given, whatever its value."""
+        """Return whether any of these keys is given, with a valid value or not."""
         return any(key in self.values or key in self.unclear for key in keys)
 
 
@@ -73,7 +73,7 @@ class Manifest:
 def read_manifest(path: str | Path) -> Manifest:
     """Read `looks.toml` (docs/batch.md).
 
-    Errors in keys and values are among its mistakes, and left out of its tables.
+    Wrong keys and values are recorded as mistakes and left out of the tables.
 
     Raises BatchError for a file that is not TOML.
     """
@@ -86,56 +86,56 @@ def read_manifest(path: str | Path) -> Manifest:
     mistakes = Mistakes(str(path))
     right = mistakes.check_keys(data, TABLES, "")
     unclear = mistakes.unclear_keys(data, TABLES, right)
-    if "defaults" in unclear:  # which may have had any of its keys
+    if "defaults" in unclear:  # it may have had any key
         defaults = Table("defaults", {}, frozenset(DEFAULT_KEYS))
     else:
         defaults = _table(data.get("defaults", {}), DEFAULT_KEYS, "defaults", mistakes)
         if (
             "settings" in defaults.values
-        ):  # said once, and not of each look that they are merged into
-            known = mistakes.settings(defaults.values["settings"], "defaults")
-            defaults = replace(defaults, values={**defaults.values, "settings": known})
+        ):  # reported once, not for each look that they are merged into
+            valid = mistakes.settings(defaults.values["settings"], "defaults")
+            defaults = replace(defaults, values={**defaults.values, "settings": valid})
     looks = _tables(data["look"] if "look" in right else [], LOOK_KEYS, "look", mistakes)
-    given = data["sequence"] if "sequence" in right else []
-    sequences = _tables(given, SEQUENCE_KEYS, "sequence", mistakes)
+    sequence_tables = data["sequence"] if "sequence" in right else []
+    sequences = _tables(sequence_tables, SEQUENCE_KEYS, "sequence", mistakes)
     if not data.get("look") and "look" not in unclear:
         mistakes.add("", "it has no look: begin one with [[look]]")
     return Manifest(path, tuple(_merge(defaults, x) for x in looks), tuple(sequences), mistakes)
 
 
 def _table(
-    given: Mapping[str, Any], known: Mapping[str, Check], where: str, mistakes: Mistakes
+    raw: Mapping[str, Any], keys: Mapping[str, Check], label: str, mistakes: Mistakes
 ) -> Table:
-    """Return a table's valid values; errors are added to the mistakes."""
-    right = mistakes.check_keys(given, known, where)
-    values = {key: value for key, value in given.items() if key in right}
-    return Table(where, values, mistakes.unclear_keys(given, known, right))
+    """Return a table's valid values, and add errors to the mistakes."""
+    right = mistakes.check_keys(raw, keys, label)
+    values = {key: value for key, value in raw.items() if key in right}
+    return Table(label, values, mistakes.unclear_keys(raw, keys, right))
 
 
 def _tables(
-    given: list[Any], known: Mapping[str, Check], what: str, mistakes: Mistakes
+    raw_tables: list[Any], keys: Mapping[str, Check], kind: str, mistakes: Mistakes
 ) -> list[Table]:
     """Return all tables of one kind."""
     tables = []
-    for k, table in enumerate(given, start=1):
-        where = f"{what} {k}"
+    for k, table in enumerate(raw_tables, start=1):
+        label = f"{kind} {k}"
         if not isinstance(table, dict):
-            mistakes.add(where, f"{one_line(repr(table))} is no table: write [[{what}]]")
+            mistakes.add(label, f"{one_line(repr(table))} is no table: write [[{kind}]]")
             continue
-        if called := _display_name(table):
-            where = f"{what} {called!r}"
-        tables.append(_table(table, known, where, mistakes))
+        if name := _display_name(table):
+            label = f"{kind} {name!r}"
+        tables.append(_table(table, keys, label, mistakes))
     return tables
 
 
 def _display_name(table: Mapping[str, Any]) -> str:
-    """Return the name of a look as it stands in the manifest; "" where it has none."""
-    named = (table.get(key) for key in ("name", "painting", "lighting"))
-    return next((name for name in named if isinstance(name, str) and name), "")
+    """Return the name of a look as the manifest gives it; "" if it has none."""
+    candidates = (table.get(key) for key in ("name", "painting", "lighting"))
+    return next((name for name in candidates if isinstance(name, str) and name), "")
 
 
 def _merge(defaults: Table, table: Table) -> Table:
-    """Return a look merged over the defaults; tables of values are merged key by key."""
+    """Return a look merged over the defaults, tables of values key by key."""
     values, look, unclear = dict(defaults.values), table.values, defaults.unclear
     for keys in SOURCE_GROUPS:
         if table.has(*keys):
@@ -148,8 +148,10 @@ def _merge(defaults: Table, table: Table) -> Table:
             value = [values[key], value]
         values[key] = value
     _drop_unused(values, look)
-    left = {key for key in unclear if key not in look or key in (*MERGED_TABLES, "constraints")}
-    return Table(table.where, {**values, **_as_list(values)}, table.unclear | left)
+    still_unclear = {
+        key for key in unclear if key not in look or key in (*MERGED_TABLES, "constraints")
+    }
+    return Table(table.where, {**values, **_as_list(values)}, table.unclear | still_unclear)
 
 
 def _drop_unused(values: dict[str, Any], look: Mapping[str, Any]) -> None:
@@ -164,7 +166,7 @@ def _drop_unused(values: dict[str, Any], look: Mapping[str, Any]) -> None:
 
 
 def _as_list(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return constraints as a list of all that were given, the defaults' first."""
+    """Return all given constraints as a list, the defaults' first."""
     requests = values.get("constraints", [])
     return {"constraints": requests if isinstance(requests, list) else [requests]}
 

@@ -1,4 +1,4 @@
-"""Interpolated lightings: the frames of a sequence, even in stops or in perceived colour."""
+"""Interpolation of lightings for the frames of a sequence, even in stops or perceived colour."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from lightpaint.colour.hue_names import WHITE_DUV
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting
 
-#: Stops below the brighter end at which a light that is off begins, or ends, in `log`.
+#: A light that is off begins or ends so many stops below the brighter end, in `log`.
 OFF_STOPS = 10.0
 
 #: Linear Rec.709 to cone responses, and their cube roots to Oklab (Ottosson 2020).
@@ -46,10 +46,10 @@ def frame_position(frame: int, frames: int, keys: int) -> tuple[int, float]:
 def interpolate(ends: Sequence[Lighting], share: float, *, space: Space) -> Lighting:
     """Return the lighting at `share`, 0 to 1, of the way from one to the other.
 
-    Raises LightingError if the two are not of the same lights.
+    Raises LightingError if the two have different lights.
     """
-    one, other = ends
-    if one.members != other.members or one.fixed != other.fixed:
+    first, second = ends
+    if first.members != second.members or first.fixed != second.fixed:
         raise LightingError(
             "the lightings of a sequence are of different lights, or of lights in other groups"
         )
@@ -58,48 +58,47 @@ def interpolate(ends: Sequence[Lighting], share: float, *, space: Space) -> Ligh
         light
         if light.is_fixed
         else with_emission(
-            light, mix(np.array(light.emission), np.array(other[light.name].emission), share)
+            light, mix(np.array(light.emission), np.array(second[light.name].emission), share)
         )
-        for light in one.lights
+        for light in first.lights
     )
-    return replace(one, lights=lights, certificate=None)
+    return replace(first, lights=lights, certificate=None)
 
 
-def _mix_in_stops(one: Doubles, other: Doubles, share: float) -> Doubles:
+def _mix_in_stops(first: Doubles, second: Doubles, share: float) -> Doubles:
     """Mix brightness evenly in stops, and colour evenly as perceived.
 
-    Channel by channel instead, a lamp would pass colours that are in neither end: from red to blue,
-    green. A light that is off, or OFF_STOPS below the other end, starts there, in the other's
-    colour.
+    Mixed channel by channel, a lamp would pass through colours of neither end: from red to blue
+    through green. A light that is off starts OFF_STOPS below the other end, in the other's colour.
     """
     if share in (0.0, 1.0):
-        return other if share else one
-    bright = [float(luminance(rgb)) for rgb in (one, other)]
+        return second if share else first
+    bright = [float(luminance(rgb)) for rgb in (first, second)]
     least = max(bright) * 2.0**-OFF_STOPS
     if least == 0:
         return np.zeros(3)
-    hues = [rgb / y for rgb, y in zip((one, other), bright, strict=True) if y > least]
+    hues = [rgb / y for rgb, y in zip((first, second), bright, strict=True) if y > least]
     y = max(bright[0], least) ** (1 - share) * max(bright[1], least) ** share
-    if len(hues) == 1 or np.ptp(one) == np.ptp(other) == 0:
+    if len(hues) == 1 or np.ptp(first) == np.ptp(second) == 0:
         return np.asarray(y * hues[0])
     return np.asarray(y * _mix_hues(hues[0], hues[1], share))
 
 
-def _mix_hues(one: Doubles, other: Doubles, share: float) -> Doubles:
+def _mix_hues(first: Doubles, second: Doubles, share: float) -> Doubles:
     """Return the colour, (3,) of luminance 1, at `share` between two of luminance 1.
 
-    Whites stay white: they follow the black bodies, evenly in mireds and Duv, where a straight line
-    from 2000 to 9000 K would be pink in the middle, at a Duv of -0.010. Other colours are mixed in
-    Oklab at equal lightness, which does not depend on how bright they are.
+    Whites stay white: they follow the black bodies, evenly in mireds and Duv. A straight line from
+    2000 to 9000 K would be pink in the middle, at a Duv of -0.010. Other colours are mixed in Oklab
+    at equal lightness, so that the mix does not depend on their brightness.
     """
-    whites = [cct_and_duv(rgb) for rgb in (one, other)]
+    whites = [cct_and_duv(rgb) for rgb in (first, second)]
     if all(white is not None and abs(white[1]) <= WHITE_DUV for white in whites):
         (kelvin, duv), (kelvin_, duv_) = whites  # type: ignore[misc]
         mired = (1 - share) * 1e6 / kelvin + share * 1e6 / kelvin_
         return kelvin_to_rgb(1e6 / mired, (1 - share) * duv + share * duv_)
-    ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (one, other)]
+    ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (first, second)]
     lab = (1 - share) * ends[0] / ends[0][0] + share * ends[1] / ends[1][0]
-    # Between two colours a lamp can have lies now and then one that it cannot.
+    # The mix of two colours that a lamp can have may lie outside its gamut.
     linear = np.maximum(_lab_to_linear(lab), 0.0)
     return np.asarray(linear / luminance(linear))
 
@@ -109,12 +108,12 @@ def _lab_to_linear(lab: Doubles) -> Doubles:
     return np.asarray(np.linalg.solve(TO_CONES, np.linalg.solve(TO_LAB, lab) ** 3))
 
 
-def _mix_in_oklab(one: Doubles, other: Doubles, share: float) -> Doubles:
+def _mix_in_oklab(first: Doubles, second: Doubles, share: float) -> Doubles:
     if share in (0.0, 1.0):
-        return other if share else one
-    if np.ptp(one) == np.ptp(other) == 0:  # as of what can only be dimmed: grey to the last bit
-        light = ((1 - share) * np.cbrt(one[0]) + share * np.cbrt(other[0])) ** 3
+        return second if share else first
+    if np.ptp(first) == np.ptp(second) == 0:  # a light that can only be dimmed stays exactly grey
+        light = ((1 - share) * np.cbrt(first[0]) + share * np.cbrt(second[0])) ** 3
         return np.full(3, light)
-    ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (one, other)]
+    ends = [TO_LAB @ np.cbrt(TO_CONES @ rgb) for rgb in (first, second)]
     lab = (1 - share) * ends[0] + share * ends[1]
     return np.maximum(_lab_to_linear(lab), 0.0)

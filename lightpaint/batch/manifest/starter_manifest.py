@@ -27,14 +27,14 @@ def write_starter_manifest(
 ) -> None:
     """Write a manifest to `path` with a look for each painting of one scene.
 
-    Raises BatchError without a painting, and for files that do not exist; OutputError for a
-    manifest that does.
+    Raises BatchError if there is no painting, or a file does not exist, and OutputError if the
+    manifest exists already.
     """
     if not paintings:
         raise BatchError("no painting to begin with: give the scene, then paintings")
-    for given in (scene, *paintings):
-        if not Path(given).is_file():
-            raise BatchError(f"no such file: {given}")
+    for file in (scene, *paintings):
+        if not Path(file).is_file():
+            raise BatchError(f"no such file: {file}")
     check_files([path], map(Path, (scene, *paintings)))
     if path.exists() and not force:
         raise OutputError(f"{path} is there: choose another name with folder=..., or force=True")

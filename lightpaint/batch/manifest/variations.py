@@ -1,4 +1,4 @@
-"""Named variations of a look: one word, and what it changes."""
+"""Named variations of a look: each word, and the settings that it changes."""
 
 from collections.abc import Collection, Iterable
 from dataclasses import replace
@@ -24,36 +24,36 @@ SHIFTED_WORDS = {"warmer": 60.0, "cooler": -60.0}
 
 VARIATIONS = (*SHIFTED_WORDS, *SOLVED_WORDS)
 
-#: Part of the lights that `fewer lights` leaves on, and how much harder `held harder` holds.
+#: Share of the lights that `fewer lights` leaves on, and the factor on hold of `held harder`.
 FEWER, HARDER = 0.5, 4.0
 
-#: Colour temperatures between which a light is shifted, in kelvin: below, lamps have no blue.
+#: Limits of a shifted colour temperature, in kelvin: below the lower, lamps have no blue.
 WARMEST, COOLEST = 2000.0, 15000.0
 
-#: Colour temperature of a colour that has none of its own, in kelvin.
+#: Colour temperature that is assumed for a colour without one, in kelvin.
 NEUTRAL = 6504.0
 
 
-def parse_variations(given: Iterable[str]) -> tuple[str, ...]:
+def parse_variations(names: Iterable[str]) -> tuple[str, ...]:
     """Return variations by their words, each once; hyphens may stand for spaces.
 
     Raises BatchError for an unknown word.
     """
-    words = dict.fromkeys(word.replace("-", " ") for word in given)
+    words = dict.fromkeys(word.replace("-", " ") for word in names)
     if unknown := [word for word in words if word not in VARIATIONS]:
-        known = ", ".join(word.replace(" ", "-") for word in VARIATIONS)
-        raise BatchError(f"there is no variation {unknown[0]!r}: known are {known}")
+        known_names = ", ".join(word.replace(" ", "-") for word in VARIATIONS)
+        raise BatchError(f"there is no variation {unknown[0]!r}: known are {known_names}")
     return tuple(words)
 
 
 def vary(
     word: str, settings: Settings, constraints: Constraints, lights: int
 ) -> tuple[Settings, Constraints]:
-    """Return the settings and constraints of a variation. lights: how many are adjusted."""
+    """Return the settings and constraints of a variation. lights: number of adjusted lights."""
     if word == "fewer lights":
-        few = max(1, ceil(FEWER * lights))
-        most = few if constraints.sparse is None else min(few, constraints.sparse)
-        return settings, replace(constraints, sparse=most)
+        limit = max(1, ceil(FEWER * lights))
+        sparse = limit if constraints.sparse is None else min(limit, constraints.sparse)
+        return settings, replace(constraints, sparse=sparse)
     if word == "white only":
         return replace(settings, colors="white"), constraints
     hold = HARDER * (DEFAULT_HOLD if not settings.hold else settings.hold)
@@ -63,7 +63,7 @@ def vary(
 def shift(lighting: Lighting, mireds: float, dimmer_lights: Collection[str] = ()) -> Lighting:
     """Return a lighting with every light warmer by `mireds`, at its luminance.
 
-    dimmed: names of lights that have a dimmer and no colour, and stay as they are.
+    dimmer_lights: names of lights that have a dimmer and no colour; they stay as they are.
     """
     lights = tuple(
         light if light.name in dimmer_lights else _shift_light(light, mireds)
@@ -92,10 +92,10 @@ def with_emission(
     light: LightSetting, emission: object, *, keeps_luminance: bool = False
 ) -> LightSetting:
     """Return `light` at another emission, without claims on its accuracy."""
-    given = np.asarray(emission, dtype=np.float64)
-    if keeps_luminance and (now := float(luminance(given))) > 0:
-        given = given * float(luminance(np.array(light.emission))) / now
-    rgb: RGB = (float(given[0]), float(given[1]), float(given[2]))
+    values = np.asarray(emission, dtype=np.float64)
+    if keeps_luminance and (current := float(luminance(values))) > 0:
+        values = values * float(luminance(np.array(light.emission))) / current
+    rgb: RGB = (float(values[0]), float(values[1]), float(values[2]))
     return replace(
         light,
         emission=rgb,

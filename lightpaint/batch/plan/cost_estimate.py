@@ -1,7 +1,7 @@
 """Estimates of a plan's time and memory, from constants that were measured.
 
-Looks by processor seconds in benchmarks/batch.py's own batches, some looks each on a machine that
-had other work: a rough guide.
+The seconds of looks are processor seconds of the batches in benchmarks/batch.py, a few looks each,
+on a machine that had other work: they are a rough guide.
 """
 
 from collections.abc import Iterable
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook
 from lightpaint.batch.work.render_cost import SAMPLE_S, render_seconds
 
-#: Seconds of a look: of any; of what is solved for each pixel, and for each pixel and light; and of
-#: a report for each pixel.
+#: Seconds of any look; of a solve, for each pixel, and for each pixel and light; and of a report,
+#: for each pixel.
 LOOK_S, PIXEL_S, PIXEL_LIGHT_S, REPORT_S = 0.07, 1.7e-6, 1.6e-7, 1.2e-5
 
 #: Assumed cost of a basis that is a file.
@@ -20,7 +20,7 @@ SAVED = Cost("", 12, (360, 640), 0, 0)
 
 @dataclass(frozen=True)
 class CostEstimate:
-    """Seconds for bases and for looks, final renders among them; bytes at the peak."""
+    """Seconds for bases and for looks, including final renders; memory: bytes at the peak."""
 
     bases_s: float
     looks_s: float
@@ -29,10 +29,10 @@ class CostEstimate:
 
 def estimate(plan: Plan) -> CostEstimate:
     """Estimate the rest of `plan`, if no basis is cached."""
-    left = [look for look in plan.chosen_looks if not look.failure and not look.is_done]
+    remaining = [look for look in plan.chosen_looks if not look.failure and not look.is_done]
     needed = dict.fromkeys(
         key
-        for look in left
+        for look in remaining
         for step in look.steps
         if not step.is_done
         for key in step.task.bases
@@ -41,7 +41,7 @@ def estimate(plan: Plan) -> CostEstimate:
     costs = [plan.costs[key] for key in needed]
     return CostEstimate(
         sum(render_seconds(cost.samples, cost.lights) for cost in costs),
-        sum(look_seconds(look, plan) for look in left),
+        sum(look_seconds(look, plan) for look in remaining),
         max((cost.memory for cost in costs), default=0),
     )
 

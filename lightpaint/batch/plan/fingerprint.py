@@ -1,4 +1,4 @@
-"""Fingerprints of results: a hash of the request, the content of its files, and our version."""
+"""Fingerprints of results: hashes of the request, the content of its files, and our version."""
 
 import hashlib
 import json
@@ -15,8 +15,8 @@ from lightpaint.version import __version__
 
 
 class Fingerprints:
-    """Fingerprints of one manifest's looks. Paths are relative to its folder, so that it may be
-    moved.
+    """Fingerprints of one manifest's looks.
+    Paths are relative to the manifest's folder, so that it may be moved.
     """
 
     def __init__(self, base: Path) -> None:
@@ -25,9 +25,9 @@ class Fingerprints:
         self._answers: dict[str, str] = {}
 
     def answer(self, entry: LookEntry, reads: Sequence[Path]) -> str:
-        """Return the fingerprint of an answer; looks that it combines come before it.
+        """Return the fingerprint of an answer; call this for the looks that it combines first.
 
-        reads: files whose content counts. Raises OutputError for one that cannot be read.
+        reads: files whose content counts. Raises OutputError if one cannot be read.
         """
         values = asdict(replace(entry, where="", want=(), final=Final(), handover=Handover()))
         made_of = [

@@ -1,8 +1,8 @@
-"""The journal of a batch: a line for each step, on the disk before the next begins.
+"""The journal of a batch: a line for each step, written to disk before the next step begins.
 
-A kill leaves all lines but maybe half of the last one, which is ignored. So is a line that a disk
-has damaged: its step is done again. The last line of each step counts. At the end of a run the file
-is rewritten, in the order of the looks, so that it does not show how often a batch was stopped.
+A kill can cut only the last line, and half a line is ignored. So is a line that the disk has
+damaged: its step is done again. The last line of each step counts. At the end of a run the file is
+rewritten in the order of the looks, so that it does not depend on how often the batch was stopped.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from lightpaint.file_reading import read_bytes
 from lightpaint.files import write_text
 from lightpaint.storage.json_records import read_record, strict_json
 
-#: Longest that is read, in bytes.
+#: Longest journal that is read, in bytes.
 MAX_BYTES = 2**28
 
 
@@ -38,8 +38,8 @@ class JournalLine:
 class Journal:
     """Journal of the batch in `folder`.
 
-    part: of several processes that share the folder, which part of the looks this one does: it
-    writes a file of its own, and reads those of all.
+    part: identifies this process's looks, if several processes share the folder. Each writes a file
+    of its own, and reads the files of all.
     """
 
     def __init__(self, folder: Path, part: str = "") -> None:
@@ -48,11 +48,13 @@ class Journal:
             name = hashlib.sha256(part.encode()).hexdigest()[:16]
             self._path = folder / f"{JOURNAL_PART}{name}.jsonl"
         read = {file: _read_journal(file) for file in [self._whole, *_parts(folder)]}
-        lines = (line for one in read.values() for line in one.lines)
+        lines = (line for file_content in read.values() for line in file_content.lines)
         self._lines = {(line.look, line.kind): line for line in lines}
-        self.remarks = tuple(one.remark(file) for file, one in read.items() if one.damaged)
+        self.remarks = tuple(
+            file_content.remark(file) for file, file_content in read.items() if file_content.damaged
+        )
         own = read.get(self._path, _JournalContent())
-        # Half of a line gives way to the next one; behind a line without its end goes the end.
+        # The next line overwrites half a line; a whole line without its newline gets one first.
         self._half, self._lacks_end = own.half, own.lacks_end
 
     @property
@@ -61,7 +63,7 @@ class Journal:
         return self._lines
 
     def add(self, line: JournalLine) -> None:
-        """Append a line durably. Raises OutputError where the disk does not take it."""
+        """Append a line durably. Raises OutputError if it cannot be written."""
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with self._path.open("ab") as file:
@@ -77,12 +79,12 @@ class Journal:
         self._lines[line.look, line.kind] = line
 
     def rewrite(self, steps: Iterable[tuple[str, Kind]]) -> None:
-        """Rewrite the file with the lines of these steps alone, in this order, parts included."""
-        kept = [self._lines[step] for step in steps if step in self._lines]
-        write_text(self._whole, "".join(map(_to_text, kept)))
+        """Rewrite the file with the lines of these steps alone, in this order, and merge parts."""
+        lines = [self._lines[step] for step in steps if step in self._lines]
+        write_text(self._whole, "".join(map(_to_text, lines)))
         for file in _parts(self._whole.parent):
             file.unlink(missing_ok=True)
-        self._lines = {(line.look, line.kind): line for line in kept}
+        self._lines = {(line.look, line.kind): line for line in lines}
         self._half, self._lacks_end = None, False
 
 
@@ -99,8 +101,8 @@ def _parts(folder: Path) -> list[Path]:
 class _JournalContent:
     """The content of a journal file.
 
-    damaged: number of unreadable lines. half: where in the file an incomplete line begins, if one
-    does. lacks_end: whether only the end of the last line is missing.
+    damaged: number of unreadable lines. half: offset at which an incomplete last line begins, if
+    there is one. lacks_end: whether the last line lacks only its newline.
     """
 
     lines: tuple[JournalLine, ...] = ()
@@ -109,24 +111,26 @@ class _JournalContent:
     lacks_end: bool = False
 
     def remark(self, path: Path) -> str:
-        """Return a remark on the damage, for people."""
+        """Return a remark on the damage for the user."""
         lines, they = ("a line", "its step") if self.damaged == 1 else ("lines", "their steps")
         count = "" if self.damaged == 1 else f"{self.damaged} "
         return f"{path} has {count}{lines} that cannot be read: {they} will be done again"
 
 
 def _read_journal(path: Path) -> _JournalContent:
-    """Return all whole lines. They are read one by one: damage in one costs no other."""
+    """Return all whole lines. Each is read by itself, so that damage in one costs no other."""
     if not path.exists():
         return _JournalContent()
     data = read_bytes(path, "journal", BatchError, limit=MAX_BYTES, may_be_empty=True)
     *rows, last = data.split(b"\n")
-    found = [_parse_line(row) for row in rows]
-    # Of the last one a kill may have left half, and its step is begun again anyway.
+    parsed = [_parse_line(row) for row in rows]
+    # A kill may have cut the last line; its step is begun again anyway.
     end = _parse_line(last)
     half = len(data) - len(last) if last and end is None else None
-    damaged = sum(line is None and bool(row.strip()) for row, line in zip(rows, found, strict=True))
-    return _JournalContent(tuple(x for x in (*found, end) if x), damaged, half, end is not None)
+    damaged = sum(
+        line is None and bool(row.strip()) for row, line in zip(rows, parsed, strict=True)
+    )
+    return _JournalContent(tuple(x for x in (*parsed, end) if x), damaged, half, end is not None)
 
 
 def _parse_line(row: bytes) -> JournalLine | None:

@@ -1,6 +1,4 @@
-"""All errors of a look that cannot be planned: each is checked by itself, so that none hides
-another.
-"""
+"""All errors of a look that cannot be planned, found one by one, so that none hides another."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -23,7 +21,7 @@ from lightpaint.scene.quality_presets import on_film
 def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> None:
     """Add errors in scene, sensors, settings and constraints, each checked alone, to the mistakes.
 
-    cache: scenes and bases that are already loaded. Errors that fail one look alone, as a basis
+    cache: scenes and bases that are already loaded. Errors that fail one look alone, like a basis
     that cannot be read, are no mistakes of the manifest.
     """
 
@@ -38,26 +36,26 @@ def collect_errors(entry: LookEntry, cache: WorkerCache, mistakes: Mistakes) -> 
 
     lights: Sequence[BasisLight] | None = None
     for scene in map(cache.scene, entry.scenes):
-        found = attempt(partial(content, scene))
-        if found is None:  # its lights are there through whichever sensor
+        loaded = attempt(partial(content, scene))
+        if loaded is None:  # the lights can be checked without a sensor
             plain = cache.scene(replace(scene, sensor=None))
-            found = attempt(partial(content, plain))
-        if found is None:
+            loaded = attempt(partial(content, plain))
+        if loaded is None:
             continue
-        lights = basis_lights(found)
-        attempt(partial(on_film, found, entry.settings.quality, entry.settings.resolution))
+        lights = basis_lights(loaded)
+        attempt(partial(on_film, loaded, entry.settings.quality, entry.settings.resolution))
         if "render" in entry.want:
-            attempt(partial(on_film, found, None, entry.final.resolution))
+            attempt(partial(on_film, loaded, None, entry.final.resolution))
     if entry.basis is not None:
         saved = cache.source(entry.basis.unread())
-        found = attempt(partial(content, saved))
-        if found is not None:
-            lights = found.basis.lights if isinstance(found, LightGroups) else found.lights
+        loaded = attempt(partial(content, saved))
+        if loaded is not None:
+            lights = loaded.basis.lights if isinstance(loaded, LightGroups) else loaded.lights
         if not entry.scenes:
             attempt(partial(check_nothing_unused, entry.settings, entry.basis))
     if lights is not None:
-        for one in _split_constraints(entry.constraints):
-            attempt(partial(reduce_to, one, lights))
+        for part in _split_constraints(entry.constraints):
+            attempt(partial(reduce_to, part, lights))
 
 
 def _split_constraints(constraints: Constraints) -> Iterator[Constraints]:

@@ -1,7 +1,7 @@
-"""A batch as a farm job: an Open Job Description template, which `openjd run` takes as it is.
+"""A batch as a farm job: an Open Job Description template, which `openjd run` accepts as it is.
 
-Its tasks are lightpaint commands that share the folder of the batch, and the cache: the first look
-of each basis renders it, the others find it there.
+Its tasks are lightpaint commands that share the folder of the batch and the cache. The first look
+of each basis renders it, and the others find it in the cache.
 """
 
 import json
@@ -18,18 +18,18 @@ from lightpaint.files import check_writable, write_text
 #: Name of the template in the folder of the job.
 TEMPLATE = "template.json"
 
-#: Values of one parameter of a step, and characters of a value, at most.
+#: Most values of one parameter of a step, and most characters of a value.
 MAX_VALUES, MAX_VALUE_LENGTH = 1024, 1024
 
 
-#: Parameter in the command of a task that stands for the pattern of its looks.
+#: Placeholder in the command of a task for the pattern of its looks.
 LOOK_PARAMETER = "{{Task.Param.Look}}"
 
 
 def write_openjd(folder: Path, plan: Plan, *, command: Sequence[str], force: bool = False) -> Path:
     """Write the template of `plan` to `folder`, and return its path.
 
-    command: words of the command that does the looks of one task, LOOK_PARAMETER among them.
+    command: words of the command that runs the looks of one task, including LOOK_PARAMETER.
     """
     check_writable(folder)
     path = folder / TEMPLATE
@@ -43,8 +43,8 @@ def write_openjd(folder: Path, plan: Plan, *, command: Sequence[str], force: boo
 def template_of(plan: Plan, folder: Path, command: Sequence[str]) -> dict[str, Any]:
     """Return the template, as plain values.
 
-    folder: of the template. Files in it are named relative to it, so that farms may send them with
-    the job; others by absolute paths, which all machines have to share. command: as of
+    folder: of the template. Paths of files in it are relative, so that farms may send the files
+    with the job; other paths are absolute, and all machines have to share them. command: see
     `write_openjd`.
     """
 
@@ -53,11 +53,11 @@ def template_of(plan: Plan, folder: Path, command: Sequence[str]) -> dict[str, A
     def path(default: Path, kind: str, flow: str, about: str) -> dict[str, Any]:
         file = default.resolve()
         if base not in (file, *file.parents):
-            # A path that leaves the folder of the job may not be its default.
+            # The default of a PATH parameter may not lie outside the folder of the job.
             return {"type": "STRING", "default": str(file), "description": about}
         inside = os.path.relpath(file, base)
-        how = {"type": "PATH", "objectType": kind, "dataFlow": flow, "default": inside}
-        return {**how, "description": about}
+        definition = {"type": "PATH", "objectType": kind, "dataFlow": flow, "default": inside}
+        return {**definition, "description": about}
 
     manifest = path(plan.manifest, "FILE", "IN", "The looks.")
     output = path(plan.folder, "DIRECTORY", "OUT", "Receives a folder for each look.")
@@ -80,7 +80,7 @@ def template_of(plan: Plan, folder: Path, command: Sequence[str]) -> dict[str, A
 
 
 def _steps(plan: Plan, command: Sequence[str]) -> list[dict[str, Any]]:
-    """Return the job's steps, each of tasks that do not wait for each other."""
+    """Return the job's steps; the tasks of one step do not depend on each other."""
     steps: list[dict[str, Any]] = []
     for name, looks in _waves(plan.chosen_looks):
         for k in range(0, len(looks), MAX_VALUES):
@@ -89,46 +89,46 @@ def _steps(plan: Plan, command: Sequence[str]) -> list[dict[str, Any]]:
             look = {"name": "Look", "type": "STRING", "range": range_}
             space = {"taskParameterDefinitions": [look]}
             steps.append(_step(name + part, command, steps, parameterSpace=space))
-    # What is left, if a task was lost, and the gallery.
+    # The last step does what lost tasks have left, and writes the gallery.
     steps.append(_step("Gallery", (), steps))
     return steps
 
 
 def _step(
-    name: str, how: Sequence[str], before: Sequence[dict[str, Any]], **others: Any
+    name: str, arguments: Sequence[str], before: Sequence[dict[str, Any]], **fields: Any
 ) -> dict[str, Any]:
-    args = ["batch", "{{Param.Manifest}}", "-o", "{{Param.Output}}", *how]
+    args = ["batch", "{{Param.Manifest}}", "-o", "{{Param.Output}}", *arguments]
     command = {"command": "{{Param.Lightpaint}}", "args": args}
-    waits = [{"dependsOn": step["name"]} for step in before]
+    dependencies = [{"dependsOn": step["name"]} for step in before]
     return {
         "name": name,
-        **({"dependencies": waits} if waits else {}),
-        **others,
+        **({"dependencies": dependencies} if dependencies else {}),
+        **fields,
         "script": {"actions": {"onRun": command}},
     }
 
 
 def _waves(looks: Sequence[PlannedLook]) -> list[tuple[str, list[PlannedLook]]]:
-    """Group looks: the first of each basis; those that share them; those combined from others."""
+    """Group looks: the first of each basis, those that share one, then those made of others."""
     first: list[PlannedLook] = []
-    rest: list[PlannedLook] = []
-    made: list[PlannedLook] = []
-    seen: set[str] = set()
+    sharing: list[PlannedLook] = []
+    combined: list[PlannedLook] = []
+    seen_keys: set[str] = set()
     for look in looks:
         keys = set(look.steps[0].task.bases)
         if look.entry.of:
-            made.append(look)
-        elif keys <= seen:
-            rest.append(look)
+            combined.append(look)
+        elif keys <= seen_keys:
+            sharing.append(look)
         else:
             first.append(look)
-            seen |= keys
-    waves = [("Bases", first), ("Looks", rest)]
-    while made:
-        names = {look.entry.name for look in made}
-        ready = [look for look in made if not names & set(look.entry.of)]
+            seen_keys |= keys
+    waves = [("Bases", first), ("Looks", sharing)]
+    while combined:
+        names = {look.entry.name for look in combined}
+        ready = [look for look in combined if not names & set(look.entry.of)]
         waves.append((f"Made {len(waves) - 1}", ready))
-        made = [look for look in made if look not in ready]
+        combined = [look for look in combined if look not in ready]
     return [(name, wave) for name, wave in waves if wave]
 
 
@@ -141,5 +141,5 @@ def _pattern(look: PlannedLook) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return text without what a format string would take for an expression."""
+    """Return text without the braces that mark expressions in a format string."""
     return text.replace("{{", "").replace("}}", "")

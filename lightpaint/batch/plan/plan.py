@@ -14,7 +14,7 @@ from lightpaint.screen import some_names
 
 @dataclass(frozen=True)
 class PlanStep:
-    """A step of one look. made_of: fingerprint of its inputs. is_done: by an earlier run."""
+    """A step of one look. made_of: fingerprint of its inputs. is_done: True if it need not run."""
 
     task: Task
     made_of: str
@@ -23,7 +23,7 @@ class PlanStep:
 
 @dataclass(frozen=True)
 class PlannedLook:
-    """A look of the plan. failure: why it cannot be done, while others can. remarks: for people."""
+    """A look of the plan. failure: why it alone cannot be done. remarks: for the user."""
 
     entry: LookEntry
     folder: Path
@@ -55,7 +55,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Plan:
-    """Looks of a manifest. costs: of each basis, by its key. chosen: names of the looks to do.
+    """The plan of a manifest. costs: of each basis, by its key. chosen: names of the looks to do.
 
     cache: scenes that the checks have loaded, so that they are not loaded twice. remarks: on the
     batch as a whole.
@@ -80,27 +80,27 @@ class Plan:
         return [(step.task.look, step.task.kind) for look in self.looks for step in look.steps]
 
     def select(self, pattern: str | None) -> "Plan":
-        """Return the plan of the looks whose names match, and of those that these combine.
+        """Return the plan of the looks whose names match, and of the looks that they combine.
 
-        Raises BatchError if there is none.
+        Raises BatchError if no name matches.
         """
         if pattern is None:
             return self
-        wanted = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
-        if not wanted:
+        chosen = {x.entry.name for x in self.looks if fnmatchcase(x.entry.name, pattern)}
+        if not chosen:
             names = some_names(look.entry.name for look in self.looks)
             raise BatchError(f"no look matches {pattern!r}: there are {names}")
-        for look in reversed(self.looks):  # what others are made of stands before them
-            if look.entry.name in wanted:
-                wanted |= set(look.entry.of)
-        return replace(self, chosen=frozenset(wanted))
+        for look in reversed(self.looks):  # a look stands behind those that it combines
+            if look.entry.name in chosen:
+                chosen |= set(look.entry.of)
+        return replace(self, chosen=frozenset(chosen))
 
 
 def by_bases(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> list[list[PlanStep]]:
-    """Group steps that share their bases, each group after those that its looks combine."""
-    left, groups = list(steps), []
-    while left:
-        ready = {step.task.look: step.task.bases for step in left}
+    """Group steps that share their bases; a group follows the groups that its looks combine."""
+    remaining, groups = list(steps), []
+    while remaining:
+        ready = {step.task.look: step.task.bases for step in remaining}
         pending, waits = dict(ready), True
         while waits:
             waits = False
@@ -110,17 +110,17 @@ def by_bases(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> lis
                     del ready[look]
                     waits = True
         for keys in dict.fromkeys(ready.values()):
-            groups.append([step for step in left if ready.get(step.task.look) == keys])
-        left = [step for step in left if step.task.look not in ready]
+            groups.append([step for step in remaining if ready.get(step.task.look) == keys])
+        remaining = [step for step in remaining if step.task.look not in ready]
     return groups
 
 
 def waves(steps: Sequence[PlanStep], looks: Mapping[str, PlannedLook]) -> list[list[PlanStep]]:
-    """Group steps: those that wait for none of the others; those that wait for these; and so on."""
-    left, found = list(steps), []
-    while left:
-        names = {step.task.look for step in left}
-        wave = [step for step in left if not names & set(looks[step.task.look].entry.of)]
-        found.append(wave)
-        left = [step for step in left if step not in wave]
-    return found
+    """Group steps into waves: each wave depends only on earlier ones."""
+    remaining, groups = list(steps), []
+    while remaining:
+        names = {step.task.look for step in remaining}
+        wave = [step for step in remaining if not names & set(looks[step.task.look].entry.of)]
+        groups.append(wave)
+        remaining = [step for step in remaining if step not in wave]
+    return groups

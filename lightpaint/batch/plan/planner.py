@@ -1,4 +1,4 @@
-"""The planner: which steps of a manifest are to be done, all checked before any sample."""
+"""The planner: checks all looks of a manifest before any sample, and lists the steps to do."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -40,13 +40,13 @@ from lightpaint.screen import some_names
 def plan(
     manifest: str | Path, folder: str | Path, *, force: bool = False, command: str = ""
 ) -> Plan:
-    """Read `manifest` (docs/batch.md), and check every look of it, before anything is rendered.
+    """Read `manifest` (docs/batch.md), and check all its looks before anything is rendered.
 
     Args:
         manifest: TOML.
         folder: Receives a folder for each look.
-        force: Whether results of something else, or changed by hand, are replaced.
-        command: The shell command that asks for this, for the reports.
+        force: Whether to replace results of something else, or results changed by hand.
+        command: The shell command that was run, for the reports.
 
     Raises:
         BatchError: With all mistakes, one line each.
@@ -70,7 +70,7 @@ def plan(
 
 
 class _Planner:
-    """A planner of one entry after the other, with what several entries share."""
+    """A planner of one entry after the other, with the data that entries share."""
 
     def __init__(
         self,
@@ -90,8 +90,9 @@ class _Planner:
         self.costs: dict[str, Cost] = {}
 
     def plan_look(self, entry: LookEntry) -> PlannedLook:
-        """Return the plan of one look. Errors in the manifest are added to its mistakes; errors in
-        the look's own files become its failure.
+        """Return the plan of one look.
+        Errors in the manifest are added to its mistakes; errors in the look's own files become its
+        failure.
         """
         failure = ""
         remarks: tuple[str, ...] = ()
@@ -104,21 +105,21 @@ class _Planner:
             self._mistakes.add(entry.where, str(error))
             failure = str(error)
             self.collect_errors(entry)
-        if not failure and (gone := self._failed & set(entry.of)):
-            failure = f"it is made of {some_names(sorted(gone))}, which failed"
+        if not failure and (failed := self._failed & set(entry.of)):
+            failure = f"it is made of {some_names(sorted(failed))}, which failed"
         if failure:
             self._failed.add(entry.name)
         steps = self._steps(entry, reads if not failure else (), is_possible=not failure)
         return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
 
     def collect_errors(self, entry: LookEntry) -> None:
-        """Add all errors of a look that cannot be planned, of which one would hide the others."""
+        """Add all errors of a look that cannot be planned, not only the first."""
         collect_errors(entry, self.cache, self._mistakes)
 
     def _steps(
         self, entry: LookEntry, reads: Sequence[Path], *, is_possible: bool
     ) -> tuple[PlanStep, ...]:
-        """Return the steps of a look: its answer, and its render and exports if they are wanted."""
+        """Return the steps of a look: its answer, and its render and exports if requested."""
         folder = self._folders[entry.name]
         answer = answer_task(
             entry, self._folders, reads=reads, force=self._force, command=self._command
@@ -133,14 +134,14 @@ class _Planner:
             made_of.append(self._fingerprints.export(entry))
         is_whole = is_possible and is_as_written(folder)
         steps = []
-        for task, its in zip(tasks, made_of, strict=True):
+        for task, fingerprint in zip(tasks, made_of, strict=True):
             line = self.journal.lines.get((task.look, task.kind))
-            is_done = line is not None and (line.state, line.made_of) == ("done", its)
-            # What was rendered of an earlier answer went with it.
+            is_done = line is not None and (line.state, line.made_of) == ("done", fingerprint)
+            # A new answer invalidates its render and exports.
             is_whole = is_whole and is_done
             if task.kind == "export":
                 is_whole = is_whole and is_as_written(folder / EXPORT)
-            steps.append(PlanStep(task, its, is_whole))
+            steps.append(PlanStep(task, fingerprint, is_whole))
         return tuple(steps)
 
     def _resolve_entry(
@@ -148,7 +149,7 @@ class _Planner:
     ) -> tuple[LookEntry, tuple[Path, ...], tuple[str, ...]]:
         """Return the entry with all defaults resolved, the files that it reads, and remarks."""
         scenes = tuple(map(self.cache.scene, entry.scenes))
-        # Of saved bases no more than one is held, and by no look.
+        # At most one saved basis stays in memory, and only the cache holds it.
         self.cache.keep_only(bases_of(entry))
         basis = None if entry.basis is None else self.cache.source(entry.basis.unread())
         if not entry.is_solved:
@@ -178,20 +179,18 @@ class _Planner:
         settings: Settings,
         constraints: Constraints,
     ) -> Job:
-        """Return the job of a look, which checks it; its painting is read, and released again."""
+        """Return the job of a look, which reads, checks and releases the look's painting."""
         paintings = tuple(painting.unread() for painting in entry.paintings)
         settings = replace(settings, force=self._force, command=self._command)
         folder = self._folders[entry.name]
         return Job(tuple(scenes), paintings, folder, basis, constraints, settings, entry.by_sensor)
 
     def _check_lighting_look(self, entry: LookEntry) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-        """Check a look with a given or combined lighting; return the files that it reads, and
-        remarks.
-        """
+        """Check a look with a given or combined lighting; return its input files and remarks."""
         scenes: list[Scene] = [file.content for file in entry.scenes]
         scene = scenes[0] if scenes else None
-        given = None if entry.basis is None else entry.basis.content
-        groups = given if isinstance(given, LightGroups) else None
+        basis = None if entry.basis is None else entry.basis.content
+        groups = basis if isinstance(basis, LightGroups) else None
         reads: tuple[Path, ...] = () if scene is None else scene.read_files
         if groups is not None:
             reads += tuple(groups.files)
@@ -202,13 +201,13 @@ class _Planner:
             reads += (Path(entry.lighting),)
             if scene is not None:
                 scene_of(scene, lighting)
-                if (have := set(lighting)) != (want := {light.name for light in scene.lights}):
+                if (lit := set(lighting)) != (named := {light.name for light in scene.lights}):
                     raise BatchError(
-                        f"{entry.lighting} has the lights {some_names(sorted(have))}, and the "
-                        f"scene {some_names(sorted(want))}: load it with the same lights and groups"
+                        f"{entry.lighting} has the lights {some_names(sorted(lit))}, and the scene "
+                        f"{some_names(sorted(named))}: load it with the same lights and groups"
                     )
-            elif isinstance(given, LightGroups | Basis):
-                names = (given.basis if isinstance(given, LightGroups) else given).names
+            elif isinstance(basis, LightGroups | Basis):
+                names = (basis.basis if isinstance(basis, LightGroups) else basis).names
                 if set(lighting) != set(names):
                     raise BatchError(f"{entry.lighting} is of other lights than {entry.basis}")
         folders = [str(self._folders[name] / "lighting.json") for name in entry.of]
@@ -217,7 +216,9 @@ class _Planner:
         options: dict[str, Any] = {"views": views, "groups": groups, "force": self._force}
         derived_folder(self._folders[entry.name], scene, lightings, **options).check()
         settings = entry.settings
-        films = [on_film(one, settings.quality, settings.resolution) for one in scenes]
+        films = [
+            on_film(sensor_scene, settings.quality, settings.resolution) for sensor_scene in scenes
+        ]
         self._note_costs(entry, films, settings)
         if scene is not None and entry.final.resolution is not None and "render" in entry.want:
             on_film(scene, None, entry.final.resolution)
@@ -226,27 +227,27 @@ class _Planner:
     def _note_costs(
         self, entry: LookEntry, films: Sequence[Scene | None], settings: Settings
     ) -> None:
-        """Store the cost of each basis that is to be obtained. films: that they are rendered on."""
+        """Store the cost of each basis that has to be obtained. films: one for each basis."""
         if entry.basis is not None:
             return
         for key, film in zip(bases_of(entry), films, strict=True):
             if film is None or key in self.costs:
                 continue
-            constraints = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+            spp = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
             self.costs[key] = Cost(
                 f"{film.path.name} through {film.sensor_names[film.sensor]}",
                 len(film.lights),
                 film.size,
-                film.spp if constraints is None else constraints,
+                film.spp if spp is None else spp,
                 memory_needed(film),
             )
 
 
 def _check_by_sums(job: Job) -> None:
-    """Raise BatchError for a lighting that does not follow from sums."""
+    """Raise BatchError if the lighting of a job does not follow from sums alone."""
     [view] = job.views
-    why = reason_against_sums(view.target, job.fit)
-    if not why and view.basis is None and view.scene is not None:
-        why = why_not_one_pass(view.scene) or ""
-    if why:
-        raise BatchError(f"want = ['lights'] takes sums alone, and {why}: want 'solve' instead")
+    reason = reason_against_sums(view.target, job.fit)
+    if not reason and view.basis is None and view.scene is not None:
+        reason = why_not_one_pass(view.scene) or ""
+    if reason:
+        raise BatchError(f"want = ['lights'] takes sums alone, and {reason}: want 'solve' instead")

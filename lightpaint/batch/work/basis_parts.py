@@ -39,14 +39,17 @@ class PartwiseRender:
         seed: int,
         start: Basis | None = None,
         progress: Progress,
-        **others: Any,
+        **options: Any,
     ) -> Basis:
-        """Render as `render_basis` does. A time budget is spent in this process, which can measure
-        it.
-        """
+        """Render as `render_basis` does. This process alone spends and measures a time budget."""
         if time_s is not None:
-            how: dict[str, Any] = {"time_s": time_s, "seed": seed, "progress": progress, **others}
-            return render_basis(scene, start=start, **how)
+            budget_options: dict[str, Any] = {
+                "time_s": time_s,
+                "seed": seed,
+                "progress": progress,
+                **options,
+            }
+            return render_basis(scene, start=start, **budget_options)
         spp = scene.spp if spp is None else spp
         if start is not None and start.origin.spp >= spp:
             return with_first_hits(start.with_requests(scene.requests), scene, seed)
@@ -78,26 +81,26 @@ class PartwiseRender:
     ) -> None:
         """Add all parts to `sums`: those that are cached, and those that the engine renders."""
         learned = str(spool.learned) if spool.learned.is_file() else ""
-        left = {}
+        missing = {}
         for k, part in enumerate(parts):
-            kept = spool.part(part)
-            if kept is not None:
-                sums.add(part, *kept)
+            cached = spool.part(part)
+            if cached is not None:
+                sums.add(part, *cached)
                 continue
             pixels = (part.bottom - part.top) * scene.size[1]
             lights = len(scene.lights) if part.light is None else 1
             samples = pixels * part.spp * (2 if part.half is None else 1)
             expected_s = render_seconds(samples, lights)
             item = PartOfBasis(f"part {k}", self._film_of(scene), part, seed, learned, expected_s)
-            left[item.name] = item
-        progress("basis", len(parts) - len(left), len(parts), "parts")
-        for count, done in enumerate(self._engine.run(list(left.values()))):
-            if done.failure:
-                raise BasisError(done.failure)
-            part, (planes, seen) = left[done.look].part, done.value
-            spool.keep_part(part, planes, seen)
-            sums.add(part, planes, seen)
-            progress("basis", len(parts) - len(left) + count + 1, len(parts), "parts")
+            missing[item.name] = item
+        progress("basis", len(parts) - len(missing), len(parts), "parts")
+        for count, result in enumerate(self._engine.run(list(missing.values()))):
+            if result.failure:
+                raise BasisError(result.failure)
+            part, (planes, first_hits) = missing[result.look].part, result.value
+            spool.keep_part(part, planes, first_hits)
+            sums.add(part, planes, first_hits)
+            progress("basis", len(parts) - len(missing) + count + 1, len(parts), "parts")
 
 
 def obtain_lesson(
@@ -108,18 +111,18 @@ def obtain_lesson(
     start: Basis | None,
     spool: Spool,
 ) -> Floats | None:
-    """Return the emission that parts sample by, and put it into the spool; None if they
-    need none.
+    """Return the emission that guides the samples of parts, and store it in the spool.
+    Returns None if the parts need none.
     """
     if method_of(scene) != ONE_PASS:
         return None
     learned = spool.lesson() if start is None else start.learned
     if learned is None:
         expected_s = render_seconds(sum(LESSON), len(scene.lights))
-        [done] = engine.run([Lesson("lesson", film, seed, expected_s)])
-        if done.failure:
-            raise BasisError(done.failure)
-        learned = done.value
+        [result] = engine.run([Lesson("lesson", film, seed, expected_s)])
+        if result.failure:
+            raise BasisError(result.failure)
+        learned = result.value
         assert learned is not None
     if not spool.learned.is_file():
         spool.keep_lesson(learned)

@@ -1,4 +1,4 @@
-"""Answers derived from other answers, and not solved: as they are, warmer, between two."""
+"""Answers that are derived from other answers: unchanged, warmer, or between two."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,7 +26,7 @@ def derived_folder(
     groups: LightGroups | None = None,
     force: bool = False,
 ) -> ResultFolder:
-    """Return where a derived answer goes. views: folders in it, one for each picture."""
+    """Return the result folder of a derived answer. views: folders in it, one for each picture."""
     reads = tuple(map(Path, lightings))
     files = answer_files(folder, scene=scene, groups=groups)
     files += [folder / view / "predicted.exr" for view in views]
@@ -50,16 +50,16 @@ def publish_derived(
 ) -> None:
     """Write lighting.json, its pictures from `bases`, and the relit scene.
 
-    views: folder of each picture. groups: light groups that the basis was read from, whose programs
-    get the answer, too. spp: of a verification.
+    views: folder of each picture. groups: light groups that the basis was read from; the answer is
+    also written for their programs. spp: of a verification.
     """
     results.check()
     with new_answer(results, lighting, scene=scene, groups=groups) as answer:
         for basis, view in zip(bases, views, strict=True):
             (answer.path / view).mkdir(exist_ok=True)
             predicted, origin = combine(basis, lighting), basis.origin
-            its, spp_ = answer.path / view / "predicted.exr", spp or origin.spp
-            write_predicted(its, predicted, origin=origin, spp=spp_, scene=answer.relit)
+            path, spp_ = answer.path / view / "predicted.exr", spp or origin.spp
+            write_predicted(path, predicted, origin=origin, spp=spp_, scene=answer.relit)
 
 
 def dimmer_lights(basis: Basis) -> set[str]:
@@ -68,31 +68,31 @@ def dimmer_lights(basis: Basis) -> set[str]:
 
 
 def variation_folder(folder: Path, word: str) -> Path:
-    """Return where a variation goes: beside the look that it varies."""
+    """Return the folder of a variation, which lies beside the look that it varies."""
     return folder.with_name(f"{folder.name}-{word.replace(' ', '-')}")
 
 
 def adjusted_light_count(job: Job) -> int:
-    """Return how many lights are adjusted."""
+    """Return the number of adjusted lights."""
     first = job.views[0]
-    told = first.basis if first.basis is not None else first.scene
-    return sum(not light.is_fixed for light in told.lights) if told is not None else 0
+    source = first.basis if first.basis is not None else first.scene
+    return sum(not light.is_fixed for light in source.lights) if source is not None else 0
 
 
 def variation_jobs(job: Job, words: Sequence[str]) -> dict[str, Job]:
-    """Return the jobs of variations that are solved, by their words; checked like all jobs."""
-    made = {}
+    """Return the jobs of variations that are solved, by their words."""
+    jobs = {}
     for word in (x for x in words if x in SOLVED_WORDS):
         options, lights = replace(job.settings, hold=job.fit.hold), adjusted_light_count(job)
-        settings, asked = vary(word, options, job.constraints, lights)
+        settings, constraints = vary(word, options, job.constraints, lights)
         folder = variation_folder(job.folder, word)
-        its = (job.scenes, job.targets, folder, job.basis, asked, settings, job.by_sensor)
-        made[word] = Job(*its)
-    return made
+        fields = (job.scenes, job.targets, folder, job.basis, constraints, settings, job.by_sensor)
+        jobs[word] = Job(*fields)
+    return jobs
 
 
 def shifted_folders(job: Job, words: Sequence[str]) -> dict[str, ResultFolder]:
-    """Return where variations go that are derived from the answer, by their words."""
+    """Return the result folders of variations that are derived from the answer, by their words."""
     return {
         word: derived_folder(
             variation_folder(job.folder, word),
@@ -123,5 +123,5 @@ def publish_shifted(
 
 
 def _views(job: Job) -> list[str]:
-    """Return the folder of each view in that of the results."""
+    """Return each view's folder, relative to the folder of the results."""
     return [str(view.folder.relative_to(job.folder)) for view in job.views]

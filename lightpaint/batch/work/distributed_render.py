@@ -20,13 +20,13 @@ from lightpaint.scene.scene_render import estimate_of, passes_of, ranges_of
 def distributed_renderer(
     engine: Engine, task: Task, variant: str | None, listen: Listener
 ) -> Callable[[Scene], Estimate]:
-    """Return a function that renders an answered look's scene by `engine`, in ranges of passes.
+    """Return a function that renders a look's relit scene by `engine`, in ranges of passes.
 
-    variant: Mitsuba's, of the look's own scene.
+    variant: Mitsuba variant of the look's scene.
     """
 
     def render(relit: Scene) -> Estimate:
-        # As the answer has left it, which comes out the same when it is written anew.
+        # The answer has written this scene; writing it again gives the same file.
         path = str(Path(task.writes) / "relit.xml")
         scene = SceneFile(
             path,
@@ -42,17 +42,17 @@ def distributed_renderer(
         for range_ in ranges_of(relit, passes):
             samples = height * width * sum(passes[k][1] for k in range_)
             name, expected_s = f"{task.look} {range_.start}", samples * SAMPLE_S
-            which = range_.start, range_.stop
-            items.append(Passes(name, scene, task.final, *which, files, expected_s))
+            bounds = range_.start, range_.stop
+            items.append(Passes(name, scene, task.final, *bounds, files, expected_s))
         results = {}
         sums, next_item = np.zeros((2, height, width, 3), np.float64), 0
-        for count, done in enumerate(engine.run(items)):
-            if done.failure:
-                raise SceneError(done.failure)
-            results[done.look] = done.value
+        for count, result in enumerate(engine.run(items)):
+            if result.failure:
+                raise SceneError(result.failure)
+            results[result.look] = result.value
             while next_item < len(items) and items[next_item].name in results:
-                for half, its in results.pop(items[next_item].name).items():
-                    sums[half] += its
+                for half, half_sum in results.pop(items[next_item].name).items():
+                    sums[half] += half_sum
                 next_item += 1
             listen("relit", count + 1, len(items), "ranges of passes")
         return estimate_of(sums, passes)

@@ -1,7 +1,8 @@
-"""Looks of which only the lighting is wanted: workers send sums, and nobody has the basis."""
+"""Looks that need only a lighting: workers send sums, and no process stores the basis."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from lightpaint.basis.render.parts import plan_parts
@@ -26,41 +27,41 @@ from lightpaint.scene.quality_presets import samples
 def solve_by_sums(
     tasks: Sequence[Task], engine: Engine, cache: WorkerCache, listen: Listener
 ) -> list[ItemResult]:
-    """Solve looks that share one basis and want nothing but the lighting."""
+    """Solve looks that share one basis and request nothing but the lighting."""
     jobs: list[Job] = []
-    done: list[ItemResult] = []
+    outcomes: list[ItemResult] = []
 
     def make_job(task: Task) -> Callable[[], None]:
         return lambda: jobs.append(Job(**job_fields(task, cache)))
 
     runnable = []
     for task in tasks:
-        if (its := attempt(task, make_job(task))).failure:
-            done.append(its)
+        if (outcome := attempt(task, make_job(task))).failure:
+            outcomes.append(outcome)
         else:
             runnable.append(task)
     if not runnable:
-        return done
+        return outcomes
     sums: list[Sums] = []
     results = attempt(
         runnable[0], lambda: sums.extend(_render_sums(runnable[0], jobs, engine, cache, listen))
     )
     for k, task in enumerate(runnable):
         if results.failure:
-            done.append(replace(results, look=task.look))
+            outcomes.append(replace(results, look=task.look))
             continue
-        done.append(attempt(task, lambda job=jobs[k], its=sums[k]: _solve_and_write(job, its)))  # type: ignore[misc]
-    return done
+        outcomes.append(attempt(task, partial(_solve_and_write, jobs[k], sums[k])))
+    return outcomes
 
 
 def _render_sums(
     task: Task, jobs: Sequence[Job], engine: Engine, cache: WorkerCache, listen: Listener
 ) -> list[Sums]:
-    """Return the sums of each job's problem, over all rows in their order."""
+    """Return the sums of each job's problem over all rows, added in the order of the rows."""
     scene, settings = jobs[0].views[0].scene, jobs[0].settings
     assert scene is not None
-    asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
-    spp = scene.spp if asked is None else asked
+    requested_spp = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+    spp = scene.spp if requested_spp is None else requested_spp
     parts = plan_parts(scene, spp)
     file = replace(job_fields(task, cache)["scenes"][0])
     film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, scene.read_files)))
@@ -82,33 +83,33 @@ def _render_sums(
     following = iter(items)
     item = next(following, None)
     listen("basis", 0, len(items), "ranges of rows")
-    for count, done in enumerate(engine.run(items)):
-        if done.failure:
-            raise BasisError(done.failure)
-        results[done.look] = done.value
+    for count, result in enumerate(engine.run(items)):
+        if result.failure:
+            raise BasisError(result.failure)
+        results[result.look] = result.value
         listen("basis", count + 1, len(items), "ranges of rows")
-        # In the order of the rows, whatever order they come in.
+        # Add in the order of the rows, whatever order they arrive in.
         while item is not None and item.name in results:
-            more = results.pop(item.name)
-            total = [a + b for a, b in zip(total, more, strict=True)] if total else more
+            next_sums = results.pop(item.name)
+            total = [a + b for a, b in zip(total, next_sums, strict=True)] if total else next_sums
             item = next(following, None)
     spool.drop()
     return total
 
 
 def _solve_and_write(job: Job, sums: Sums) -> None:
-    """Solve, and write the lighting, and the scene that has it."""
+    """Solve a job from its sums, and write the lighting and the relit scene."""
     scene = job.views[0].scene
     assert scene is not None
-    asked = samples(job.settings.quality, spp=job.settings.spp, time_s=None)
-    half = -(-(scene.spp if asked is None else asked) // 2)
+    requested_spp = samples(job.settings.quality, spp=job.settings.spp, time_s=None)
+    half = -(-(scene.spp if requested_spp is None else requested_spp) // 2)
     publish_solved_lights(
         job, basis_lights(scene), sums, scene_identity=scene.identity, spp=2 * half
     )
 
 
 def _file_of(job: Job) -> Painting:
-    """Return the painting, not read yet."""
+    """Return the job's painting, not yet read."""
     [painting] = job.targets
     assert isinstance(painting, Painting)
     return painting.unread()

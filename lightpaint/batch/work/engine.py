@@ -1,4 +1,4 @@
-"""Engines run work items: this process, processes beside it (processes.py), or a cluster
+"""Engines that run work items: this process, local worker processes (processes.py), or a cluster
 (cluster.py).
 """
 
@@ -10,38 +10,37 @@ from lightpaint.batch.work.work_items import ItemResult, WorkItem
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener
 
-#: How often an item is tried, where workers die over it.
+#: How often an item is tried if workers die over it.
 MAX_TRIES = 3
 
-#: Failure of an item that all workers die over.
+#: Failure of an item over which every worker has died.
 LOST_TEXT = "its worker was killed, or ran out of memory"
 
 
 class Engine(Protocol):
-    """An engine for work items that do not wait for each other."""
+    """An engine for work items that do not depend on each other."""
 
     @property
     def is_apart(self) -> bool:
-        """True if it works in other processes, which have no basis in memory."""
+        """True if it uses other processes, which have no basis in memory."""
 
     @property
     def is_gone(self) -> bool:
-        """True once nobody is left to do anything, which is no look's failure."""
+        """True once no worker can be reached any more, which is no look's failure."""
 
     @property
     def workers(self) -> int:
-        """Number of items that it runs at a time, as far as is known."""
+        """Number of items that it runs at a time, as far as it knows."""
 
     def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
         """Yield the result of each item as it is done, in any order.
 
-        An item over which a worker dies is done again, elsewhere. Closing the iterator ends the
-        work.
+        If a worker dies over an item, another one tries it. Closing the iterator ends the work.
         """
 
 
 class InProcess:
-    """An engine that runs items here, one after the other."""
+    """An engine that runs items in this process, one after the other."""
 
     is_apart = False
     is_gone = False
@@ -51,7 +50,7 @@ class InProcess:
         self._cache, self._listen = cache, listen
 
     def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
-        """Run the items in their order, as of `Engine`."""
+        """Run the items in their order; see `Engine`."""
         try:
             for item in items:
                 yield run_item(item, self._cache, self._listen)

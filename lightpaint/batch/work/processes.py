@@ -19,7 +19,7 @@ from lightpaint.scene.runtime.kernel_threads import limit_threads
 
 
 class Processes:
-    """An engine of several processes. One that dies costs only its own item's try."""
+    """An engine of several processes. One that dies costs only one try of its own item."""
 
     is_apart = True
     is_gone = False
@@ -35,9 +35,9 @@ class Processes:
         self._stop_pool()
 
     def run(self, items: Sequence[WorkItem]) -> Iterator[ItemResult]:
-        """Run the items, as of `Engine`."""
+        """Run the items; see `Engine`."""
         waiting, tries = list(items), dict.fromkeys((item.name for item in items), 0)
-        # Of several that were at work when one died nobody knows which did: each goes alone.
+        # When a process dies, any of the running items may be the cause: each is then run alone.
         suspects: list[WorkItem] = []
         try:
             while waiting or suspects:
@@ -46,40 +46,42 @@ class Processes:
                 while suspects:
                     item = suspects.pop(0)
                     tries[item.name] += 1
-                    lock_folder: list[WorkItem] = []
-                    yield from self._run_parallel([item], lock_folder)
-                    if lock_folder and tries[item.name] < MAX_TRIES:
+                    lost: list[WorkItem] = []
+                    yield from self._run_parallel([item], lost)
+                    if lost and tries[item.name] < MAX_TRIES:
                         suspects.append(item)
-                    elif lock_folder:
+                    elif lost:
                         yield ItemResult(item.name, item.kind, LOST_TEXT, is_lost=True)
         except BaseException:
             self._stop_pool()
             raise
 
     def _run_parallel(self, waiting: list[WorkItem], lost: list[WorkItem]) -> Iterator[ItemResult]:
-        """Empty `waiting`, as many at a time as there are workers, until one of them dies."""
+        """Run the items in `waiting`, one for each worker at a time, until a worker dies.
+        Removes the started items from `waiting`, and adds those that were running to `lost`.
+        """
         running: dict[Future[ItemResult], WorkItem] = {}
-        # Which process takes an item only the pool knows, but so many are at work.
-        places: dict[Future[ItemResult], str] = {}
-        free = [f"worker {k + 1}" for k in reversed(range(self.workers))]
+        # The pool does not tell which process runs an item, so the display numbers the slots.
+        slots: dict[Future[ItemResult], str] = {}
+        free_slots = [f"worker {k + 1}" for k in reversed(range(self.workers))]
         pool = self._start_pool()
         while waiting or running:
             try:
                 while waiting and len(running) < self.workers:
                     future = pool.submit(_run_item, waiting[0])
-                    running[future], places[future] = waiting[0], free.pop()
-                    self._listen.at_work(places[future], item_label(waiting[0]))
+                    running[future], slots[future] = waiting[0], free_slots.pop()
+                    self._listen.at_work(slots[future], item_label(waiting[0]))
                     del waiting[0]
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
-                    done = future.result()
+                    result = future.result()
                     del running[future]
-                    free.append(places.pop(future))
-                    self._listen.at_work(free[-1], None)
-                    yield done
+                    free_slots.append(slots.pop(future))
+                    self._listen.at_work(free_slots[-1], None)
+                    yield result
             except BrokenProcessPool:
                 lost += running.values()
-                for place in places.values():
+                for place in slots.values():
                     self._listen.at_work(place, None)
                 self._stop_pool()
                 return
@@ -89,7 +91,7 @@ class Processes:
             threads = max(1, (os.cpu_count() or 1) // self.workers)
             self._pool = ProcessPoolExecutor(
                 self.workers,
-                # A fork would have half of the renderer's threads.
+                # A forked process would lack the renderer's threads.
                 mp_context=multiprocessing.get_context("spawn"),
                 initializer=_init_worker,
                 initargs=(threads,),
@@ -113,7 +115,7 @@ _CACHE = WorkerCache()
 
 
 def _init_worker(threads: int) -> None:
-    """Prepare a worker: it ignores Ctrl-C, since its parent handles it and ends it."""
+    """Prepare a worker: it ignores Ctrl-C, which its parent handles by ending it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, str(threads))
@@ -123,9 +125,7 @@ def _init_worker(threads: int) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this worker with its parent: otherwise it would wait for ever, or work on what is
-    lost.
-    """
+    """End this worker with its parent: otherwise it would wait for ever, or work for nobody."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

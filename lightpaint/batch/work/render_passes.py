@@ -18,17 +18,15 @@ class PassRenderer:
         self._passes = passes_of(scene, final.spp)
         self._loaded: Any = scene.load()
 
-    def sum(self, some: range) -> dict[int, Doubles]:
-        """Return the undivided sum, (h, w, 3), of those passes that belong to a half, by
-        the half.
-        """
+    def sum(self, passes: range) -> dict[int, Doubles]:
+        """Return the undivided sums, (h, w, 3), of the given passes for each half, by the half."""
         sums: dict[int, Doubles] = {}
-        for k in some:
+        for k in passes:
             half, spp = self._passes[k]
             seed, stream = self._final.seed, Stream.VERIFICATION
             with tracing():
-                its = pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
-            sums[half] = sums[half] + its if half in sums else its
+                summed = pass_sum(self._loaded, self._scene, k, spp, seed=seed, stream=stream)
+            sums[half] = sums[half] + summed if half in sums else summed
         return sums
 
     def close(self) -> None:

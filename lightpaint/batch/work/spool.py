@@ -1,4 +1,4 @@
-"""Rendered parts of a basis that are not yet added up, on the disk: no kill costs them."""
+"""Rendered parts of a basis that are not yet added up, on the disk, where they survive a kill."""
 
 import hashlib
 import re
@@ -30,14 +30,22 @@ _NAME = re.compile("[0-9a-f]{32}")
 
 
 class Spool:
-    """Rendered parts of one basis. A disk that takes none is no reason to lose a render."""
+    """Rendered parts of one basis. If the disk cannot store them, the render goes on."""
 
     def __init__(
         self, scene: Scene, parts: Sequence[Part], *, seed: int, start: Basis | None
     ) -> None:
-        begun = None if start is None else start.origin
-        what = (__version__, scene.identity, scene.sensor, seed, scene.size, begun, list(parts))
-        name = hashlib.sha256(repr(what).encode()).hexdigest()[:32]
+        start_origin = None if start is None else start.origin
+        identity = (
+            __version__,
+            scene.identity,
+            scene.sensor,
+            seed,
+            scene.size,
+            start_origin,
+            list(parts),
+        )
+        name = hashlib.sha256(repr(identity).encode()).hexdigest()[:32]
         try:
             self.folder = folder() / PARTS / name
             self._delete_leftovers()
@@ -60,24 +68,24 @@ class Spool:
             return None
 
     def keep_lesson(self, learned: Floats) -> None:
-        """Keep what was learned. Raises OSError."""
+        """Store the lesson. Raises OSError."""
         _write(self.learned, compressed=True, learned=learned)
 
     def part(self, part: Part) -> tuple[Floats, Floats] | None:
-        """Return the sums of a part; None if they are not kept, or damaged."""
+        """Return the sums of a part; None if they are not stored, or damaged."""
         try:
-            with np.load(self._file(part), allow_pickle=False) as kept:
-                return kept["planes"], kept["seen"]
+            with np.load(self._file(part), allow_pickle=False) as arrays:
+                return arrays["planes"], arrays["seen"]
         except (OSError, ValueError, KeyError, zipfile.BadZipFile):
             return None
 
-    def keep_part(self, part: Part, planes: Floats, seen: Floats) -> None:
-        """Keep the sums of that part, if the disk takes them."""
+    def keep_part(self, part: Part, planes: Floats, first_hits: Floats) -> None:
+        """Store the sums of a part, if the disk can take them."""
         with suppress(OSError):
-            _write(self._file(part), planes=planes, seen=seen)
+            _write(self._file(part), planes=planes, seen=first_hits)
 
     def drop(self) -> None:
-        """Delete all parts: the basis is made."""
+        """Delete all parts once the basis is complete."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _file(self, part: Part) -> Path:
@@ -85,27 +93,27 @@ class Spool:
         return self.folder / f"{part.top}-{part.first}{light}.npz"
 
     def _delete_leftovers(self) -> None:
-        for other in self.folder.parent.glob("*"):
-            if _NAME.fullmatch(other.name) is None:
+        for leftover in self.folder.parent.glob("*"):
+            if _NAME.fullmatch(leftover.name) is None:
                 continue
             with suppress(OSError):
-                if time.time() - other.stat().st_mtime > LEFTOVER_S:
-                    shutil.rmtree(other, ignore_errors=True)
+                if time.time() - leftover.stat().st_mtime > LEFTOVER_S:
+                    shutil.rmtree(leftover, ignore_errors=True)
 
 
 def read_lesson(file: str) -> Floats:
     """Return a saved lesson. Raises BasisError."""
     try:
-        with np.load(file, allow_pickle=False) as kept:
-            learned: Floats = kept["learned"]
+        with np.load(file, allow_pickle=False) as arrays:
+            learned: Floats = arrays["learned"]
             return learned
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise BasisError(f"cannot read {file}: {first_line(error)}") from error
 
 
 def _write(file: Path, *, compressed: bool = False, **arrays: Any) -> None:
-    """Write all arrays under that name, or nothing."""
-    half = file.with_name(f".{file.name}.half")
-    with half.open("wb") as opened:
-        (np.savez_compressed if compressed else np.savez)(opened, **arrays)
-    half.replace(file)
+    """Write all arrays to `file`, or nothing."""
+    temporary = file.with_name(f".{file.name}.half")
+    with temporary.open("wb") as stream:
+        (np.savez_compressed if compressed else np.savez)(stream, **arrays)
+    temporary.replace(file)

@@ -1,4 +1,4 @@
-"""Answers of which only the lighting is wanted: the sums of rows, and what is solved from them."""
+"""Answers that are only a lighting: sums over rows, and the lighting solved from them."""
 
 from dataclasses import replace
 
@@ -18,27 +18,27 @@ from lightpaint.pipeline.job import Job
 
 
 def sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
-    """Return the sums with each painting, of the very images that a whole basis has in
-    these rows.
+    """Return the sums with each painting over some rows.
+    The images are those that a whole basis has in these rows, to the last bit.
     """
     renderer, scene = cache.renderer(item), cache.film(item.film)
     part = item.part
-    halves, seen = renderer.render(part)
-    seen = seen.sum(axis=0) > 0
-    basis = basis_of_sums(scene, item.seed, list(halves), seen, part.spp, None, start=None)
+    halves, is_hit = renderer.render(part)
+    is_hit = is_hit.sum(axis=0) > 0
+    basis = basis_of_sums(scene, item.seed, list(halves), is_hit, part.spp, None, start=None)
     rows = slice(part.top, part.bottom)
     return [
-        sum_rows(basis, cache.target(wanted, scene.size), rows, Fit(emitters=wanted.emitters))
-        for wanted in item.paintings
+        sum_rows(basis, cache.target(request, scene.size), rows, Fit(emitters=request.emitters))
+        for request in item.paintings
     ]
 
 
 def answer_by_sums(job: Job, basis: Basis) -> None:
-    """Solve with a basis in memory, of which only sums are used."""
+    """Solve with the sums of a basis in memory, and write the lighting."""
     [view] = job.views
     basis = basis if view.scene is None else basis.with_requests(view.scene.requests)
     if not basis.knows_noise:
-        # Only pixels tell what rounding alone has made (see lighting/round_off.py).
+        # Only pixels show which differences are rounding alone (see lighting/round_off.py).
         problem = Problem.of(basis, view.target, constraints=job.asked, fit=job.fit)
         publish_lighting_only(job, solution_of(problem).lighting)
         return
@@ -52,7 +52,7 @@ def answer_by_sums(job: Job, basis: Basis) -> None:
 def publish_solved_lights(
     job: Job, lights: Lights, sums: Sums, *, scene_identity: str, spp: int
 ) -> None:
-    """Solve, and write the lighting. Other parameters are those of `summed_problem`."""
+    """Solve, and write the lighting. The other parameters are those of `summed_problem`."""
     problem = summed_problem(
         lights,
         job.views[0].target.name,
@@ -66,8 +66,8 @@ def publish_solved_lights(
 
 
 def publish_lighting_only(job: Job, lighting: Lighting) -> None:
-    """Write the lighting, and the scene that has it."""
+    """Write the lighting and the relit scene."""
     [view] = job.views
     lighting = replace(lighting, cd_per_unit=job.settings.cd_per_unit)
     with new_answer(job.results, lighting, scene=view.scene):
-        pass  # no pictures of it
+        pass  # there are no pictures

@@ -1,4 +1,4 @@
-"""A step of one look as a work item: files and plain values, which can be sent."""
+"""A step of one look as a work item: files and plain values, which can be sent to a worker."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -29,12 +29,12 @@ EXPORT = "export"
 class Task:
     """A step of one look, of files and plain values.
 
-    look: name. kind: step. job: as `Job.to_json` writes it; of a derived answer without a target.
+    look: name. kind: step. job: the text of `Job.to_json`; without a target if it is derived.
     lightings: files that it combines; reads: all other files but bases; share, space: between two
     lightings; mireds: how much warmer. final: options of the final render. handover: exports for
-    other programs. bases: keys of the bases it is solved with, and files where they are saved, ""
-    where they are to be obtained. expected_s: roughly how long it takes. is_by_sums: whether only
-    the lighting is wanted.
+    other programs. bases: keys of its bases; files: where these are saved, "" if they have to be
+    obtained. expected_s: rough estimate of its time. is_by_sums: whether only the lighting is
+    requested.
     """
 
     look: str
@@ -55,12 +55,12 @@ class Task:
 
     @property
     def name(self) -> str:
-        """Name of the look, as of `WorkItem`."""
+        """Name of the look; see `WorkItem`."""
         return self.look
 
     @property
     def writes(self) -> str:
-        """Folder of the results, as of `WorkItem`."""
+        """Folder of the results; see `WorkItem`."""
         return str(json.loads(self.job)["folder"])
 
     @property
@@ -70,17 +70,15 @@ class Task:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Files that it reads, as of `WorkItem`: of a final render also those beside the
-        lighting.
-        """
-        beside: list[str] = []
+        """Files that it reads; see `WorkItem`. A final render reads those beside its lighting, too."""
+        existing: list[str] = []
         if self.kind == "render":
-            beside = [str(x) for x in sorted(Path(self.writes).rglob("*")) if x.is_file()]
-        return tuple(dict.fromkeys([*self.reads, *self.lightings, *beside]))
+            existing = [str(x) for x in sorted(Path(self.writes).rglob("*")) if x.is_file()]
+        return tuple(dict.fromkeys([*self.reads, *self.lightings, *existing]))
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """Saved bases, as of `WorkItem`."""
+        """Saved bases; see `WorkItem`."""
         return tuple(file for file in self.files if file)
 
     def with_paths(self, move: PathMap) -> "Task":
@@ -95,7 +93,7 @@ class Task:
         )
 
     def to_json(self) -> str:
-        """Return this task as text, to be done elsewhere."""
+        """Return this task as text, for another process."""
         return json.dumps(asdict(self))
 
     @staticmethod
@@ -103,13 +101,13 @@ class Task:
         """Return the task that `to_json` wrote. Raises BatchError for anything else."""
         try:
             data = strict_json(text)
-            signed = {
+            numbers = {
                 key: data.pop(key) for key in ("expected_s", "mireds", "share") if key in data
             }
-            return read_record(Task, {**data, **{k: float(v) for k, v in signed.items()}})
+            return read_record(Task, {**data, **{k: float(v) for k, v in numbers.items()}})
         except (AttributeError, TypeError, ValueError) as error:
-            said = " ".join(str(error).split())
-            raise BatchError(f"this is no task: {said}; make one with Task.to_json") from None
+            reason = " ".join(str(error).split())
+            raise BatchError(f"this is no task: {reason}; make one with Task.to_json") from None
 
 
 def answer_task(
@@ -120,9 +118,7 @@ def answer_task(
     force: bool,
     command: str,
 ) -> Task:
-    """Return the task of a look's answer. folders: of all looks, by name. reads: its input
-    files.
-    """
+    """Return the task of a look's answer. folders: of all looks, by name. reads: input files."""
     lightings = [str(folders[name] / "lighting.json") for name in entry.of]
     return Task(
         entry.name,
@@ -158,14 +154,14 @@ def render_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
 def export_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
     """Return the task of a look's exports. answer: that of its answer, in `folder`."""
     lighting = str(folder / "lighting.json")
-    # Of light groups it needs what they are called.
+    # An export to light groups needs their names.
     bases = answer.bases if isinstance(entry.basis, GroupsFile) else ()
-    how: dict[str, Any] = {"handover": entry.handover, "bases": bases}
-    return Task(entry.name, "export", answer.job, (lighting,), answer.reads, **how)
+    options: dict[str, Any] = {"handover": entry.handover, "bases": bases}
+    return Task(entry.name, "export", answer.job, (lighting,), answer.reads, **options)
 
 
 def bases_of(entry: LookEntry) -> tuple[str, ...]:
-    """Return the key of each basis that a look is solved with: equal keys, equal bases."""
+    """Return the key of each basis that a look is solved with: equal keys mean equal bases."""
     if entry.basis is not None:
         return (key_of_basis(entry.basis),)
     return tuple(key_of_scene(scene, entry.settings) for scene in entry.scenes)
@@ -177,16 +173,14 @@ def key_of_basis(basis: BasisFile | GroupsFile) -> str:
 
 
 def key_of_scene(scene: SceneFile, settings: Settings) -> str:
-    """Return the key of a basis that is rendered: the scene through its sensor, and render
-    settings.
-    """
+    """Return the key of a rendered basis: the scene with its sensor, and the render settings."""
     rendered = ("spp", "time_s", "seed", "resolution", "quality", "use_cache", "exact_spp")
-    how = {name: getattr(settings, name) for name in rendered}
-    return json.dumps({"scene": asdict(scene), **how})
+    render_settings = {name: getattr(settings, name) for name in rendered}
+    return json.dumps({"scene": asdict(scene), **render_settings})
 
 
 def _map_paths(given: Any, move: PathMap) -> Any:
-    """Return a job's plain values with other paths: `move` leaves all other texts as they are."""
+    """Return a job's plain values with other paths; `move` leaves all other texts unchanged."""
     if isinstance(given, dict):
         return {key: _map_paths(value, move) for key, value in given.items()}
     if isinstance(given, list):

@@ -1,4 +1,4 @@
-"""Running a work item: what a worker computes, and what it writes."""
+"""The work that an item stands for: computing its value, or writing its files."""
 
 import errno
 import time
@@ -53,31 +53,31 @@ OUT_OF_MEMORY_TEXT = "it takes more memory than there is: use resolution=... or 
 
 
 def run_item(item: WorkItem, cache: WorkerCache, listen: Listener) -> ItemResult:
-    """Run one item; an error becomes its own failure alone, in one line."""
+    """Run one item; an error becomes the failure of this item alone, in one line."""
     return attempt(item, lambda: _run(item, cache, listen))
 
 
 def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
-    """Call `work`, which runs that item, and return its result or its failure."""
-    begun = time.perf_counter()
-    failure, full, lost, value = "", False, False, None
+    """Call `work`, which runs `item`, and return its result or its failure."""
+    start_s = time.perf_counter()
+    failure, disk_full, is_lost, value = "", False, False, None
     try:
         value = work()
     except LightpaintError as error:
-        failure, full = str(error), is_disk_full(error)
+        failure, disk_full = str(error), is_disk_full(error)
     except MemoryError:
-        failure, lost = OUT_OF_MEMORY_TEXT, True
+        failure, is_lost = OUT_OF_MEMORY_TEXT, True
     except OSError as error:
-        failure, full = first_line(error), error.errno in DISK_FULL_ERRNOS
-    except Exception as error:  # a mistake of ours, or of a library's: the others go on
+        failure, disk_full = first_line(error), error.errno in DISK_FULL_ERRNOS
+    except Exception as error:  # a bug here or in a library: the other items go on
         failure = f"{type(error).__name__}: {first_line(error)}"
-    spent_s = time.perf_counter() - begun
+    spent_s = time.perf_counter() - start_s
     failure = one_line(failure, limit=MAX_REASON_LENGTH)
-    return ItemResult(item.name, item.kind, failure, full, lost, spent_s, value=value)
+    return ItemResult(item.name, item.kind, failure, disk_full, is_lost, spent_s, value=value)
 
 
 def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
-    """Run an item; return its value, or None if it fills a folder instead."""
+    """Run an item; return its value, or None if it writes files instead."""
     if isinstance(item, Lesson):
         cache.release_renderer()
         return lesson(cache.film(item.film), item.seed)
@@ -90,8 +90,8 @@ def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
     cache.release_renderer()
     assert isinstance(item, Task)
     cache.keep_only(item.bases)
-    does = {"answer": _answer, "render": final_render, "export": _export}
-    return does[item.kind](item, cache, listen)
+    runners = {"answer": _answer, "render": final_render, "export": _export}
+    return runners[item.kind](item, cache, listen)
 
 
 def is_disk_full(error: BaseException) -> bool:
@@ -132,13 +132,13 @@ def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
 
 
 def _derive_answer(task: Task, fields: dict[str, Any], cache: WorkerCache) -> None:
-    """Write an answer derived from others: a lighting as it is, warmer, or between two."""
+    """Write an answer derived from others: a lighting unchanged, warmer, or between two."""
     settings: Settings = fields["settings"]
     scenes: list[Scene] = [file.content for file in fields["scenes"]]
-    given = content(fields["basis"])
-    groups = given if isinstance(given, LightGroups) else None
-    bases: list[Basis] = [given if groups is None else groups.basis]
-    if given is None:
+    source = content(fields["basis"])
+    groups = source if isinstance(source, LightGroups) else None
+    bases: list[Basis] = [source if groups is None else groups.basis]
+    if source is None:
         bases = [basis for key in task.bases if (basis := cache.basis(key)) is not None]
     lighting = derive_lighting(task.lightings, bases[0], share=task.share, space=task.space)
     if task.mireds:
@@ -156,7 +156,7 @@ def _derive_answer(task: Task, fields: dict[str, Any], cache: WorkerCache) -> No
 def derive_lighting(
     files: tuple[str, ...], basis: Basis, *, share: float, space: Space
 ) -> Lighting:
-    """Return the lighting of one file, or between those of two. Raises LightingError."""
+    """Return the lighting of one file, or a mix of two files' lightings. Raises LightingError."""
     lightings = [read_lighting(file) for file in files]
     lighting = lightings[0] if len(lightings) == 1 else interpolate(lightings, share, space=space)
     lighting.weights_for(basis)
@@ -195,10 +195,10 @@ def _export(task: Task, cache: WorkerCache, listen: Listener) -> None:
     """Write an answered look's exports for other programs."""
     fields = job_fields(task, cache)
     lighting, folder = Path(task.lightings[0]), fields["folder"] / EXPORT
-    given = fields["basis"]
+    basis_source = fields["basis"]
     source = Source(
         fields["scenes"][0].content if fields["scenes"] else None,
-        given.content if isinstance(given, GroupsFile) else None,
+        basis_source.content if isinstance(basis_source, GroupsFile) else None,
         Path(task.handover.stage) if task.handover.stage else None,
     )
     names = names_of_forms(task.handover.to, source)

@@ -1,4 +1,4 @@
-"""Work items, which engines run: steps of looks (see task.py), and parts of what is rendered.
+"""Work items, which engines run: steps of looks (see task.py), and parts of renders.
 
 A work item is files and plain values. It can be sent anywhere and done twice, with the same result.
 """
@@ -23,7 +23,7 @@ class WorkItem(Protocol):
 
     @property
     def name(self) -> str:
-        """Name that no other item of its kind has."""
+        """Name, unique among items of its kind."""
 
     @property
     def kind(self) -> str:
@@ -35,7 +35,7 @@ class WorkItem(Protocol):
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """Files that it reads, too, which were made for it and exist only here."""
+        """Further files that it reads, which were made for it and exist only on this machine."""
 
     @property
     def writes(self) -> str:
@@ -57,12 +57,12 @@ def item_label(item: WorkItem) -> str:
 
 @dataclass(frozen=True)
 class ItemResult:
-    """The result of a work item. failure: the reason if it failed; "" where it is done.
+    """The result of a work item. failure: the reason if it failed; "" if it is done.
 
-    look: name of the item, of steps that of the look. is_disk_full: whether nothing more can be
+    look: name of the item; for a step, of its look. is_disk_full: whether nothing more can be
     written. is_lost: whether the worker died, and the item may well succeed elsewhere. spent_s:
-    seconds. left_s: for all that is left. value: the returned value. files: the written files, by
-    name in the folder, where they were written elsewhere.
+    seconds it took. left_s: estimated seconds for the remaining steps. value: the returned value.
+    files: written files by their name in the folder, if another machine wrote them.
     """
 
     look: str
@@ -95,12 +95,12 @@ class SceneFilm:
         )
 
     def unread(self) -> "SceneFilm":
-        """Return the same, of which nothing is loaded yet."""
+        """Return the same film, with nothing loaded yet."""
         return replace(self, scene=self.scene.unread())
 
     @property
     def key(self) -> str:
-        """Key that two equal ones share."""
+        """Key that equal films share."""
         return json.dumps([vars_of(self.scene), self.quality, self.resolution, self.only])
 
 
@@ -157,7 +157,7 @@ class PartOfBasis:
 
 @dataclass(frozen=True)
 class PaintingOfSums:
-    """A painting whose sums are wanted. emitters: as of `Fit`; resize: as of `Settings`."""
+    """A painting to form sums with. emitters: of `Fit`; resize: of `Settings`."""
 
     painting: Painting
     emitters: Emitters
@@ -165,19 +165,19 @@ class PaintingOfSums:
 
     def with_paths(self, move: PathMap) -> "PaintingOfSums":
         """Return the same with other paths."""
-        its = self.painting
+        painting = self.painting
         paths: dict[str, Any] = {
-            name: value if (value := getattr(its, name)) is None else move(value)
+            name: value if (value := getattr(painting, name)) is None else move(value)
             for name in ("path", "mask", "template")
         }
-        return replace(self, painting=replace(its, **paths))
+        return replace(self, painting=replace(painting, **paths))
 
 
 @dataclass(frozen=True)
 class SumsOfRows:
-    """An item that renders rows of a basis, and keeps nothing but their sums with paintings.
+    """An item that renders rows of a basis, and returns only their sums with paintings.
 
-    part: of all of their samples. learned: as of `PartOfBasis`. files: of the paintings.
+    part: the rows with all their samples. learned: see `PartOfBasis`. files: of the paintings.
     """
 
     name: str
@@ -207,7 +207,7 @@ class SumsOfRows:
             self,
             film=self.film.with_paths(move),
             learned=move(self.learned),
-            paintings=tuple(one.with_paths(move) for one in self.paintings),
+            paintings=tuple(painting.with_paths(move) for painting in self.paintings),
             files=tuple(map(move, self.files)),
         )
 
@@ -216,7 +216,7 @@ class SumsOfRows:
 class Passes:
     """An item that renders passes of a final render. relit: the scene. final: its options.
 
-    first, last: range of passes, the last one not included.
+    first, last: range of passes; the last one is not included.
     """
 
     name: str

@@ -22,7 +22,7 @@ from lightpaint.target.target import Target
 
 
 class WorkerCache:
-    """Scenes and bases that several looks share, each loaded or rendered once in this process."""
+    """Scenes and bases that several looks share; this process loads or renders each once."""
 
     def __init__(self) -> None:
         self._scenes: dict[str, SceneFile] = {}
@@ -32,16 +32,16 @@ class WorkerCache:
         self._rendered = ""
         self._targets: dict[str, Target] = {}
 
-    def scene(self, given: SceneFile) -> SceneFile:
-        """Return the shared scene file that equals `given`; it is loaded when it is first used."""
-        return self._scenes.setdefault(repr(given), given)
+    def scene(self, file: SceneFile) -> SceneFile:
+        """Return the shared scene file that equals `file`; its first use loads it."""
+        return self._scenes.setdefault(repr(file), file)
 
-    def source(self, given: BasisFile | GroupsFile) -> BasisFile | GroupsFile:
-        """Return the shared basis or light groups of that file, read when first used."""
-        return self._saved.setdefault(repr(given), given)
+    def source(self, file: BasisFile | GroupsFile) -> BasisFile | GroupsFile:
+        """Return the shared basis or light groups that equal `file`; the first use reads them."""
+        return self._saved.setdefault(repr(file), file)
 
     def basis(self, key: str) -> Basis | None:
-        """Return the basis of a key, if it is here. key: `key_of_scene`."""
+        """Return the basis of a key, if it is stored here. key: of `key_of_scene`."""
         return self._bases.get(key)
 
     def put(self, key: str, basis: Basis) -> None:
@@ -49,7 +49,7 @@ class WorkerCache:
         self._bases[key] = basis
 
     def load(self, key: str, file: str) -> None:
-        """Load the basis of a key from a file that was saved for workers."""
+        """Load the basis of a key from a file that was written for workers."""
         if file and key not in self._bases:
             self._bases[key] = read_basis(file)
 
@@ -59,7 +59,7 @@ class WorkerCache:
         return scene.only(film.only) if film.only else scene
 
     def renderer(self, item: PartOfBasis | SumsOfRows) -> PartRenderer:
-        """Return the renderer of a part; it stays loaded until the next item is another basis's."""
+        """Return the renderer of a part; it stays loaded until an item of another basis comes."""
         key = repr((item.film.key, item.seed, item.learned))
         if not isinstance(self._renderer, PartRenderer) or self._rendered != key:
             self.release_renderer()
@@ -69,7 +69,7 @@ class WorkerCache:
         return self._renderer
 
     def frame(self, item: Passes) -> PassRenderer:
-        """Return the renderer of passes; it stays loaded as well."""
+        """Return the renderer of passes; it stays loaded until another scene's item comes."""
         key = repr((item.relit, item.final))
         if not isinstance(self._renderer, PassRenderer) or self._rendered != key:
             self.release_renderer()
@@ -77,12 +77,12 @@ class WorkerCache:
             self._renderer, self._rendered = PassRenderer(scene, item.final), key
         return self._renderer
 
-    def target(self, wanted: PaintingOfSums, size: tuple[int, int]) -> Target:
+    def target(self, request: PaintingOfSums, size: tuple[int, int]) -> Target:
         """Return a painting at the size of its basis, read once."""
-        key = repr((wanted, size))
+        key = repr((request, size))
         if key not in self._targets:
-            read = wanted.painting.unread().content
-            self._targets[key] = read.fitted_to(size, resize=wanted.resize)
+            read = request.painting.unread().content
+            self._targets[key] = read.fitted_to(size, resize=request.resize)
         return self._targets[key]
 
     def release_renderer(self) -> None:
