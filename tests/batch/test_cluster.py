@@ -250,7 +250,7 @@ def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     workers.await_two()
     here, expected = undisturbed
     spool = here / "cache-killed" / "parts"
-    killer = Killer(workers, "part 3", lambda: len(list(spool.glob("*/?-*.npz"))) >= 2)
+    killer = Killer(workers, "part 3", lambda: len(list(spool.glob("*/[0-9]*-*.npz"))) >= 2)
     hears = Hears(killer.hear)
     run_item(here, "killed", workers, hears)
     assert killer.thread is not None
@@ -310,13 +310,13 @@ def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
     spool = here / "cache-stopped" / "parts"
 
     def stop(text: str) -> None:
-        if text.startswith("part ") and len(list(spool.glob("*/?-*.npz"))) >= 2:
+        if text.startswith("part ") and len(list(spool.glob("*/[0-9]*-*.npz"))) >= 2:
             raise KeyboardInterrupt
 
     first, second = Hears(stop), Hears()
     with pytest.raises(KeyboardInterrupt):
         run_item(here, "stopped", workers, first)
-    kept = len(list(spool.glob("*/?-*.npz")))
+    kept = len(list(spool.glob("*/[0-9]*-*.npz")))
     assert kept >= 2
     run_item(here, "stopped", workers, second)
     assert contents(here / "stopped") == expected

@@ -93,7 +93,9 @@ def test_files_in_the_folder_of_the_job_go_with_it(here: Path) -> None:
 def test_a_template_that_is_there_is_kept(here: Path) -> None:
     said = refused(here, "batch", "looks.toml", "--export", "openjd", "job")
     assert "template.json is there" in said
-    assert "where is the job to go" in refused(here, "batch", "looks.toml", "--export", "openjd")
+    assert "folder of the job is missing" in refused(
+        here, "batch", "looks.toml", "--export", "openjd"
+    )
 
 
 def test_openjd_runs_it(here: Path) -> None:

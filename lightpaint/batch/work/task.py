@@ -70,7 +70,7 @@ class Task:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Files that it reads; see `WorkItem`. A final render reads those beside its lighting, too."""
+        """Files that it reads (see `WorkItem`); a render needs those beside its lighting, too."""
         existing: list[str] = []
         if self.kind == "render":
             existing = [str(x) for x in sorted(Path(self.writes).rglob("*")) if x.is_file()]
