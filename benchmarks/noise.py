@@ -1,0 +1,217 @@
+"""How noisy planes and pictures are for the time that they take, against one render per light.
+
+    python benchmarks/noise.py [--scenes gallery hall64 hall256] [--before CHECKOUT] [--keep FOLDER]
+
+Errors are mean squared differences from a long render, of each light's plane over its mean, less
+what that render's own noise adds: so bias counts. Times are seconds of the processor, kernels
+compiled, loading not counted. `one pass` is the basis as it is rendered and solved, `pictures`
+its planes as people see them, without grain. The rivals are one ordinary render per light, as they
+come and denoised alike; where there are many lights, some of them are rendered alone, and their
+time is scaled to all. A figure says how many times lower the error is at equal time, as the
+geometric mean over lights. `--before` names a checkout of an earlier version, which is then
+measured in the same run, in turns. Long renders are kept in FOLDER for the next run.
+"""
+
+import argparse
+import gc
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from hall import write_hall
+
+from lightpaint import Basis, Scene, load_scene, render_basis
+from lightpaint.basis import clean
+from lightpaint.images.denoiser import denoised
+from lightpaint.scene.scene_render import Stream, render_loaded
+
+REPOSITORY = Path(__file__).parent.parent
+GALLERY = REPOSITORY / "scenes" / "gallery" / "scene.xml"
+SCENES = ("gallery", "hall64", "hall256")
+HALL_SIZE = {"width": 320, "height": 180}
+
+#: Seeds of the long render, and of the first one that is measured.
+LONG_SEED, FIRST_SEED = 90_000, 1
+
+#: Lights that are rendered alone, at most.
+ALONE = 12
+
+WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+
+#: Denoises a plane, under the name that an earlier version may have.
+clean_halves = clean.clean_halves if hasattr(clean, "clean_halves") else clean.clean_plane
+
+Errors = npt.NDArray[np.float64]
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=SCENES)
+    parser.add_argument("--spp", type=int, default=32)
+    parser.add_argument("--long-spp", type=int, default=1024)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--before", type=Path, metavar="CHECKOUT")
+    parser.add_argument("--keep", type=Path, metavar="FOLDER")
+    parser.add_argument("--measure", nargs=2, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.measure:
+        scene, out = options.measure
+        measure(scene_named(scene), options.spp, options.repeats, Path(out))
+        return
+    print(f"{'':32s}{'one pass':>10s}{'pictures':>10s}{'of denoised':>13s}{'CPU s':>8s}")
+    with tempfile.TemporaryDirectory() as folder:
+        keep = options.keep or Path(folder)
+        keep.mkdir(parents=True, exist_ok=True)
+        for name in options.scenes:
+            compare(name, options, keep)
+
+
+def scene_named(name: str) -> Scene:
+    """Load the gallery at half its size, or the hall with as many lights as its name says."""
+    if name == "gallery":
+        return load_scene(GALLERY).reduced("1/2")
+    with tempfile.TemporaryDirectory() as folder:
+        return load_scene(write_hall(Path(folder), int(name.removeprefix("hall")), **HALL_SIZE))
+
+
+def compare(name: str, options: argparse.Namespace, keep: Path) -> None:
+    """Measure one scene by this version, by the one before, and by a render per light."""
+    scene = scene_named(name)
+    truth, variance = long_render(scene, options.long_spp, keep / f"{name}_{options.long_spp}.npz")
+    checkouts = {"now": REPOSITORY} | ({"before": options.before} if options.before else {})
+    found = {which: measured(name, options, at, keep) for which, at in checkouts.items()}
+    spp, repeats, lights = options.spp, options.repeats, len(scene.lights)
+    which = np.unique(np.linspace(0, lights - 1, min(ALONE, lights)).astype(int))
+    alone = [render_alone(scene, k, spp, seed) for seed in range(repeats) for k in which]
+    alone_s = sum(seconds for _, seconds in alone) / len(alone) * lights
+    plain = errors([image for image, _ in alone], np.tile(which, repeats), truth, variance)
+    now = found["now"]
+    # As many samples as that many renders can take in the same time, one at least.
+    few = max(1, round(spp * float(now["pictures_s"]) / alone_s))
+    features = render_basis(scene, spp=2, seed=0).features
+    rough = [render_alone(scene, k, few, seed) for seed in range(repeats) for k in which]
+    begin_s = time.process_time()
+    clean = [denoised(image, features) for image, _ in rough]
+    clean_s = (time.process_time() - begin_s + sum(s for _, s in rough)) / len(rough) * lights
+    smooth = errors(clean, np.tile(which, repeats), truth, variance)
+    for label, its in found.items():
+        noisy = errors(its["planes"], np.tile(np.arange(lights), repeats), truth, variance)
+        shown = errors(its["pictures"], np.tile(np.arange(lights), repeats), truth, variance)
+        pass_s, pictures_s = float(its["pass_s"]), float(its["pictures_s"])
+        figures = (
+            ratio(plain * alone_s, noisy[which] * pass_s),
+            ratio(plain * alone_s, shown[which] * pictures_s),
+            ratio(smooth * clean_s, shown[which] * pictures_s),
+        )
+        title = f"{name}, {lights} lights, {spp} spp, {label}"
+        print(
+            f"{title:32s}{figures[0]:9.1f}x{figures[1]:9.1f}x{figures[2]:12.1f}x{pictures_s:8.1f}"
+        )
+        sys.stdout.flush()
+
+
+def long_render(scene: Scene, spp: int, path: Path) -> tuple[npt.NDArray[np.float32], Errors]:
+    """Return planes of many samples, (n, h, w, 3), and the variance of each, (n,)."""
+    if not path.is_file():
+        basis = render_basis(scene, spp=spp, seed=LONG_SEED)
+        variance = np.square(basis.half_differences, dtype=np.float64).mean(axis=(1, 2, 3))
+        np.savez(path, planes=basis.images, variance=variance)
+    with np.load(path) as kept:
+        return kept["planes"], kept["variance"]
+
+
+def measured(
+    name: str, options: argparse.Namespace, checkout: Path, keep: Path
+) -> dict[str, npt.NDArray[np.float32]]:
+    """Return what `measure` finds in a process that runs the version of `checkout`."""
+    out = keep / "measured.npz"
+    command = [sys.executable, str(Path(__file__).absolute()), "--measure", name, str(out)]
+    command += ["--spp", str(options.spp), "--repeats", str(options.repeats)]
+    path = os.pathsep.join([str(checkout), str(Path(__file__).parent)])
+    subprocess.run(command, check=True, env={**os.environ, "PYTHONPATH": path})
+    with np.load(out) as found:
+        made = dict(found)
+    out.unlink()
+    return made
+
+
+def measure(scene: Scene, spp: int, repeats: int, out: Path) -> None:
+    """Write planes and pictures of several seeds, and seconds for one of each."""
+    render_basis(scene, spp=2, seed=0)  # compiles the kernels
+    planes, pictures, pass_s, clean_s = [], [], 0.0, 0.0
+    for seed in range(FIRST_SEED, FIRST_SEED + repeats):
+        basis, seconds = render_timed(scene, spp, seed)
+        pass_s += seconds
+        begin_s = time.process_time()
+        for k in range(len(scene.lights)):
+            halves, scale = clean_halves(basis, k)
+            pictures.append(halves.astype(np.float32) * np.float32(scale))
+        clean_s += time.process_time() - begin_s
+        planes += list(basis.images)
+        del basis
+        gc.collect()
+    seconds = {"pass_s": pass_s / repeats, "pictures_s": (pass_s + clean_s) / repeats}
+    np.savez(out, planes=np.stack(planes), pictures=np.stack(pictures), **seconds)
+
+
+def render_timed(scene: Scene, spp: int, seed: int) -> tuple[Basis, float]:
+    """Return a basis and the processor's seconds from its first pass on."""
+    begun: list[float] = []
+
+    def progress(*_: object) -> None:
+        begun.append(time.process_time())
+
+    basis = render_basis(scene, spp=spp, seed=seed, progress=progress)
+    return basis, time.process_time() - begun[0]
+
+
+def render_alone(
+    scene: Scene, light: int, spp: int, seed: int
+) -> tuple[npt.NDArray[np.float32], float]:
+    """Return an ordinary render of one light alone, and the processor's seconds for it."""
+    loaded = scene.load(
+        {x.name: WHITE if k == light else BLACK for k, x in enumerate(scene.lights)}
+    )
+    render_loaded(loaded, scene, spp=2, seed=0, stream=Stream.TEMPLATE)
+    begin_s = time.process_time()
+    image = render_loaded(
+        loaded, scene, spp=max(spp, 2), seed=seed * 1000 + light, stream=Stream.TEMPLATE
+    )
+    seconds = time.process_time() - begin_s
+    del loaded
+    gc.collect()
+    return image.image, seconds * spp / max(spp, 2)
+
+
+def errors(
+    images: Sequence[npt.NDArray[np.float32]] | npt.NDArray[np.float32],
+    lights: npt.NDArray[np.int64],
+    truth: npt.NDArray[np.float32],
+    variance: Errors,
+) -> Errors:
+    """Return the error of each light that occurs, in their order, as a mean over its images.
+
+    images: (h, w, 3) each; lights: which light each one shows.
+    """
+    total = np.zeros(len(truth))
+    for image, k in zip(images, lights, strict=True):
+        total[k] += np.square(image - truth[k], dtype=np.float64).mean() - variance[k]
+    there, count = np.unique(lights, return_counts=True)
+    return total[there] / count / np.square(truth[there].mean(axis=(1, 2, 3), dtype=np.float64))
+
+
+def ratio(theirs: Errors, ours: Errors) -> float:
+    """Return the geometric mean over lights of how many times lower our error is."""
+    told = (theirs > 0) & (ours > 0)
+    return float(np.exp(np.mean(np.log(theirs[told] / ours[told]))))
+
+
+if __name__ == "__main__":
+    main()
