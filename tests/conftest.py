@@ -50,6 +50,11 @@ def pytest_configure(config: pytest.Config) -> None:
         threadpool_limits(1, "blas")
 
 
+def pytest_unconfigure() -> None:
+    """Have all collected at the end: libraries complain of what is left."""
+    gc.unfreeze()
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """One line for all skips, whose reasons are the names of what was not there."""
     skipped = terminalreporter.getreports("skipped")
@@ -136,8 +141,11 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="module", autouse=True)
 def _older_objects_are_not_looked_through() -> Iterator[None]:
-    """Every scene that is let go of collects garbage: of what is new, not of all that is loaded."""
-    gc.collect()
+    """Every scene that is let go of collects garbage: of what is new, not of all that is loaded.
+
+    Each module's garbage is collected as it ends, and what is left is never looked through again:
+    half a million objects of the tests and of what they import take 0.3 s each time.
+    """
     gc.freeze()
     yield
-    gc.unfreeze()
+    gc.collect()
