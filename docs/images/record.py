@@ -38,6 +38,10 @@ WINDOW, SIZE = (1360, 800), (1020, 600)
 #: Milliseconds that a frame is shown.
 FRAME = 90
 
+#: Looks in a row at which nothing is being solved, before an answer counts as final: on a busy
+#: machine a drag begins to be solved only after a while.
+CALM = 4
+
 #: An arrow whose tip is its first point.
 POINTER = ((0, 0), (0, 19), (5, 15), (8, 22), (12, 20), (9, 14), (15, 14))
 
@@ -88,16 +92,22 @@ class Hand:
         self.see(3)
 
     def wait(self, times: int = 12) -> None:
-        """Until the answer is exact, and its sentence is there."""
-        said = self.page.locator(".headline .said")
-        until = time.time() + 60
-        while time.time() < until:
+        """Until the answer is exact, and stays it, and its sentence and the reasons are there."""
+        until, calm = time.time() + 120, 0
+        while calm < CALM:
+            if time.time() > until:
+                raise TimeoutError("the painter has been solving for two minutes")
             time.sleep(0.4)
-            is_live = self.page.locator(".headline .live").count()
-            if not is_live and "…" not in said.inner_text():
-                break
+            calm = calm + 1 if self.is_calm() else 0
         time.sleep(0.8)  # a toast, a sharp picture
         self.see(times)
+
+    def is_calm(self) -> bool:
+        """Whether nothing is being solved or explained."""
+        said = self.page.locator(".headline .said")
+        reasons = self.page.get_by_role("button", name="Finding reasons …")
+        is_busy = self.page.locator(".headline .live").count() or reasons.count()
+        return not is_busy and "…" not in said.inner_text()
 
     def of_painting(self, u: float, v: float) -> Place:
         """A place of the left, or upper, picture, as shares of it."""
