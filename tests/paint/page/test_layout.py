@@ -376,3 +376,12 @@ def test_axe_finds_nothing(opened: Any, axe: str, state: str) -> None:
         }"""
     )
     assert violations(painter.page, ".lightpaint") == []
+
+
+def test_a_picture_at_the_right_edge_is_named_on_one_line(painter: Painter) -> None:
+    """In the wipe the name of the right picture ends where the window does."""
+    painter.button("Wipe").click()
+    painter.still()
+    boxes = [one.bounding_box() for one in painter.page.locator(".tag").all()]
+    left, right = sorted(boxes, key=lambda box: box["x"])
+    assert right["height"] == left["height"]
