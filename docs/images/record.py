@@ -92,9 +92,14 @@ class Hand:
         self.see(3)
 
     def wait(self, times: int = 12) -> None:
-        """Until the answer is exact, and stays it, and its sentence and the reasons are there."""
+        """Until the answer is exact, and stays it, and its sentence and the reasons are there.
+
+        Raises RuntimeError where the page warns of something.
+        """
         until, calm = time.time() + 120, 0
         while calm < CALM:
+            if warnings := self.page.locator(".toast.is-warn").all_inner_texts():
+                raise RuntimeError(warnings[0])
             if time.time() > until:
                 raise TimeoutError("the painter has been solving for two minutes")
             time.sleep(0.4)

@@ -141,6 +141,9 @@ def an_hour_later(designer: Designer) -> None:
 
 Job = Callable[[Designer], None]
 
+#: Where the pointer outlines nothing, and no tip appears.
+AWAY = (260, 20)
+
 STAGE = ("--sensor=balcony", "--sensor=box", "--resolution=1/2")
 
 #: Scene, more words for the command, and what is done in one page after the other.
@@ -169,6 +172,7 @@ def main() -> None:
                     server = painter(scene, options.spp, options.port, *words, folder=folder)
                     designer = Designer(stack.enter_context(using(stack.enter_context(server))))
                     job(designer)
+                    designer.page.mouse.move(*AWAY)
                     designer.hand.wait(0)
                     actions += designer.actions
                     sentence = designer.sentence
