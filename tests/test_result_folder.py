@@ -46,11 +46,13 @@ def no_render(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object, **__: object) -> None:
         raise AssertionError("this was to be refused before it renders")
 
+    # The modules that import `obtain` first: what they import then must not be `never` for good.
     for name in (
-        "job_bases.obtain",
+        "templates.obtain",
         "templates.render",
         "templates.render_surfaces",
         "relit_renders.render",
+        "job_bases.obtain",
     ):
         monkeypatch.setattr(f"lightpaint.pipeline.{name}", never)
 
@@ -183,7 +185,7 @@ def test_force_replaces_whatever_it_was(here: Path) -> None:
 
 def test_two_paintings_of_one_name_in_one_command(here: Path) -> None:
     line = refused(here, *SOLVE, "template/evening.exr", "gallery/evening.exr", "-o", "out")
-    assert "results would overwrite each other in evening: give" in line
+    assert "results would overwrite each other in evening: run those" in line
 
 
 def test_jobs_that_were_born_before_the_other_was_run(here: Path) -> None:
@@ -316,7 +318,7 @@ def test_relight_keeps_what_is_not_its_own(here: Path, room: Path) -> None:
     assert done.returncode == 2
     assert "look holds the answer to look.exr, not to other/lighting.json" in done.stderr
     done = relight("other/lighting.json", "look/lighting.json")
-    assert "results would overwrite each other in look: give" in done.stderr
+    assert "results would overwrite each other in look: run those" in done.stderr
     os.link(lighting, here / "other" / "relit.png")
     done = relight("look/lighting.json", "-o", "other", "--force")
     assert "other/relit.png is an input of this command" in done.stderr

@@ -89,12 +89,12 @@ def test_it_stops_early_and_still_finds_what_is_wrong(tmp_path: Path):
     lighting = Lighting.of_weights(basis, basis.present_weights)
     relit = relight(scene, lighting, tmp_path / "relit.xml")
     predicted = combine(basis, lighting)
-    right = verify_in_stages(predicted, relit, basis, lighting, spp=256)
+    right = verify_in_stages(predicted, relit, basis, lighting, spp=1024)
     assert right.agrees
     assert right.spp is not None
-    assert right.spp < 256
-    assert right.limit == pytest.approx(limit_of_looks(len(stages_of(256))))
+    assert right.spp < 1024
+    assert right.limit == pytest.approx(limit_of_looks(len(stages_of(1024))))
     wrong = Estimate(predicted.image * np.float32(1.2), predicted.half_difference)
-    found = verify_in_stages(wrong, relit, basis, lighting, spp=256)
+    found = verify_in_stages(wrong, relit, basis, lighting, spp=1024)
     assert not found.agrees
-    assert found.spp == stages_of(256)[0]
+    assert found.spp == stages_of(1024)[0]
