@@ -128,8 +128,8 @@ def _check_size(basis: Basis, name: str) -> None:
     if (held := 6 * count * height * width) > MAX_PAGE_BYTES:
         raise PaintError(
             f"{name} has {count} lights of {width}x{height}, for which a page would need "
-            f"{held / 1e9:.1f} GB: paint on a smaller film (lightpaint paint SCENE --resolution "
-            "1/4), export the painting, and solve it with this basis (lightpaint solve --resize)"
+            f"{held / 1e9:.1f} GB: paint the scene on a smaller film, with resolution=..., export "
+            "the painting, and solve it with this basis and resize=True"
         )
 
 

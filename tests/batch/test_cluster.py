@@ -153,7 +153,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[st
 
 
 def in_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
-    patch.setattr(parts_module, "SAMPLES", 2**11)
+    patch.setattr(parts_module, "SAMPLES", 2**10)
     patch.setattr(lessons, "LESSON", (2**12,))
     patch.setattr(scene_render, "SAMPLES_PER_RANGE", 1)
     patch.setenv("LIGHTPAINT_CACHE", str(cache))

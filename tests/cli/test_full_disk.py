@@ -69,7 +69,7 @@ def test_a_full_cache_costs_no_answer(small_disk: tuple[Path, str], tmp_path: Pa
         assert code == 0, errors
         assert "results in warm/" in output
         assert (tmp_path / "warm" / "report.html").is_file()
-        assert f"the basis could not be kept in {disk}" in errors
+        assert f"the basis could not be saved in {disk}" in errors
         assert {path.name for path in disk.iterdir()} <= {"others", TAG}
         # Nor does it cost one where the disk is full from the beginning.
         if before == "true":

@@ -58,9 +58,12 @@ def kept(folder: Path, cache: str) -> list[Path]:
     return list((folder / cache).glob("*.basis.exr"))
 
 
-def writings(folder: Path, cache: str) -> list[int]:
-    """When the basis that is kept was written last; nothing where there is none."""
-    return [path.stat().st_mtime_ns for path in kept(folder, cache)]
+def writings(folder: Path, cache: str) -> list[tuple[int, int]]:
+    """Which file has the basis that is kept; nothing where there is none.
+
+    Each one that is written is another file, while a time also changes when a basis is found.
+    """
+    return [(path.stat().st_ino, path.stat().st_size) for path in kept(folder, cache)]
 
 
 def samples(basis: Basis) -> int:

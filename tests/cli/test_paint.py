@@ -124,7 +124,7 @@ def test_several_views_are_named_by_sensors_or_are_bases(make_basis: Any) -> Non
     ("line", "said"),
     [
         ("room.basis.exr room.basis.exr", "a view is there twice"),
-        ("room.basis.exr groups.exr", "several are bases of the views of one scene"),
+        ("room.basis.exr groups.exr", "several must be bases of the views of one scene"),
         ("scene.xml room.basis.exr", "for views of a scene repeat --sensor"),
         ("room.basis.exr -s a", "-s cannot change a saved basis|--sensor"),
         ("", "nothing to paint: give a scene, a basis, or light groups"),
@@ -201,7 +201,7 @@ def test_it_serves_until_it_is_told_to_end_and_keeps_the_session(
         assert process.stderr is not None
         said = process.stderr.read()
         assert "Traceback" not in said
-        assert said.endswith("what was painted is kept in room.paint\n")
+        assert said.endswith("the session is kept in room.paint\n")
     identity = Identity.of([make_basis(2)])
     with Store.open(path, identity) as store:
         store.append(Step("stroke", "mine"))
@@ -283,7 +283,7 @@ def test_who_asks_twice_for_the_end_gets_one(here: Path, second: signal.Signals)
         assert process.stderr is not None
         said = process.stderr.read()
     assert "Traceback" not in said
-    assert said.endswith("what was painted is kept in room.paint\n")
+    assert said.endswith("the session is kept in room.paint\n")
 
 
 def live(url: str) -> ClientConnection:
@@ -370,7 +370,7 @@ def test_a_host_is_told_what_it_means_and_a_closed_terminal_ends_it(
     is_risk = "anyone who has its address with the token can paint here" in said
     assert is_risk == (host == "0.0.0.0")
     assert "Traceback" not in said
-    assert said.endswith("what was painted is kept in groups.paint\n")
+    assert said.endswith("the session is kept in groups.paint\n")
 
 
 @pytest.mark.parametrize("host", ["", "no.such.name.invalid", "203.0.113.7"])

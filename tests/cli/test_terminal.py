@@ -145,6 +145,17 @@ def test_progress_and_remarks_on_a_terminal(
     assert capfd.readouterr().err == f"basis of {SHOWN}: 2 passes\n"
 
 
+@pytest.mark.parametrize(
+    ("count", "unit", "line"),
+    [(1, "passes", "1 pass"), (1, "ranges of rows", "1 range of rows"), (2, "parts", "2 parts")],
+)
+def test_one_thing_is_no_plural(
+    count: int, unit: str, line: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    terminal.TerminalListener()("basis", 0, count, unit)
+    assert capfd.readouterr().err == f"basis: {line}\n"
+
+
 def test_each_worker_has_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TERM", "dumb")

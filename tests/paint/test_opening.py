@@ -150,5 +150,5 @@ def test_a_basis_that_no_page_can_hold_says_what_to_do(
     monkeypatch.setattr(subject_factory, "MAX_PAGE_BYTES", 6 * 3 * 120)
     assert make_subject(basis, path.parent / "s").basis is basis
     monkeypatch.setattr(subject_factory, "MAX_PAGE_BYTES", 6 * 3 * 120 - 1)
-    with pytest.raises(PaintError, match=r"3 lights of 10x12.*--resolution 1/4.*--resize"):
+    with pytest.raises(PaintError, match=r"3 lights of 10x12.*resolution=.*resize=True"):
         make_subject(basis, path.parent / "s")

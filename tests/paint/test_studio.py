@@ -220,7 +220,7 @@ def test_an_exact_answer_tells_of_each_light(heard: IncomingMessage, basis: lp.B
     assert any(light["error"] for light in fields["lights"])
 
 
-def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
+def test_clean_halvess_of_few_samples_do_until_there_are_better_ones(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """A picture without grain is not shown with it again while the lights are still rendered."""
@@ -228,16 +228,16 @@ def test_clean_planes_of_few_samples_do_until_there_are_better_ones(
     better = replace(basis, planes=basis.images * np.float32(1.5))
     is_taken, goes_on = threading.Event(), threading.Event()
     cleaned: list[lp.Basis] = []
-    real = plane_denoiser.clean_plane
+    real = plane_denoiser.clean_halves
 
-    def clean_plane(its: lp.Basis, k: int) -> Any:
+    def clean_halves(its: lp.Basis, k: int) -> Any:
         if its.images is better.images:
             is_taken.set()
             goes_on.wait(30)
         cleaned.append(its)
         return real(its, k)
 
-    monkeypatch.setattr(plane_denoiser, "clean_plane", clean_plane)
+    monkeypatch.setattr(plane_denoiser, "clean_halves", clean_halves)
     monkeypatch.setattr(studio, "obtain_bases", lambda *_: iter([[basis], [better]]))
     heard = IncomingMessage(tmp_path, basis)
     assert is_taken.wait(30)
@@ -305,7 +305,7 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
     heard.studio.close()
 
 
-def test_clean_planes_come_later_and_keep_the_light(
+def test_clean_halvess_come_later_and_keep_the_light(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -213,13 +212,8 @@ def test_a_basis_of_a_smaller_film_than_the_scene(tmp_path: Path):
     [first] = suggest_lights(scene, basis, solution, count=1)
     assert first.with_it.shape == (10, 12, 3)
     assert first.gain_share > 0.5
-    other = replace(
-        basis,
-        planes=basis.images[:, :7],
-        noise=basis.half_differences[:, :7],
-        emitters_seen=basis.emitters_seen[:7],
-        features=None,
-        objects=None,
+    other = basis.on_pixels(
+        basis.images[:, :7], basis.half_differences[:, :7], basis.emitters_seen[:7]
     )
     with pytest.raises(SceneError, match="no blocks of those of the film"):
         suggest_lights(scene, other, solution, count=1)
@@ -256,7 +250,7 @@ def _made(name: str, gain: float, missed: float, at: Any = (0.25, 0.5)) -> Sugge
 
 def test_the_section_says_what_was_found():
     assert suggestion_section(None, transform=ViewTransform()) == ""
-    assert "No point light would surely" in suggestion_section((), transform=ViewTransform())
+    assert "No point light would certainly" in suggestion_section((), transform=ViewTransform())
     two = (_made("a", 0.4, 0.6), _made("b & c", 0.2, 0.4, None))
     page = suggestion_section(two, transform=ViewTransform(), cd_per_unit=100)
     assert "would remove 40 % of the difference" in page

@@ -173,7 +173,7 @@ class TerminalListener:
         """Show that `done` of `total` pieces of the work `label` are finished."""
         if self._bars is None:
             if done == 0 and not output_mode().is_quiet:
-                lines.err(f"{label}: {total} {unit}")
+                lines.err(f"{label}: {_counted(total, unit)}")
             return
         if label not in self._tasks:
             what = label if unit in ("passes", label) else f"{label} ({unit})"
@@ -215,3 +215,11 @@ class TerminalListener:
         """Print a finished stage with its time, in verbose mode."""
         if output_mode().is_verbose:
             self.say(_timed(text))
+
+
+def _counted(count: int, unit: str) -> str:
+    """Return a number of things. unit: their plural, of which the first word counts."""
+    things, _, rest = unit.partition(" ")
+    if count == 1:
+        things = {"passes": "pass"}.get(things, things.removesuffix("s"))
+    return " ".join(filter(None, (str(count), things, rest)))
