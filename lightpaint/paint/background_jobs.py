@@ -1,6 +1,4 @@
-"""Long tasks of a session, in threads of their own: exports, verification, explanations,
-previews.
-"""
+"""Long tasks of a session in threads of their own: exports, verification, previews and others."""
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -53,7 +51,7 @@ class JobHost(Protocol):
     ) -> tuple[SessionSnapshot, Lighting]:
         """Return the paintings and requests as they are now, and the last answer.
 
-        requests: asked instead of those of the session.
+        requests: replace those of the session, if given.
         """
 
     def clean_planes(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
@@ -77,8 +75,8 @@ def _absolute_names(files: Iterable[Path]) -> tuple[str, ...]:
 class BackgroundJobs:
     """Exports, verifications, explanations and previews of one studio.
 
-    One job writes at a time, and one verifies. Of two verifications the later one counts, since the
-    answer may have changed by then.
+    One job writes at a time, and one verifies. A later verification replaces an earlier one, since
+    the answer may have changed by then.
     """
 
     def __init__(self, host: JobHost, threads: BackgroundThreads) -> None:
@@ -86,16 +84,16 @@ class BackgroundJobs:
         self._write_lock, self._render_lock = Lock(), Lock()
         self._verifications: dict[
             int, tuple[int, VerificationResult]
-        ] = {}  # renders, by view: of which version
-        self._preview_number = 0  # number of the last preview that was asked for
+        ] = {}  # last verification of each view, with the session's version at its render
+        self._preview_number = 0  # number of the last requested preview
         self._verify_request: protocol.Verify | None = (
-            None  # that was asked for last; None if stopped
+            None  # the last request; None if it was stopped
         )
-        self._stop_count = 0  # how often somebody has stopped what is written
+        self._stop_count = 0  # how often exports were stopped
 
     def handle(self, message: JobRequest) -> list[Message]:
         """Start a job, or stop one. Raises PaintError for what this session cannot do."""
-        works: dict[type, tuple[TaskName, Callable[[Any], None]]] = {
+        starters: dict[type, tuple[TaskName, Callable[[Any], None]]] = {
             protocol.Export: ("export", partial(self._run_export, stop_count=self._stop_count)),
             protocol.Verify: ("verify", self._run_verify),
             protocol.Explain: ("explain", self._run_explain),
@@ -106,22 +104,21 @@ class BackgroundJobs:
                 return [TaskStarted(what="stop")]
             if self._subject(message.view).scene is None:
                 raise PaintError("there is no scene to render: it was opened from a saved basis")
-            # Here, and not in its thread: what is said next may be that it is to stop.
+            # Set here, not in its thread: the next message may stop it.
             self._verify_request = message
         elif isinstance(message, protocol.Explain):
             self._subject(message.view)
         elif not message.run:
             self._stop_count += 1
             return [TaskStarted(what="stop")]
-        what, work = works[type(message)]
-        self._threads.start_low_priority(lambda: work(message), what)
-        return [TaskStarted(what=what)]
+        task_name, work = starters[type(message)]
+        self._threads.start_low_priority(lambda: work(message), task_name)
+        return [TaskStarted(what=task_name)]
 
     def start_preview(self, message: protocol.Preview, requests: SessionRequests) -> list[Message]:
-        """Start to compute what a change would do. Raises PaintError for a view that does not
-        exist.
+        """Start to compute the effect of a change. Raises PaintError for an unknown view.
 
-        requests: those after the change. Of two previews the later one counts.
+        requests: those after the change. A later preview replaces an earlier one.
         """
         self._subject(message.view)
         self._preview_number = message.number
@@ -129,18 +126,17 @@ class BackgroundJobs:
         return [TaskStarted(what="preview")]
 
     def solve_command(self, sensors: Sequence[str], requests: SessionRequests) -> str:
-        """Return the command that finds the same answer from exported paintings; "" where there is
-        none.
-        """
+        """Return the command that solves exported paintings to the same answer; "" if none."""
         subject = self._host.subjects[0]
         paths = {sensor: str(painting_path(subject.folder, sensor)) for sensor in sensors}
         return subject.command(paths, requests) if paths else ""
 
     def verifications(self, version: int) -> tuple[VerificationResult, ...]:
-        """Return the last verification of each view, marked where the session has changed since."""
+        """Return the last verification of each view, marked as old if the session has changed."""
         results = list(self._verifications.values())
         return tuple(
-            replace(result, is_old=of_version != version) for of_version, result in results
+            replace(result, is_old=version_at_render != version)
+            for version_at_render, result in results
         )
 
     def _subject(self, view: int) -> Subject:
@@ -151,10 +147,10 @@ class BackgroundJobs:
 
     def _exact_answer(self) -> tuple[SessionSnapshot, Lighting]:
         """Return the paintings as they are now, and the exact answer to them."""
-        snapshot, now = self._host.snapshot_and_lighting()
+        snapshot, lighting = self._host.snapshot_and_lighting()
         solution = snapshot.solution()
         if solution is None:
-            return snapshot, now
+            return snapshot, lighting
         return snapshot, with_findings(solution, analyse(solution)).lighting
 
     def _run_export(self, message: protocol.Export, stop_count: int) -> None:
@@ -162,7 +158,7 @@ class BackgroundJobs:
 
         stop_count: how often exports had been stopped when this one was requested.
         """
-        # It brings all rooms, of which painting needs a few.
+        # Imported here: it loads all rooms, and painting needs only a few.
         from lightpaint.paint.session_exports import NEEDS_PAINTING, export
 
         def check() -> None:
@@ -170,35 +166,35 @@ class BackgroundJobs:
                 raise StoppedError
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
-            del label  # what it is at within an export is no news to a page
+            del label  # a page does not show the steps of an export
             check()
             self._host.report_progress("export", done, total, unit)
 
         files: list[Path] = []
         try:
-            # Also the exact answer, which may take longer than somebody waits, is given up.
+            # A stop also ends the exact solve, which may take long.
             with cancellable(check):
                 snapshot, lighting = self._exact_answer()
                 with self._write_lock:
                     check()
                     subjects = self._host.subjects
                     for file in export(subjects, snapshot, lighting, message.what, report):
-                        files.append(file)  # one by one: those before a stop are there
+                        files.append(file)  # one by one: a stop keeps those already written
         except StoppedError:
             if self._stop_count != stop_count:
                 result = ExportResult(files=_absolute_names(files), command="", is_stopped=True)
                 self._host.publish(result)
             return
-        # It is of the paintings that were written now: those of before may be others.
-        is_asked, is_painted = (
+        # The command names only paintings that this export wrote: older files may differ.
+        needs_painting, is_painted = (
             bool(NEEDS_PAINTING & set(message.what)),
             bool(snapshot.painted_views),
         )
-        sensors = snapshot.painted_sensors if is_asked and is_painted else ()
+        sensors = snapshot.painted_sensors if needs_painting and is_painted else ()
         result = ExportResult(
             files=_absolute_names(files),
             command=self.solve_command(sensors, snapshot.requests),
-            is_unpainted=is_asked and not is_painted,
+            is_unpainted=needs_painting and not is_painted,
         )
         self._host.publish(result)
 
@@ -208,7 +204,7 @@ class BackgroundJobs:
                 raise StoppedError
 
         try:
-            # Also the exact answer, which may take longer than somebody waits, is given up.
+            # A stop also ends the exact solve, which may take long.
             with self._render_lock, cancellable(check):
                 check()
                 self._render_and_compare(request.view, check)
@@ -217,9 +213,7 @@ class BackgroundJobs:
                 self._host.publish(TaskStopped(what="verify"))
 
     def _render_and_compare(self, view: int, check: Callable[[], None]) -> None:
-        """Render the answer in a view and compare. check: raises StoppedError once nobody wants
-        that.
-        """
+        """Render the answer in a view and compare. check: raises StoppedError after a stop."""
         from lightpaint.paint.session_exports import render_verification
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
@@ -244,8 +238,8 @@ class BackgroundJobs:
                 raise StoppedError
 
         with suppress(StoppedError), cancellable(check):
-            proposed, now = self._host.snapshot_and_lighting(requests)
-            weights = now.weights_for(proposed.bases[0])
+            proposed, lighting = self._host.snapshot_and_lighting(requests)
+            weights = lighting.weights_for(proposed.bases[0])
             clean = self._host.clean_planes(proposed.bases)[request.view]
             preview = proposed.preview(weights, request.view, clean=clean)
             check()

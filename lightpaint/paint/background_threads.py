@@ -1,6 +1,4 @@
-"""Work beside the brush: low-priority threads, the exact solve, and writes that a full disk
-delays.
-"""
+"""Background work of a session: low-priority threads, the exact solve, and delayed writes."""
 
 import os
 import sys
@@ -21,21 +19,21 @@ SOLVE_DELAY_S = 0.2
 #: Seconds between attempts to write.
 RETRY_S = 2.0
 
-#: Niceness of all work but strokes, where threads can have their own: on Linux.
+#: Niceness of all work but strokes, on Linux, where each thread has its own.
 NICENESS = 10
 
-#: Seconds in which a pass of a render ends, at most.
+#: Most seconds to wait for a pass of a render to end.
 JOIN_TIMEOUT_S = 60.0
 
 
 class StoppedError(Exception):
-    """Ends a task that nobody wants any more."""
+    """Signal that ends a task whose result is no longer needed."""
 
 
 class ExactSolveLoop:
     """A thread's loop that finds the exact answer whenever the brush rests.
 
-    solve: finds the answer and publishes it. report: receives what went wrong.
+    solve: finds the answer and publishes it. report: receives errors.
     """
 
     def __init__(self, solve: Callable[[], None], report: Callable[[Message], None]) -> None:
@@ -58,9 +56,8 @@ class ExactSolveLoop:
     def run(self) -> None:
         """Solve after each change, until `stop`.
 
-        The loop gives way by giving up its solve. With a lower priority, a thread that waits for
-        the interpreter, or for a lock, would wait as long as others keep this one from the
-        processor.
+        The loop gives way to strokes by abandoning its solve. A lower priority would not do: other
+        threads would wait for a lock, or the interpreter, that this one holds without processor.
         """
         while True:
             with self._condition:
@@ -75,15 +72,15 @@ class ExactSolveLoop:
             try:
                 self._solve()
             except Exception as error:
-                # A mistake of our own ends no session: the next stroke is answered again.
+                # A bug here must not end the session: the next stroke is answered again.
                 self._report(Notice(text=error_text(error), tone="warn"))
 
 
 class UnsavedRetry:
-    """A thread's loop that writes again what a full disk keeps in memory.
+    """A thread's loop that retries writes which a full disk has refused.
 
-    store: returns the store; None before there is one. report: receives, with a tone, that
-    something cannot be written, and later that all is.
+    store: returns the store; None before there is one. report: receives a message with a tone when
+    something cannot be written, and another once all is written.
     """
 
     def __init__(
@@ -93,11 +90,11 @@ class UnsavedRetry:
         self._is_over = Event()
 
     def stop(self) -> None:
-        """End the loop. Whoever closes the store reports what is lost."""
+        """End the loop. Closing the store reports what is lost."""
         self._is_over.set()
 
     def run(self) -> None:
-        """Write again every `RETRY_S` seconds, until `stop`."""
+        """Retry every `RETRY_S` seconds, until `stop`."""
         was_reported = False
         while not self._is_over.wait(RETRY_S):
             store = self._store()
@@ -110,7 +107,7 @@ class UnsavedRetry:
 
 
 class BackgroundThreads:
-    """The threads of one studio, which it joins at its end. report: receives what fails in one."""
+    """The threads of one studio, which it joins at its end. report: receives their errors."""
 
     def __init__(self, report: Callable[[Message], None]) -> None:
         self._report = report
@@ -119,11 +116,11 @@ class BackgroundThreads:
     def start(self, work: Callable[[], None], name: str) -> None:
         """Run `work` in a thread of its own."""
         thread = Thread(target=work, name=f"lightpaint-{name}", daemon=True)
-        self._threads = [one for one in self._threads if one.is_alive()] + [thread]
+        self._threads = [old for old in self._threads if old.is_alive()] + [thread]
         thread.start()
 
     def start_low_priority(self, work: Callable[[], None], name: str) -> None:
-        """Run `work` in a thread of low priority, and report what fails in it."""
+        """Run `work` in a thread of low priority, and report its errors."""
 
         def run() -> None:
             lower_priority()
@@ -140,20 +137,20 @@ class BackgroundThreads:
         """Wait for all threads but the calling one, for at most `JOIN_TIMEOUT_S` seconds."""
         end_s = time.monotonic() + JOIN_TIMEOUT_S
         for thread in self._threads:
-            # Who is being started, as where Ctrl-C comes just then, cannot be waited for.
+            # A thread that has not started yet, as when Ctrl-C comes early, cannot be joined.
             if thread is not current_thread() and thread.is_alive():
                 thread.join(max(0.0, end_s - time.monotonic()))
 
 
 def error_tone(error: BaseException) -> Tone:
-    """Return how a page shows what could not be done."""
+    """Return the tone in which a page shows an error."""
     return "info" if isinstance(error, NothingToUndoError) else "warn"
 
 
 def error_text(error: Exception, *, at_length: bool = True) -> str:
     """Return a message for an error.
 
-    at_length: whether the traceback of a mistake of lightpaint's own is printed in the terminal.
+    at_length: whether the traceback of a bug in lightpaint is printed to the terminal.
     """
     if isinstance(error, LightpaintError):
         return str(error)

@@ -5,7 +5,7 @@ two travel as they are; on a socket they are one binary frame:
 
     uint32 length of the JSON, little endian | JSON | padding to 8 bytes | buffers, each padded
 
-`buffers` in the JSON says what they are: `[{"name": ..., "dtype": ..., "shape": [...]}, ...]`.
+`buffers` in the JSON describes them: `[{"name": ..., "dtype": ..., "shape": [...]}, ...]`.
 """
 
 import json
@@ -32,7 +32,7 @@ MAX_CHARACTERS, MAX_VALUES = 1000, 4096
 
 def to_frame(content: Mapping[str, Any], buffers: Sequence[bytes]) -> bytes:
     """Return JSON and buffers as one binary frame."""
-    # Names of files that are not UTF-8 stand in Python's text as halves of pairs.
+    # Python represents file names that are not UTF-8 by lone surrogates.
     text = json.dumps(content, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace")
     parts = [struct.pack("<I", len(text)), text, b"\0" * (-(4 + len(text)) % 8)]
     for buffer in buffers:
@@ -50,20 +50,18 @@ def from_frame(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
     if length > min(MAX_TEXT, len(frame) - 4):
         raise PaintError(f"a frame that speaks of {length} bytes of JSON and has fewer")
     content = _parse_json(bytes(frame[4 : 4 + length]))
-    rest, at, buffers = memoryview(frame), 4 + length + -(4 + length) % 8, []
+    view, position, buffers = memoryview(frame), 4 + length + -(4 + length) % 8, []
     for shape, kind in _buffer_types(content):
         size = math.prod(shape) * np.dtype(kind).itemsize
-        if at + size > len(frame):
+        if position + size > len(frame):
             raise PaintError("a frame that is shorter than its buffers")
-        buffers.append(rest[at : at + size])
-        at += size + -size % 8
+        buffers.append(view[position : position + size])
+        position += size + -size % 8
     return content, buffers
 
 
 def is_other_version(content: Mapping[str, Any]) -> bool:
-    """Return whether this is the first message of a page of another version, whatever else it
-    holds.
-    """
+    """Return whether this is the first message of a page of another version."""
     version = content.get("version")
     return (
         content.get("kind") in ("hello", "observe") and type(version) is int and version != VERSION
@@ -73,10 +71,9 @@ def is_other_version(content: Mapping[str, Any]) -> bool:
 def parse_request(
     content: Mapping[str, Any], buffers: Sequence[bytes | memoryview]
 ) -> tuple[int, AnyRequest, dict[str, npt.NDArray[Any]]]:
-    """Return the number, the message and the arrays of a request. Raises PaintError for anything
-    else.
+    """Return the number, the message and the arrays of a request.
 
-    The arrays are finite and read-only.
+    The arrays are finite and read-only. Raises PaintError for anything else.
     """
     kind, seq = content.get("kind"), content.get("seq")
     if not (isinstance(kind, str) and kind in REQUESTS):
@@ -93,21 +90,21 @@ def parse_request(
     if len(buffer_types) != len(buffers):
         raise PaintError(f"{kind}: {len(buffers)} buffers, not {len(buffer_types)} as it says")
     arrays = {}
-    for about, (shape, dtype), buffer in zip(
+    for description, (shape, dtype), buffer in zip(
         content.get("buffers", ()), buffer_types, buffers, strict=True
     ):
         if len(buffer) != math.prod(shape) * np.dtype(dtype).itemsize:
             raise PaintError(f"{kind}: {len(buffer)} bytes are no array of shape {list(shape)}")
         array = np.frombuffer(buffer, dtype).reshape(shape)
         if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise PaintError(f"{kind}: {about['name']} holds NaN or Inf")
+            raise PaintError(f"{kind}: {description['name']} holds NaN or Inf")
         array.flags.writeable = False
-        arrays[about["name"]] = array
+        arrays[description["name"]] = array
     return seq, request, arrays
 
 
 def _check_lengths(kind: str, value: Any) -> None:
-    """Raise PaintError for more words or values than a page has any use for."""
+    """Raise PaintError for longer texts or lists than any page sends."""
     if isinstance(value, str) and len(value) > MAX_CHARACTERS:
         raise PaintError(
             f"{kind}: a text of {len(value)} characters, and at most {MAX_CHARACTERS} are taken"
@@ -117,8 +114,8 @@ def _check_lengths(kind: str, value: Any) -> None:
             raise PaintError(
                 f"{kind}: a list of {len(value)} values, and at most {MAX_VALUES} are taken"
             )
-        for one in [*value, *value.values()] if isinstance(value, dict) else value:
-            _check_lengths(kind, one)
+        for item in [*value, *value.values()] if isinstance(value, dict) else value:
+            _check_lengths(kind, item)
 
 
 def _parse_json(text: bytes) -> dict[str, Any]:
@@ -133,20 +130,20 @@ def _parse_json(text: bytes) -> dict[str, Any]:
 
 def _buffer_types(content: Mapping[str, Any]) -> list[tuple[tuple[int, ...], str]]:
     """Return shape and dtype of each buffer that a message lists."""
-    listed, found, names = content.get("buffers", []), [], set[str]()
+    listed, types, names = content.get("buffers", []), [], set[str]()
     if not (isinstance(listed, list) and len(listed) <= 16):
         raise PaintError("buffers are a list of at most 16")
-    for about in listed:
-        if not (isinstance(about, dict) and isinstance(about.get("name"), str)):
+    for description in listed:
+        if not (isinstance(description, dict) and isinstance(description.get("name"), str)):
             raise PaintError("a buffer without a name")
-        if about["name"] in names:
-            raise PaintError(f"two buffers are called {about['name'][:40]!r}")
-        names.add(about["name"])
-        shape, dtype = about.get("shape"), about.get("dtype")
+        if description["name"] in names:
+            raise PaintError(f"two buffers are called {description['name'][:40]!r}")
+        names.add(description["name"])
+        shape, dtype = description.get("shape"), description.get("dtype")
         if not (isinstance(dtype, str) and dtype in DTYPES):
             raise PaintError(f"a buffer of {str(dtype)[:40]!r}: expected {', '.join(DTYPES)}")
         is_shape = isinstance(shape, list) and len(shape) <= 4
         if not (is_shape and all(type(n) is int and 0 <= n <= 2**16 for n in shape or ())):
             raise PaintError(f"a buffer of shape {str(shape)[:40]}")
-        found.append((tuple(shape or ()), DTYPES[dtype]))
-    return found
+        types.append((tuple(shape or ()), DTYPES[dtype]))
+    return types

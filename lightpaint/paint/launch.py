@@ -1,4 +1,4 @@
-"""The painter in a browser: opens session file, studio and server, and closes them at the end."""
+"""The painter in a browser: it opens session file, studio and server, and closes them."""
 
 import gc
 import sys
@@ -60,9 +60,9 @@ def _serve_session(
     new: bool,
     say: Callable[[str], None],
 ) -> None:
-    """Serve the session of a file, which is created where there is none."""
-    if new and (aside := set_aside(path)) is not None:
-        say(f"the earlier session is kept as {aside}")
+    """Serve the session of a file, which is created if it does not exist."""
+    if new and (kept_path := set_aside(path)) is not None:
+        say(f"the earlier session is kept as {kept_path}")
     session_file = SessionFile(subjects, path, say)
     studio = Studio(subjects, session_file.open_store)
     studio.on_unsaved = say
@@ -71,7 +71,7 @@ def _serve_session(
         session_file.server = server
         connection_file = ConnectionFile(path.parent, server.connection)
 
-        def write_connection() -> None:  # once the folder is known to be this painter's
+        def write_connection() -> None:  # called once this painter has locked the session
             try:
                 connection_file.write()
             except OutputError as error:
@@ -84,7 +84,7 @@ def _serve_session(
                 write_connection()
             studio.on_failure = partial(_stop_after_failure, server)
             on_ready(server)
-            with interruptible_between_pieces():  # who is being started cannot be waited for
+            with interruptible_between_pieces():  # a thread that is starting cannot be joined
                 studio.start()
             with low_latency():
                 server.run()
@@ -99,19 +99,19 @@ def _serve_session(
 
 @contextmanager
 def low_latency() -> Iterator[None]:
-    """Make strokes wait for nothing but their own work, in a process that does nothing else.
+    """Answer strokes with low latency, in a process that does nothing else.
 
-    The garbage collector leaves alone what is imported by now, and a thread that holds the
-    interpreter for long lets go of it ten times as soon.
+    The garbage collector skips all objects that exist by now, and a thread that holds the
+    interpreter for long releases it ten times as soon.
     """
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(before / 10)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(interval / 10)
     gc.freeze()
     try:
         yield
     finally:
         gc.unfreeze()
-        sys.setswitchinterval(before)
+        sys.setswitchinterval(interval)
 
 
 #: Seconds that a server waits, after a failure, for the page of a browser that was started.
@@ -119,9 +119,7 @@ PAGE_WAIT_S = 5.0
 
 
 def _stop_after_failure(server: Server, error: Exception) -> None:
-    """Stop the server, since there is nothing to paint; a page that is about to load is
-    told why.
-    """
+    """Stop the server, since there is nothing to paint, and tell a page that is loading why."""
     end_s = time.monotonic() + (PAGE_WAIT_S if server.expects_page else 0.0)
     while not server.has_page and time.monotonic() < end_s:
         time.sleep(0.05)
@@ -129,9 +127,7 @@ def _stop_after_failure(server: Server, error: Exception) -> None:
 
 
 def _close(studio: Studio, store: Store | None) -> None:
-    """Close the studio, and the store even where the studio fails; then wait for running
-    renders.
-    """
+    """Close the studio, and the store even if the studio fails; then wait for renders."""
     try:
         studio.close()
     finally:

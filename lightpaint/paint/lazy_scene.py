@@ -1,4 +1,4 @@
-"""A scene that is loaded when it is needed, and the facts that the cache knows of it before."""
+"""A scene that is loaded when it is needed, and its facts from the cache until then."""
 
 import time
 from collections.abc import Callable
@@ -19,8 +19,8 @@ from lightpaint.scene.scene import Scene
 class LazyScene:
     """A scene by its file.
 
-    checks: called with the scene once it is loaded; they raise for what cannot be painted. remarks:
-    for people; the cache keeps them for the next session.
+    checks: called with the scene once it is loaded; they raise if it cannot be painted. remarks:
+    for the user; the cache keeps them for the next session.
     """
 
     file: SceneFile
@@ -45,7 +45,7 @@ class LazyScene:
     def _cache_fields(self) -> dict[str, Any]:
         """Values that decide how the scene is loaded, and on which film."""
         file = {name: value for name, value in vars_of(self.file).items() if value is not None}
-        names = {key: list(its) for key, its in (file.get("groups") or {}).items()}
+        names = {key: list(members) for key, members in (file.get("groups") or {}).items()}
         lights = {"lights": list(file["lights"])} if "lights" in file else {}
         film = {"quality": self.settings.quality, "resolution": self.settings.resolution}
         parameters = {key: str(value) for key, value in self.file.parameters.items()}
@@ -64,7 +64,7 @@ class LazyScene:
             return self._scene
 
     def _load(self) -> Scene:
-        # The renderer, and what goes with it, comes with the first scene.
+        # Imported here: the first scene loads the renderer.
         from lightpaint.scene.quality_presets import on_film
 
         self._began_s, self._clock_s = time.time(), _clock_s()
@@ -83,7 +83,7 @@ class LazyScene:
         cached.
         """
         if abs(_clock_s() - self._clock_s) > known.COARSE_S / 2:
-            return  # the clock was set: what a file's times say of its last change is not known
+            return  # the clock was set, so that file times do not tell the last change
         if self.record is None and self._scene is not None and self.settings.use_cache:
             known.remember(
                 self._key, self._scene, basis, remarks=self.remarks, began_s=self._began_s
@@ -91,5 +91,5 @@ class LazyScene:
 
 
 def _clock_s() -> float:
-    """Return by how many seconds the clock is ahead of one that nobody sets."""
+    """Return the seconds by which the clock is ahead of the monotonic one."""
     return time.time() - time.monotonic()

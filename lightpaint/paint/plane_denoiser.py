@@ -1,4 +1,4 @@
-"""Denoised planes, made one after the other while somebody paints."""
+"""Denoised planes, computed one after the other while the user paints."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -16,9 +16,7 @@ from lightpaint.paint.store.steps import name_in_view
 
 @dataclass(frozen=True)
 class _ViewPlanes:
-    """Denoised planes of one view. basis: that they were made of. is_cached: whether a file has
-    them.
-    """
+    """Denoised planes of one view. basis: their source. is_cached: whether a file has them."""
 
     basis: Basis
     planes: CleanPlanes
@@ -28,14 +26,14 @@ class _ViewPlanes:
         return self.basis.planes is basis.planes
 
     def scaled_to(self, basis: Basis) -> CleanPlanes:
-        """Return planes that serve the eye until those of `basis` are made."""
+        """Return planes that stand in until those of `basis` are denoised."""
         return self.planes if self.matches(basis) else self.planes.scaled_as(basis)
 
 
 class PlaneDenoiser:
     """Denoises the planes of a studio's views.
 
-    publish: receives each plane, by its name. is_needed: whether anybody is there to see them.
+    publish: receives each plane, by its name. is_needed: whether a page still shows them.
     use_cache: whether they are cached for the next session.
     """
 
@@ -62,7 +60,7 @@ class PlaneDenoiser:
         return presents
 
     def planes_for(self, bases: Sequence[Basis]) -> list[CleanPlanes | None]:
-        """Return the planes that there are for each view; those of fewer samples serve the eye."""
+        """Return each view's denoised planes, of fewer samples if need be; None if it has none."""
         return [
             self._by_view[k].scaled_to(basis) if k in self._by_view else None
             for k, basis in enumerate(bases)

@@ -50,7 +50,7 @@ def export(
     Raises PaintError for what this session cannot export, OutputError for what cannot be written.
     """
     if not snapshot.painted_views:
-        what = [one for one in what if one not in NEEDS_PAINTING]
+        what = [name for name in what if name not in NEEDS_PAINTING]
         if not what:
             raise PaintError("nothing is painted yet: there is no painting to write")
     first, folder = subjects[0], subjects[0].folder
@@ -96,20 +96,22 @@ def _write_report(
     """Run `solve` on the paintings as they are; return the reports."""
     answer = subjects[0].folder / ANSWER_FOLDER
     settings = replace(snapshot.settings, force=True)
-    of_painted = [subjects[k] for k in snapshot.painted_views]
-    scenes = tuple(its.loaded_scene for its in of_painted if its.scene is not None)
-    targets, asked = snapshot.painted_targets, snapshot.constraints
+    painted_subjects = [subjects[k] for k in snapshot.painted_views]
+    scenes = tuple(
+        subject.loaded_scene for subject in painted_subjects if subject.scene is not None
+    )
+    targets, constraints = snapshot.painted_targets, snapshot.constraints
     if len(subjects) == 1:
         groups = subjects[0].groups
         basis = snapshot.bases[0] if groups is None else groups
-        job, bases = Job(scenes, targets, answer, basis, asked, settings), None
+        job, bases = Job(scenes, targets, answer, basis, constraints, settings), None
     elif scenes:
         bases = [snapshot.bases[k] for k in snapshot.painted_views]
-        # They are on their film already, and have their samples.
+        # The scenes are already on their film, and the bases have their samples.
         spp = bases[0].origin.spp if settings.checks_as_basis else settings.spp
-        done: dict[str, Any] = {"resolution": None, "quality": None, "time_s": None, "spp": spp}
-        settings = replace(settings, **done)
-        job = Job(scenes, targets, answer, None, asked, settings, by_sensor=True)
+        rendered: dict[str, Any] = {"resolution": None, "quality": None, "time_s": None, "spp": spp}
+        settings = replace(settings, **rendered)
+        job = Job(scenes, targets, answer, None, constraints, settings, by_sensor=True)
     else:
         raise PaintError("a report of several saved bases needs their scene: open that instead")
     run(job, progress, bases=bases)

@@ -1,4 +1,4 @@
-"""The session file: opened once it is known which views it is of."""
+"""The session file, which is opened once the identity of its views is known."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -18,10 +18,10 @@ from lightpaint.screen import some_names
 def session_identity(
     subjects: Sequence[Subject], loaded: Mapping[int, Scene] | None = None
 ) -> Identity | None:
-    """Return what the session is of; None as long as a scene has to be loaded for that.
+    """Return the identity of a session; None as long as a scene has to be loaded for it.
 
-    loaded: scenes that have been loaded, by view. The identity of scenes is that of their bases,
-    which are still to be rendered.
+    loaded: scenes that have been loaded, by view. A scene has the identity that its basis will have
+    once it is rendered.
     """
     bases = [subject.basis for subject in subjects if subject.basis is not None]
     if bases:
@@ -40,7 +40,7 @@ def session_identity(
 
 
 def check_view_names(sensors: Sequence[str]) -> None:
-    """Raise PaintError unless several views have distinct names that can name files."""
+    """Raise PaintError unless several views have distinct names that are valid file names."""
     if len(sensors) == 1:
         return
     if len(set(sensors)) < len(sensors):
@@ -59,7 +59,7 @@ class SessionFile:
 
     Attributes:
         store: The session; None until its identity is known.
-        server: Told once there is a store.
+        server: Receives the store once there is one.
         on_store_opened: Called when a store is opened later than at the start.
     """
 
@@ -94,7 +94,7 @@ class SessionFile:
         self._report_new((*lasting, *remarks_of_memory(scene)))
         from lightpaint.scene.runtime.variant import use_variant
 
-        # What is said of this machine may not be so the next time.
+        # Remarks on this machine may not hold the next time.
         lazy_scene.remarks = tuple(x for x in lasting if x != use_variant().note)
 
     def _open_with(self, identity: Identity) -> None:

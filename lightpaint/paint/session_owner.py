@@ -10,8 +10,8 @@ _Page = TypeVar("_Page")
 class Transfer(NamedTuple, Generic[_Page]):
     """A session that was given to a page.
 
-    is_back: whether the page had it before, and nobody since. displaced: the other connection that
-    had it until now, which is to be told; None if none had.
+    is_back: whether the page had it before, and no other since. displaced: the connection that had
+    it until now and must be told; None if none had.
     """
 
     is_back: bool
@@ -37,7 +37,7 @@ class SessionOwner(Generic[_Page]):
         return self.page is None or self._is_same(self.page, page)
 
     def give(self, page: _Page) -> Transfer[_Page]:
-        """Give the session to `page`, whoever has it."""
+        """Give the session to `page`, even if another page has it."""
         is_back = self._last is not None and self._is_same(self._last, page)
         displaced = self.page if self.page != page else None
         self.page = self._last = page

@@ -1,4 +1,4 @@
-"""The studio: one session, and all that runs beside it while the brush moves.
+"""The studio: one session, and the background work that runs while the brush moves.
 
 Requests are answered at once, by one thread at a time. Rendering the basis, exact answers,
 denoising, exports and verification have threads of their own, which publish through `on_message`.
@@ -57,11 +57,11 @@ from lightpaint.scene.runtime.render_lock import MITSUBA
 
 
 class OutdatedError(Exception):
-    """Ends work whose result is no longer wanted: somebody has painted on, or left."""
+    """Signal that ends work whose result is outdated: the user has painted on, or left."""
 
 
 def _raise_outdated() -> None:
-    """Raise OutdatedError, to end work that nobody waits for."""
+    """Raise OutdatedError, to end work whose result is outdated."""
     raise OutdatedError
 
 
@@ -90,10 +90,10 @@ class Studio:
         self.pictures = PictureTable()
         self._session: Session | None = None
         self._looks: LookLibrary | None = None
-        self._last_exact: AnswerUpdate | None = None  # the last exact answer, as it was said
+        self._last_exact: AnswerUpdate | None = None  # the last exact answer, as it was sent
         self._progress: ProgressReport | None = None  # of the first picture
         self._lock, self._is_open, self._failed = RLock(), True, ""
-        self._publish_lock = RLock()  # taken before the other, by whoever tells of what it made
+        self._publish_lock = RLock()  # taken before `_lock`, to send messages in order
         self._denoiser = PlaneDenoiser(
             self.publish_picture,
             lambda: self._is_open,
@@ -123,7 +123,7 @@ class Studio:
 
     @property
     def has_scenes(self) -> bool:
-        """True if there are scenes, and not only bases of them."""
+        """True if there are scenes, and not only bases."""
         return self.subjects[0].scene is not None
 
     def start(self) -> None:
@@ -139,7 +139,7 @@ class Studio:
         self._write_retry.stop()
         with self._lock:
             if self._session is not None:
-                # All is kept before anything is solved, and nobody asks for the answer any more.
+                # Everything is kept before any solve, and no answer is needed any more.
                 with suppress(OutdatedError), cancellable(_raise_outdated):
                     self._session.client_left(with_stroke=True)
                 self._session.store.close()
@@ -158,7 +158,7 @@ class Studio:
         first = self.subjects[0]
         with self._lock:
             session = self._session
-            about: dict[str, Any] = {
+            fields: dict[str, Any] = {
                 "version": protocol.VERSION,
                 "scene": first.name,
                 "folder": str(first.folder.absolute()),
@@ -166,18 +166,17 @@ class Studio:
                 "can_report": self.has_scenes or len(self.subjects) == 1,
             }
             if session is None:
-                return SessionPending(**about, text=self._failed, progress=self._progress)
-            found, known = session.findings, self._last_exact
-            if known is not None and known.version == session.version:
-                found = known.findings
-            about |= {"answer": found, "weights": session.weights}
-            return SessionState(**about, **self._state_fields(session), **session.edit_state)
+                return SessionPending(**fields, text=self._failed, progress=self._progress)
+            findings, exact = session.findings, self._last_exact
+            if exact is not None and exact.version == session.version:
+                findings = exact.findings
+            fields |= {"answer": findings, "weights": session.weights}
+            return SessionState(**fields, **self._state_fields(session), **session.edit_state)
 
     def greet(self, *, is_back: bool) -> Message:
-        """Return the state to a page that connects; what another page had begun is kept as it left
-        it.
+        """Return the state to a page that connects, and keep the open stroke of another page.
 
-        is_back: the page had the session before, and nobody since: it sends its open stroke again.
+        is_back: the page had the session before, and no other since: it resends its open stroke.
         """
         with self._lock:
             if self._session is not None and self._session.is_open:
@@ -189,9 +188,7 @@ class Studio:
     def handle(
         self, message: protocol.AnyRequest, arrays: Mapping[str, npt.NDArray[Any]]
     ) -> list[Message]:
-        """Return the immediate answers to a request. Raises LightpaintError for what cannot be
-        done.
-        """
+        """Return the immediate answers to a request. Raises LightpaintError if it is refused."""
         if isinstance(message, protocol.Hello | protocol.TakeOver):
             return [self.greet(is_back=True)]
         if isinstance(message, protocol.Fetch):
@@ -209,23 +206,21 @@ class Studio:
                 case protocol.Preview():
                     return self._jobs.start_preview(message, session.preview_requests(message))
                 case protocol.LoadLook():
-                    made = looks.load(message)
+                    messages = looks.load(message)
                 case _:
-                    made = session.handle(message, arrays)
+                    messages = session.handle(message, arrays)
         self._solve_loop.notify()
-        return made
+        return messages
 
     def snapshot(self) -> SessionSnapshot:
-        """Return the paintings and requests as they are. Raises PaintError before there is
-        a basis.
-        """
+        """Return the present paintings and requests. Raises PaintError before there is a basis."""
         with self._lock:
             return self.session.snapshot()
 
     def snapshot_and_lighting(
         self, requests: SessionRequests | None = None
     ) -> tuple[SessionSnapshot, Lighting]:
-        """Return the same with the last answer. requests: taken instead of the session's."""
+        """Return a snapshot and the last answer. requests: replace the session's, if given."""
         with self._lock:
             session = self.session
             snapshot = session.snapshot() if requests is None else session.snapshot(requests)
@@ -240,9 +235,9 @@ class Studio:
         Raises LightpaintError for requests that are refused; nothing is changed then.
         """
         with self._lock:
-            made = self.session.load(paintings, requests, label)
+            messages = self.session.load(paintings, requests, label)
         self._solve_loop.notify()
-        return made
+        return messages
 
     def resource(self, name: str) -> npt.NDArray[Any]:
         """Return a picture by name. Raises PaintError if there is none."""
@@ -280,11 +275,11 @@ class Studio:
         """Report how far a task is. Raises StoppedError once the studio is closed."""
         if not self._is_open:
             raise StoppedError
-        about = ProgressReport(what=label, done=done, total=total, unit=unit)
+        report = ProgressReport(what=label, done=done, total=total, unit=unit)
         if self._session is None:
-            self._progress = about
-        with MITSUBA.aside():  # whoever hears it may wait for a render of its own
-            self.publish(about)
+            self._progress = report
+        with MITSUBA.aside():  # the receiver may wait for a render of its own
+            self.publish(report)
 
     def _publish_save_state(self, text: str, tone: Tone) -> None:
         """Report whether the work can be written."""
@@ -292,7 +287,7 @@ class Studio:
         self.publish(Notice(text=text, tone=tone))
 
     def _obtain_bases(self) -> None:
-        """Obtain the bases, better and better, and denoise each."""
+        """Obtain bases of more and more samples, and denoise each."""
         lower_priority()
         try:
             with MITSUBA.low_priority():
@@ -316,7 +311,7 @@ class Studio:
     def _use_bases(self, bases: Sequence[Basis]) -> None:
         """Continue the session with these bases."""
         presents = self._denoiser.load_cached(bases)
-        shown = self._denoiser.planes_for(bases)
+        clean_planes = self._denoiser.planes_for(bases)
         with self._lock:
             if not self._is_open:
                 raise StoppedError
@@ -325,7 +320,7 @@ class Studio:
             else:
                 self._session.improve(bases, presents)
             session = self._session
-            for view, clean in zip(session.views, shown, strict=True):
+            for view, clean in zip(session.views, clean_planes, strict=True):
                 offer_view(self.pictures, view, session.transform, clean)
             offer_transforms(self.pictures, offered_transforms(session))
         self._publish_made(self.state)
@@ -350,11 +345,11 @@ class Studio:
                 self._publish_save_state(remark, "warn")
             return session, looks
         except BaseException:
-            store.close()  # whoever tries again, as with other constraints, finds it free
+            store.close()  # free for the next try, for example with other constraints
             raise
 
     def _state_fields(self, session: Session) -> dict[str, Any]:
-        """Return fields of the state, with what the background knows of it."""
+        """Return fields of the state, including those of background jobs."""
         assert self._looks is not None
         painted = [view.name for view in session.views if view.is_painted]
         sensors = [""] if len(session.views) == 1 else painted
@@ -378,7 +373,7 @@ class Studio:
             if snapshot.version != session.version or not self._is_open:
                 raise OutdatedError
 
-        # The next stroke gets the processors at once, and rings when it is done.
+        # The next stroke cancels this solve, so that it gets the processors at once.
         with suppress(OutdatedError), cancellable(check):
             solution = snapshot.solution()
             self._publish_answer(lambda: session.accept_solution(snapshot, solution))

@@ -28,12 +28,12 @@ PREVIEW_SPP = (2, 8, 32, 128)
 class Subject:
     """A view to paint, alone or among others.
 
-    source: the path that was given, for people and for commands. scene: on the film of the basis,
-    or a lazy one; None without a renderer. basis: given already, as for light groups. settings,
-    constraints: how paintings are answered. choice: the view transform to paint through. folder:
-    receives exports. command: returns the command that answers exported paintings, given by sensor
-    ("" for the only view), with the session's requests; "" where there is none. view_count: how
-    many views share the time in which bases are rendered.
+    source: the given path, for messages and commands. scene: on the film of the basis, or a lazy
+    one; None without a renderer. basis: set if it exists already, as for light groups. settings,
+    constraints: of the solve. choice: the view transform to paint through. folder: receives
+    exports. command: returns the command that solves exported paintings, given by sensor ("" for
+    the only view), with the session's requests; "" if there is none. view_count: number of views
+    that share the time budget of the bases.
     """
 
     source: str
@@ -49,7 +49,7 @@ class Subject:
 
     @property
     def name(self) -> str:
-        """Name for people."""
+        """Name in messages."""
         return scene_name(Path(self.source))
 
     @property
@@ -72,12 +72,12 @@ class Subject:
 
     @property
     def target_spp(self) -> int | None:
-        """Samples per pixel that its basis is to have; None where that is not decided here."""
+        """Samples per pixel that its basis will have; None if it is not rendered here."""
         if self.scene is None:
             return None
         settings = self.settings
-        asked = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
-        return asked or (self.record or self.loaded_scene).spp
+        requested = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+        return requested or (self.record or self.loaded_scene).spp
 
     def prepare(self) -> None:
         """Load a scene without cached facts, so that its errors show at once."""
@@ -92,7 +92,7 @@ class Subject:
         if (cached := self._cached_basis()) is not None:
             yield cached
             return
-        # What renders is not needed for a basis that is there.
+        # Imported here: a basis that exists needs no renderer.
         from lightpaint.pipeline.job_bases import obtain
 
         scene, settings, target_spp = self.loaded_scene, self.settings, self.target_spp or 1
@@ -124,7 +124,7 @@ class Subject:
         names = tuple(light.name for light in record.lights)
         if cached is None or cached.names != names or cached.origin.spp < (self.target_spp or 1):
             return None
-        if cached.features is None or cached.objects is None:  # by an earlier version
+        if cached.features is None or cached.objects is None:  # an earlier version wrote it
             return None
         return replace(cached, lights=record.lights)
 
@@ -147,10 +147,10 @@ def progress_in_samples(
     labels: dict[str, int] = {}
 
     def hear(label: str, done: int, total: int, unit: str = "passes") -> None:
-        before = labels.setdefault(label, len(labels))
+        index = labels.setdefault(label, len(labels))
         if unit == "passes":
             parts = lights if ":" in label else 1
-            share = min((before + done / max(total, 1)) / parts, 1)
+            share = min((index + done / max(total, 1)) / parts, 1)
             progress(
                 "basis", done_spp + round((spp - done_spp) * share), target_spp, "samples per pixel"
             )
@@ -161,17 +161,17 @@ def progress_in_samples(
 
 
 def joint_progress(progress: Progress, count: int) -> list[Progress]:
-    """Return listeners to the parts of one work, which report to `progress` as one.
+    """Return listeners to the parts of one task, which report to `progress` as one.
 
-    A part that has reported nothing yet counts as large as those that have.
+    A part that has not reported yet counts as much as the mean of the others.
     """
-    heard: dict[int, tuple[int, int]] = {}
+    states: dict[int, tuple[int, int]] = {}
 
     def listener(part: int) -> Progress:
         def hear(label: str, done: int, total: int, unit: str = "passes") -> None:
-            heard[part] = done, total
-            sums = [sum(each) for each in zip(*heard.values(), strict=True)]
-            progress(label, sums[0], sums[1] * count // len(heard), unit)
+            states[part] = done, total
+            sums = [sum(values) for values in zip(*states.values(), strict=True)]
+            progress(label, sums[0], sums[1] * count // len(states), unit)
 
         return hear
 
@@ -179,9 +179,7 @@ def joint_progress(progress: Progress, count: int) -> list[Progress]:
 
 
 def obtain_bases(subjects: Sequence[Subject], progress: Progress = silent) -> Iterator[list[Basis]]:
-    """Yield the bases of several views; where they are still to be rendered, previews of
-    all first.
-    """
+    """Yield the bases of several views; previews of all come first if they must be rendered."""
     for subject in subjects:
         subject.prepare()
     parts = joint_progress(progress, len(subjects))
@@ -197,9 +195,7 @@ def obtain_bases(subjects: Sequence[Subject], progress: Progress = silent) -> It
 
 
 def painting_transform(subjects: Sequence[Subject], bases: Sequence[Basis]) -> ViewTransform:
-    """Return the transform to paint through: as chosen, else sRGB at an exposure that shows all
-    views.
-    """
+    """Return the chosen transform to paint through, or sRGB at an exposure that suits all views."""
     looks = [basis.present_look for basis in bases]
     whole = looks[0] if len(looks) == 1 else np.concatenate([x.reshape(1, -1, 3) for x in looks], 1)
     return subjects[0].choice.over(ViewTransform("srgb", meter_exposure(whole, *bases)))
@@ -211,10 +207,10 @@ def sensor_name(scene: Scene | Known) -> str:
 
 
 def painting_path(folder: Path, sensor: str) -> Path:
-    """Return where the painting of a view is exported. sensor: "" for the only one."""
+    """Return the export path of a view's painting. sensor: "" for the only view."""
     return folder / (f"painting-{sensor}.exr" if sensor else "painting.exr")
 
 
 def picture_path(folder: Path, sensor: str) -> Path:
-    """Return where the picture of the answer in a view is exported. sensor: "" for the only one."""
+    """Return the export path of the answer's picture in a view. sensor: "" for the only view."""
     return folder / (f"answer-{sensor}.png" if sensor else "answer.png")

@@ -1,4 +1,4 @@
-"""Making subjects from what the user names, or has in memory; they are checked before rendering."""
+"""Subjects made from files or from objects in memory, and checked before any render."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -30,10 +30,10 @@ from lightpaint.pipeline.sources import (
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 
-#: Bytes of half floats that a page can hold: of all planes of a view.
+#: Most bytes of half floats that a page can hold, for all planes of a view.
 MAX_PAGE_BYTES = 2**31
 
-#: What can be painted: files, which are read when they are needed, and what has been read.
+#: Types that can be painted: files, which are read when they are needed, and loaded objects.
 Paintable = SceneFile | BasisFile | GroupsFile | Scene | Basis | LightGroups
 
 
@@ -42,8 +42,8 @@ def make_subjects(
 ) -> tuple[Subject, ...]:
     """Return the views of one lighting, to be painted together.
 
-    options: parameters of `make_subject`. Raises LightpaintError for what cannot be painted, alone
-    or together, as far as that is known.
+    options: parameters of `make_subject`. Raises LightpaintError if the sources cannot be painted,
+    alone or together, as far as that is known without rendering.
     """
     subjects = tuple(
         make_subject(source, folder, view_count=len(sources), **options) for source in sources
@@ -70,23 +70,23 @@ def make_subject(
     command: Callable[[Mapping[str, str], SessionRequests], str] = lambda paintings, requests: "",
     view_count: int = 1,
 ) -> Subject:
-    """Return one view to be painted, checked as far as that needs no renderer.
+    """Return one view to be painted, checked as far as possible without a renderer.
 
-    folder: one beside what is painted, named after it, by default. Others as of `Subject`. Raises
-    LightpaintError for what cannot be painted, and for constraints that its lights cannot meet.
+    folder: by default one that is named after the source. The others are those of `Subject`. Raises
+    LightpaintError if the source cannot be painted, or its lights cannot meet the constraints.
     """
     settings, constraints = settings or Settings(), constraints or Constraints()
     if isinstance(source, SceneFile | Scene):
         scene = _scene_on_film(source, settings, constraints)
-        about: dict[str, Any] = {"scene": scene}
+        fields: dict[str, Any] = {"scene": scene}
     else:
         check_nothing_unused(settings, source)
-        found = content(source)
-        basis = found.basis if isinstance(found, LightGroups) else found
+        loaded = content(source)
+        basis = loaded.basis if isinstance(loaded, LightGroups) else loaded
         _check_size(basis, _name_of(source))
         _check_constraints(basis.lights, constraints)
-        groups = found if isinstance(found, LightGroups) else None
-        about = {"basis": basis, "groups": groups}
+        groups = loaded if isinstance(loaded, LightGroups) else None
+        fields = {"basis": basis, "groups": groups}
     name = _name_of(source)
     return Subject(
         source=name,
@@ -96,7 +96,7 @@ def make_subject(
         choice=choice or TransformChoice(),
         command=command,
         view_count=view_count,
-        **about,
+        **fields,
     )
 
 
@@ -113,7 +113,7 @@ def _scene_on_film(
     if isinstance(source, Scene):
         check(source)
         return on_film(source, settings.quality, settings.resolution)
-    # What can be seen without the renderer is said before anything is opened.
+    # Errors that need no renderer are raised before the scene is loaded.
     file_length(Path(source.path), "scene file", SceneError)
     scene = LazyScene(source, settings)
     if scene.record is not None:
@@ -123,23 +123,23 @@ def _scene_on_film(
 
 
 def _check_size(basis: Basis, name: str) -> None:
-    """Raise PaintError for a basis whose planes are more than a page can hold."""
+    """Raise PaintError if the planes of a basis are more than a page can hold."""
     count, (height, width) = len(basis.lights), basis.size
-    if (held := 6 * count * height * width) > MAX_PAGE_BYTES:
+    if (needed := 6 * count * height * width) > MAX_PAGE_BYTES:
         raise PaintError(
             f"{name} has {count} lights of {width}x{height}, for which a page would need "
-            f"{held / 1e9:.1f} GB: paint the scene on a smaller film, with resolution=..., export "
-            "the painting, and solve it with this basis and resize=True"
+            f"{needed / 1e9:.1f} GB: paint the scene on a smaller film, with resolution=..., "
+            "export the painting, and solve it with this basis and resize=True"
         )
 
 
 def _check_constraints(lights: Lights, constraints: Constraints) -> None:
-    """Raise ConstraintError unless lights can meet these and what their lights file requests."""
+    """Raise ConstraintError unless lights can meet these constraints and their lights file's."""
     reduce_to(constraints_of(lights.requests).and_then(constraints), lights)
 
 
 def _name_of(source: Paintable) -> str:
-    """Return the path of what is painted, as it was given or as the object knows it."""
+    """Return the path of a source, as it was given or as the object stores it."""
     if isinstance(source, Basis):
         return source.source or source.origin.scene
     return str(source.path)

@@ -32,9 +32,9 @@ class LiveTrait(traitlets.Any, Generic[Readable, Assignable]):  # type: ignore[m
 
 @dataclass(frozen=True)
 class Callback:
-    """A function that observes changes; an error in it keeps no other callback from running.
+    """A function that observes changes; an error in it does not stop other callbacks.
 
-    warn: receives in one line what failed.
+    warn: receives its error in one line.
     """
 
     handler: Callable[[Any], Any]
@@ -44,12 +44,12 @@ class Callback:
         try:
             self.handler(change)
         except Exception as error:
-            # From the callback's own line on.
+            # The traceback begins at the callback's own line.
             traceback.print_exception(error.with_traceback(_from_caller(error)))
             text = f"{type(error).__name__}: {first_line(error)}"
             self.warn(f"a callback of painter.{change['name']} failed: {text}")
 
 
 def _from_caller(error: Exception) -> TracebackType | None:
-    here = error.__traceback__
-    return here and (here.tb_next or here)
+    frames = error.__traceback__
+    return frames and (frames.tb_next or frames)

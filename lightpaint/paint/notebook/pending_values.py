@@ -1,10 +1,10 @@
-"""Values that cells and callbacks set of a painter, and that wait until they can be set."""
+"""Values of a painter that cells and callbacks have set and that wait to be applied."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-#: Rounds in which callbacks may set what makes callbacks set something again.
+#: Most rounds in which callbacks react to values that callbacks have set.
 MAX_CALLBACK_ROUNDS = 20
 
 
@@ -32,18 +32,18 @@ class PendingValues:
 
     @contextmanager
     def notifying(self) -> Iterator[None]:
-        """Hold back what callbacks set until all observers have been called."""
+        """Hold back values that callbacks set until all observers have been called."""
         with self._lock:
-            before, self.is_notifying = self.is_notifying, True
+            was_notifying, self.is_notifying = self.is_notifying, True
             try:
                 yield
-                if not before:
+                if not was_notifying:
                     self._apply_all()
             finally:
-                self.is_notifying = before
+                self.is_notifying = was_notifying
 
     def _apply_all(self) -> None:
-        """Apply what has been waiting, and then what callbacks have set meanwhile."""
+        """Apply the waiting values, and then those that callbacks have set meanwhile."""
         for _ in range(MAX_CALLBACK_ROUNDS):
             values, self._values = self._values, []
             for name, value in values:

@@ -50,7 +50,7 @@ except ImportError as error:
 #: Traits that cells set and observe.
 LIVE_TRAITS = ("target", "targets", "lighting", "constraints")
 
-#: Functions that turn a trait's new value into what the session loads.
+#: Functions that turn a trait's new value into arguments of the session's `load`.
 LOADERS: dict[str, Callable[[Session, Any], widget_arguments.LoadArguments]] = {
     "target": widget_arguments.load_target,
     "targets": widget_arguments.load_targets,
@@ -62,7 +62,7 @@ LOADERS: dict[str, Callable[[Session, Any], widget_arguments.LoadArguments]] = {
 PAINTERS_BY_FILE: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
 
 
-#: Least height of the painter, in pixels of the screen.
+#: Minimum height of the painter, in pixels of the screen.
 MIN_HEIGHT = 240
 
 #: Default layout: without a width, an HBox gives the painter none.
@@ -149,24 +149,24 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             widget_arguments.check_target_sizes(target, subjects)
         path = widget_arguments.store_path(store)
         if path is not None:
-            if (before := PAINTERS_BY_FILE.get(path.resolve())) is not None:
-                before.close()  # its cell runs again
+            if (earlier := PAINTERS_BY_FILE.get(path.resolve())) is not None:
+                earlier.close()  # the user has run its cell again
             PAINTERS_BY_FILE[path.resolve()] = self
         self._studio = Studio(subjects, partial(_open_store, path))
         self._views = WidgetViews(self._studio, self._lock, self._send_to_pages)
         self._failed = ""
-        room = (
+        widget_layout = (
             layout
             if isinstance(layout, ipywidgets.Layout)
             else {**DEFAULT_LAYOUT, **(layout or {})}
         )
-        super().__init__(height=height, layout=room)
+        super().__init__(height=height, layout=widget_layout)
         self.on_msg(self._on_page_message)
         self._studio.on_message = self._on_studio_message
         try:
             self._begin(target)
         except BaseException:
-            self.close()  # the cell runs again, and finds its file free
+            self.close()  # the file is then free when the cell runs again
             raise
 
     def _begin(self, target: Target | Sequence[Target | None] | None) -> None:
@@ -175,7 +175,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         """
         self._studio.start()
         if self._studio.has_scenes:
-            atexit.register(self.close)  # what renders cannot be left alone at the end
+            atexit.register(self.close)  # a render must end before the process does
         else:
             self._ready.wait()
             if self._failed:
@@ -187,10 +187,12 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             )
 
     def __repr__(self) -> str:
-        first, *others = self._studio.subjects
-        its = first.loaded_scene if first.basis is None else first.basis
-        shown = f"{its.size[1]}x{its.size[0]}" if not others else f"{1 + len(others)} views"
-        return f"Painter({first.name}, {len(its.lights)} lights, {shown})"
+        first, *further = self._studio.subjects
+        subject = first.loaded_scene if first.basis is None else first.basis
+        extent = (
+            f"{subject.size[1]}x{subject.size[0]}" if not further else f"{1 + len(further)} views"
+        )
+        return f"Painter({first.name}, {len(subject.lights)} lights, {extent})"
 
     @property
     def solution(self) -> Solution | None:
@@ -238,7 +240,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         if "_studio" not in vars(self) or self._is_closed:  # it has never begun, or ended before
             return
         self._is_closed = True
-        atexit.unregister(self.close)  # which would keep it, and its pictures, until then
+        atexit.unregister(self.close)  # the reference would keep the painter's pictures alive
         self._studio.on_message = None
         try:
             self._studio.close()
@@ -250,21 +252,17 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     # Assignments from a cell
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute. Raises AttributeError for a misspelt name, which would be a new
-        attribute.
-        """
+        """Set an attribute. Raises AttributeError for a misspelt name."""
         is_known = name.startswith("_") or hasattr(type(self), name)
         if not is_known and (hint := widget_arguments.did_you_mean(name, [*LIVE_TRAITS, "height"])):
             raise AttributeError(f"lp.Painter has no attribute {name!r}{hint}")
         super().__setattr__(name, value)
 
     def _assign(self, name: str, value: Any) -> None:
-        """Apply what a cell sets, or raise where it sets it; what a callback sets is
-        applied later.
-        """
+        """Apply a value that a cell sets, or raise its error there; apply a callback's later."""
         if self._is_closed:
             raise PaintError(f"painter.{name} cannot be set: it is closed; make another lp.Painter")
-        with self._lock:  # another thread may be telling something now
+        with self._lock:  # another thread may be notifying observers
             arguments = LOADERS[name](self._studio.session, value)
             if self._pending.is_notifying:
                 self._pending.add(name, value)
@@ -272,20 +270,16 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
                 self._apply(arguments)
 
     def _apply(self, arguments: widget_arguments.LoadArguments) -> None:
-        """Load paintings and requests into the session. Raises LightpaintError for what it
-        refuses.
-        """
+        """Load paintings and requests into the session. Raises LightpaintError if refused."""
         paintings, requests, _ = arguments
         if not paintings and requests == self._studio.session.requests:
-            return  # it would be a step in which nothing happens, and answered for nothing
+            return  # it would be a step without a change
         for message in self._studio.load(*arguments):
             self._views.send(message)
         self._sync_traits()
 
     def _apply_late(self, name: str, value: Any) -> None:
-        """Apply what was set earlier; a failure is shown and ends nothing, since its cell has
-        ended.
-        """
+        """Apply a value that was set earlier; show an error, since its cell has ended."""
         try:
             self._apply(LOADERS[name](self._studio.session, value))
         except Exception as error:
@@ -312,7 +306,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         super().unobserve(self._callback(handler), names, type)
 
     def _callback(self, handler: Any) -> Any:
-        # What classes observe of themselves is called by its name, and is not a cell's.
+        # ipywidgets' own observers are ObserveHandlers, not callbacks of a cell.
         return handler if isinstance(handler, ObserveHandler) else Callback(handler, self._warn)
 
     def _warn(self, text: str) -> None:
@@ -378,9 +372,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             self._sync_traits()
 
     def _set_when_ready(self, name: str, value: Any) -> None:
-        """Set a trait now, or as soon as there is something to paint on. Raises LightpaintError if
-        now.
-        """
+        """Set a trait now, or once the first basis is there. Raises LightpaintError if now."""
         with self._lock:
             if self._studio.store is None:
                 self._pending.add(name, value)

@@ -29,7 +29,7 @@ from lightpaint.target.target import Target
 #: Types that can be painted.
 Paintable = Basis | Scene | LightGroups | str | Path
 
-#: Advice in errors, by that for the command line and `solve`.
+#: Advice in errors for the notebook, by the advice for the library that it replaces.
 NOTEBOOK_ADVICE = {
     START_AFRESH: "give another file as its store, or give that one another name",
     OTHER_FOLDER: "give another file as its store",
@@ -46,7 +46,7 @@ def load_targets(session: Session, targets: Any) -> LoadArguments:
     Raises LightpaintError.
     """
     fitted = _fit_targets(targets, [view.size for view in session.views])
-    paintings = {k: _pixels_to_load(session, k, one) for k, one in enumerate(fitted)}
+    paintings = {k: _pixels_to_load(session, k, target) for k, target in enumerate(fitted)}
     return paintings, _requests_for(session.requests, fitted), "paintings from a cell"
 
 
@@ -68,16 +68,14 @@ def _requests_for(requests: SessionRequests, targets: Sequence[Target | None]) -
         return requests
     over_look = any(target.over_look for target in painted)
     on_display = any(target.through_view for target in painted)
-    made = requests.with_values({"literal": not (over_look or on_display)})
-    if on_display and not over_look and "hold" not in made.values:
-        made = made.with_values({"hold": 0.0})
-    return made
+    result = requests.with_values({"literal": not (over_look or on_display)})
+    if on_display and not over_look and "hold" not in result.values:
+        result = result.with_values({"hold": 0.0})
+    return result
 
 
 def check_target_sizes(target: Any, subjects: Sequence[Subject]) -> None:
-    """Raise LightpaintError for what cannot be painted on, even while its lights are still
-    rendered.
-    """
+    """Raise LightpaintError if a target does not fit its view, even before a basis is rendered."""
     sizes = [(subject.basis or subject.loaded_scene).size for subject in subjects]
     if is_per_view(target):
         _fit_targets(target, sizes)
@@ -86,10 +84,14 @@ def check_target_sizes(target: Any, subjects: Sequence[Subject]) -> None:
 
 
 def transform_of_targets(target: Any) -> ViewTransform | None:
-    """Return the one view transform through which a target, or those of all views, were painted."""
+    """Return the view transform that all targets were painted through; None if they differ."""
     targets = target if is_per_view(target) else [target]
-    seen = {its.transform for its in targets if isinstance(its, Target) and its.through_view}
-    return seen.pop() if len(seen) == 1 else None
+    transforms = {
+        one_target.transform
+        for one_target in targets
+        if isinstance(one_target, Target) and one_target.through_view
+    }
+    return transforms.pop() if len(transforms) == 1 else None
 
 
 def is_per_view(target: Any) -> bool:
@@ -102,7 +104,9 @@ def _fit_targets(targets: Any, sizes: Sequence[tuple[int, int]]) -> list[Target 
         raise PaintError(
             f"painter.targets is a list of {len(sizes)}, a lp.Target or None for each view"
         )
-    return [_fit_target(one, size, "targets") for one, size in zip(targets, sizes, strict=True)]
+    return [
+        _fit_target(target, size, "targets") for target, size in zip(targets, sizes, strict=True)
+    ]
 
 
 def _fit_target(target: Any, size: tuple[int, int], name: str) -> Target | None:
@@ -116,7 +120,7 @@ def _fit_target(target: Any, size: tuple[int, int], name: str) -> Target | None:
 
 
 def _conversion_hint(value: Any) -> str:
-    """Return how to make a target of such a value."""
+    """Return advice on how to make a target from such a value."""
     if isinstance(value, np.ndarray):
         return ": give lp.Target.of(array)"
     return ": give lp.read_target(path)" if isinstance(value, str | Path) else ""
@@ -124,22 +128,22 @@ def _conversion_hint(value: Any) -> str:
 
 @contextmanager
 def notebook_advice() -> Iterator[None]:
-    """Rename the arguments in an error's advice to those that a painter has."""
+    """Replace the library's advice in errors by that for a painter in a notebook."""
     try:
         yield
     except LightpaintError as error:
         text = str(error)
-        for elsewhere, here in NOTEBOOK_ADVICE.items():
-            text = text.replace(elsewhere, here)
+        for text_of_library, text_of_notebook in NOTEBOOK_ADVICE.items():
+            text = text.replace(text_of_library, text_of_notebook)
         raise type(error)(text) from None
 
 
 def _pixels_to_load(session: Session, view: int, target: Target | None) -> Pixels:
     if target is None:
         return Pixels.unpainted(session.views[view].present)
-    its = session.views[view]
+    canvas = session.views[view]
     return _pixels_of(
-        resolve_importance(target, its.basis.emitters_seen, session.live_answer.fit.emitters)
+        resolve_importance(target, canvas.basis.emitters_seen, session.live_answer.fit.emitters)
     )
 
 
@@ -187,18 +191,18 @@ def read_settings(value: Mapping[str, Any], names: Iterable[str]) -> Settings:
 
     Raises TypeError for an unknown name, LightpaintError for an invalid value.
     """
-    known = [field.name for field in fields(Settings)]
+    setting_names = [field.name for field in fields(Settings)]
     for name in value:
-        if name not in known:
+        if name not in setting_names:
             raise TypeError(
-                f"lp.Painter has no argument {name!r}{did_you_mean(name, [*names, *known])}"
+                f"lp.Painter has no argument {name!r}{did_you_mean(name, [*names, *setting_names])}"
             )
     return Settings(**value)
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return a hint to append to an error about an unknown name; "" if no known name is near."""
-    near = get_close_matches(name, known, 1)
+    near = get_close_matches(name, names, 1)
     return f": did you mean {near[0]!r}?" if near else ""
 
 
@@ -217,16 +221,16 @@ def widget_subjects(
     constraints: Constraints | None,
     transform: ViewTransform | TransformChoice | None,
 ) -> tuple[Subject, ...]:
-    """Return what is to be painted, of one view or of several.
+    """Return the subjects to paint, one for each view.
 
-    Raises LightpaintError for what cannot be painted.
+    Raises LightpaintError if one cannot be painted.
     """
     _check_types(constraints=constraints, transform=transform)
-    several = list(value) if isinstance(value, list | tuple) else [value]
-    if not several:
+    sources = list(value) if isinstance(value, list | tuple) else [value]
+    if not sources:
         raise PaintError("lp.Painter paints at least one view: give a basis, or a scene")
     return make_subjects(
-        [_loaded(one) for one in several],
+        [_loaded(source) for source in sources],
         None if folder is None else Path(folder).absolute(),
         settings=settings,
         constraints=constraints,
@@ -245,7 +249,7 @@ def _check_types(*, constraints: Any, transform: Any) -> None:
 
 
 def _loaded(value: Any) -> Basis | Scene | LightGroups:
-    """Return what is painted, of a path the scene. Raises LightpaintError for anything else."""
+    """Return the value itself, or the scene at a path. Raises LightpaintError for anything else."""
     if isinstance(value, str | Path):
         if Path(value).suffix.lower() == ".exr":
             raise PaintError(

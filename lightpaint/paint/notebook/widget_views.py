@@ -1,4 +1,4 @@
-"""The views of one painter in a notebook: which of them has the session, and who receives what."""
+"""The views of one painter in a notebook: which one has the session, and where messages go."""
 
 from collections.abc import Callable
 from threading import RLock
@@ -10,7 +10,7 @@ from lightpaint.paint.protocol import Closing, Failure, Hello, Message, TakeOver
 from lightpaint.paint.session_owner import SessionOwner
 from lightpaint.paint.studio import Studio
 
-#: Told to a place that does not have the session, or no more.
+#: Message to a view that does not have the session, or has lost it.
 TAKEN = Closing(reason="taken", text="the painter is open at another place")
 
 #: Message numbers of one view, which is view `seq // MESSAGES_PER_VIEW`.
@@ -30,11 +30,11 @@ class WidgetViews:
         self._owner = SessionOwner[int]()
 
     def receive(self, content: Any, buffers: Any) -> None:
-        """Answer a page, whatever it sends."""
+        """Answer a message of a page, even an invalid one."""
         seq = content.get("seq") if isinstance(content, dict) else None
         try:
             answers = self._answer(content, [bytes(x) for x in buffers or ()])
-        except Exception as error:  # of our own, too, which anywidget would say nothing of
+        except Exception as error:  # bugs, too: anywidget would not report them
             answers = [Failure(text=error_text(error), tone=error_tone(error))]
         page = seq // MESSAGES_PER_VIEW if type(seq) is int else None
         for k, message in enumerate(answers):
@@ -57,5 +57,5 @@ class WidgetViews:
 
     def send(self, message: Message, reply: int | None = None, *, page: int | None = None) -> None:
         """Send a message to the page that has the session, or to `page`."""
-        about = {"page": self._owner.page if page is None else page}
-        self._send(message.content(reply) | about, message.buffers())
+        address = {"page": self._owner.page if page is None else page}
+        self._send(message.content(reply) | address, message.buffers())

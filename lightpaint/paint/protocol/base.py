@@ -28,8 +28,8 @@ class Message:
     kind: ClassVar[str] = ""
     request_buffers: ClassVar[Mapping[str, str]] = {}
 
-    def __init_subclass__(cls, *, kind: str = "", **more: Any) -> None:
-        super().__init_subclass__(**more)
+    def __init_subclass__(cls, *, kind: str = "", **options: Any) -> None:
+        super().__init_subclass__(**options)
         cls.kind = kind or cls.kind
 
     @property
@@ -44,14 +44,14 @@ class Message:
 
     def content(self, reply: int | None = None) -> dict[str, Any]:
         """Return the JSON. reply: number of the message that this one answers."""
-        made: dict[str, Any] = {"kind": self.kind, **self.fields}
+        content_fields: dict[str, Any] = {"kind": self.kind, **self.fields}
         if reply is not None:
-            made["reply"] = reply
-        made["buffers"] = [
+            content_fields["reply"] = reply
+        content_fields["buffers"] = [
             {"name": name, "dtype": _dtype(array), "shape": list(array.shape)}
             for name, array in self.arrays.items()
         ]
-        return made
+        return content_fields
 
     def buffers(self) -> list[bytes]:
         """Return the arrays as bytes, little endian, in order."""
@@ -64,11 +64,11 @@ class Message:
 def plain(value: Any) -> Any:
     """Return values of JSON for dataclasses, tuples and NumPy's numbers; NaN and Inf are null."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {name: plain(one) for name, one in _sent_fields(value).items()}
+        return {name: plain(item) for name, item in _sent_fields(value).items()}
     if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
@@ -77,12 +77,12 @@ def plain(value: Any) -> Any:
 
 
 def _sent_fields(record: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass by name, without those that are left out."""
-    found = {one.name: (getattr(record, one.name), one.metadata) for one in fields(record)}
+    """Return the fields of a dataclass by name, without optional ones that are None."""
+    values = {entry.name: (getattr(record, entry.name), entry.metadata) for entry in fields(record)}
     return {
         name: value
-        for name, (value, about) in found.items()
-        if not (value is None and about.get("is_optional"))
+        for name, (value, metadata) in values.items()
+        if not (value is None and metadata.get("is_optional"))
     }
 
 

@@ -20,20 +20,20 @@ from lightpaint.paint.protocol.typescript import field_types
 
 def sections() -> dict[str, str]:
     """Return the generated parts of the document by the names of their marks."""
-    records = [one for one in vars(message_parts).values() if _is_part(one)]
+    records = [record for record in vars(message_parts).values() if _is_part(record)]
     return {
-        "requests": "\n".join(_entry(one.kind, one) for one in requests.REQUESTS.values()),
-        "events": "\n".join(_entry(one.kind, one) for one in events.EVENTS.values()),
-        "parts": "\n".join(_entry(one.__name__, one) for one in records),
+        "requests": "\n".join(_entry(record.kind, record) for record in requests.REQUESTS.values()),
+        "events": "\n".join(_entry(record.kind, record) for record in events.EVENTS.values()),
+        "parts": "\n".join(_entry(record.__name__, record) for record in records),
     }
 
 
 def replace_sections(text: str) -> str:
     """Return a document with its generated parts made anew."""
-    for name, made in sections().items():
+    for name, section in sections().items():
         pattern = rf"<!-- {name} -->\n.*?<!-- end of {name} -->"
         before, after = re.split(pattern, text, flags=re.DOTALL)
-        text = f"{before}<!-- {name} -->\n\n{made}\n<!-- end of {name} -->{after}"
+        text = f"{before}<!-- {name} -->\n\n{section}\n<!-- end of {name} -->{after}"
     return text
 
 
@@ -43,18 +43,18 @@ def _is_part(value: Any) -> bool:
 
 def _entry(name: str, record: type[Any]) -> str:
     """Return a heading, the docstring, and a table of the fields."""
-    said = (inspect.getdoc(record) or "").split("\n\n")
-    made = [f"### `{name}`", *(" ".join(one.split("\n")) for one in said)]
+    paragraphs = (inspect.getdoc(record) or "").split("\n\n")
+    lines = [f"### `{name}`", *(" ".join(paragraph.split("\n")) for paragraph in paragraphs)]
     types = [(field, _nested_kind(kind).replace("|", "\\|")) for field, kind in field_types(record)]
     rows = [f"| `{field}` | `{kind}` |" for field, kind in types]
     if rows:
-        made.append("\n".join(["| field | type |", "|---|---|", *rows]))
+        lines.append("\n".join(["| field | type |", "|---|---|", *rows]))
     hints = get_type_hints(record)
     arrays = [x.name for x in fields(record) if get_origin(hints[x.name]) is np.ndarray]
-    given = [f"`{x}` {what}" for x, what in getattr(record, "request_buffers", {}).items()]
-    if arrays or given:
-        made.append("Buffers: " + ", ".join(given or [f"`{x}`" for x in arrays]) + ".")
-    return "\n\n".join(made) + "\n"
+    buffers = [f"`{x}` {what}" for x, what in getattr(record, "request_buffers", {}).items()]
+    if arrays or buffers:
+        lines.append("Buffers: " + ", ".join(buffers or [f"`{x}`" for x in arrays]) + ".")
+    return "\n\n".join(lines) + "\n"
 
 
 def _nested_kind(kind: str) -> str:

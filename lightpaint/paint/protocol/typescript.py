@@ -41,18 +41,20 @@ PRIMITIVES = {str: "string", int: "number", float: "number", bool: "boolean", ty
 
 def declarations() -> str:
     """Return the whole file."""
-    records = [one for one in vars(message_parts).values() if _is_record_of(one, message_parts)]
-    made = [HEADER, *(_interface(one, is_request=False) for one in records)]
-    made += [_interface(one, is_request=False) for one in events.EVENTS.values()]
-    made += [_interface(one, is_request=True) for one in requests.REQUESTS.values()]
-    for name, what, kinds in (
+    records = [
+        record for record in vars(message_parts).values() if _is_record_of(record, message_parts)
+    ]
+    blocks = [HEADER, *(_interface(record, is_request=False) for record in records)]
+    blocks += [_interface(record, is_request=False) for record in events.EVENTS.values()]
+    blocks += [_interface(record, is_request=True) for record in requests.REQUESTS.values()]
+    for name, comment, kinds in (
         ("Events", "Events from the session, by kind.", events.EVENTS),
         ("Requests", "Fields of clients' requests, by kind.", requests.REQUESTS),
     ):
-        rows = "".join(f"  {kind}: {one.__name__};\n" for kind, one in kinds.items())
-        made.append(f"/** {what} */\nexport interface {name} {{\n{rows}}}\n")
-    made.append("export type AnyEvent = Events[keyof Events];\n")
-    return "\n".join(made)
+        rows = "".join(f"  {kind}: {record.__name__};\n" for kind, record in kinds.items())
+        blocks.append(f"/** {comment} */\nexport interface {name} {{\n{rows}}}\n")
+    blocks.append("export type AnyEvent = Events[keyof Events];\n")
+    return "\n".join(blocks)
 
 
 def _is_record_of(value: Any, module: Any) -> bool:
@@ -62,14 +64,14 @@ def _is_record_of(value: Any, module: Any) -> bool:
 def _interface(record: type[Any], *, is_request: bool) -> str:
     """Return one interface. is_request: whether fields with a default may be left out."""
     hints = get_type_hints(record)
-    found = [one.name for one in fields(record) if get_origin(hints[one.name]) is np.ndarray]
-    arrays = [f"{name}: Picture" for name in found]
+    array_names = [one.name for one in fields(record) if get_origin(hints[one.name]) is np.ndarray]
+    arrays = [f"{name}: Picture" for name in array_names]
     lines = [f"  {name}: {kind};\n" for name, kind in field_types(record, is_request=is_request)]
     if record.__name__ in {one.__name__ for one in events.EVENTS.values()}:
         lines.insert(0, f"  kind: '{record.kind}';\n  reply?: number;\n")
         lines.append(f"  arrays: {{ {'; '.join(arrays)} }};\n")
-    said = (inspect.getdoc(record) or "").replace("*/", "* /").split("\n")
-    comment = "/**\n" + "".join(f" * {line}".rstrip() + "\n" for line in said) + " */\n"
+    comment_lines = (inspect.getdoc(record) or "").replace("*/", "* /").split("\n")
+    comment = "/**\n" + "".join(f" * {line}".rstrip() + "\n" for line in comment_lines) + " */\n"
     return f"{comment}export interface {record.__name__} {{\n{''.join(lines)}}}\n"
 
 
@@ -78,16 +80,16 @@ def field_types(record: type[Any], *, is_request: bool = True) -> list[tuple[str
 
     is_request: whether those with a default may.
     """
-    hints, made = get_type_hints(record), []
-    for one in fields(record):
-        if get_origin(hints[one.name]) is np.ndarray:
+    hints, types = get_type_hints(record), []
+    for entry in fields(record):
+        if get_origin(hints[entry.name]) is np.ndarray:
             continue
-        is_told = record in events.EVENTS.values() or not is_request
-        may_lack = _is_optional(one) or (not is_told and _has_default(one))
+        is_event = record in events.EVENTS.values() or not is_request
+        is_optional = _is_optional(entry) or (not is_event and _has_default(entry))
         # Left out where it is None; a request may give null all the same.
-        hint = _without_none(hints[one.name]) if _is_optional(one) else hints[one.name]
-        made.append((f"{one.name}?" if may_lack else one.name, typescript_type(hint)))
-    return made
+        hint = _without_none(hints[entry.name]) if _is_optional(entry) else hints[entry.name]
+        types.append((f"{entry.name}?" if is_optional else entry.name, typescript_type(hint)))
+    return types
 
 
 def typescript_type(hint: Any) -> str:
@@ -115,19 +117,19 @@ def typescript_type(hint: Any) -> str:
 
 def _without_none(hint: Any) -> Any:
     """Return `X` of `X | None`."""
-    kept = [one for one in get_args(hint) if one is not type(None)]
-    made = kept[0]
-    for one in kept[1:]:
-        made = made | one
-    return made
+    members = [one for one in get_args(hint) if one is not type(None)]
+    union = members[0]
+    for one in members[1:]:
+        union = union | one
+    return union
 
 
-def _is_optional(one: Field[Any]) -> bool:
-    return bool(one.metadata.get("is_optional"))
+def _is_optional(entry: Field[Any]) -> bool:
+    return bool(entry.metadata.get("is_optional"))
 
 
-def _has_default(one: Field[Any]) -> bool:
-    return one.default is not MISSING or one.default_factory is not MISSING
+def _has_default(entry: Field[Any]) -> bool:
+    return entry.default is not MISSING or entry.default_factory is not MISSING
 
 
 if __name__ == "__main__":

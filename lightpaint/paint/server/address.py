@@ -106,11 +106,15 @@ def _resolve(host: str) -> tuple[socket.AddressFamily, str, bool]:
         raise PaintError(f"no browser opens {host}, an address of one network card: {ADVICE}")
     for flags in (socket.AI_NUMERICHOST, 0):
         try:
-            found = socket.getaddrinfo(_to_ascii(name), 0, type=socket.SOCK_STREAM, flags=flags)
+            candidates = socket.getaddrinfo(
+                _to_ascii(name), 0, type=socket.SOCK_STREAM, flags=flags
+            )
         except (OSError, ValueError):
             continue
         # IPv4 first: that is what tunnels and people expect of `localhost`.
-        family, _, _, _, place = min(found, key=lambda one: one[0] != socket.AF_INET)
+        family, _, _, _, place = min(
+            candidates, key=lambda candidate: candidate[0] != socket.AF_INET
+        )
         return family, str(place[0]), bool(flags)
     raise PaintError(f"{host[:80]!r} is no address of this machine: {ADVICE}")
 

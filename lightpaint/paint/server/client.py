@@ -161,9 +161,9 @@ class Client:
         if self._is_abandoned:
             return
         if reply is None and (key := _replacement_key(message)) is not None:
-            for k, (other, its) in enumerate(self._unsent):
-                if its is None and _replacement_key(other) == key:
-                    message = _merge(other, message)
+            for k, (queued, reply_to) in enumerate(self._unsent):
+                if reply_to is None and _replacement_key(queued) == key:
+                    message = _merge(queued, message)
                     del self._unsent[k]
                     break
         self._unsent.append((message, reply))
@@ -255,6 +255,6 @@ def _merge(old: Message, new: Message) -> Message:
         return PictureUpdate(resources={**old.resources, **new.resources})
     if isinstance(old, AnswerUpdate) and isinstance(new, AnswerUpdate):
         # Live answers leave out what is asked, which the one that is replaced may have said.
-        names = [one for one in EditState.__dataclass_fields__ if getattr(new, one) is None]
+        names = [key for key in EditState.__dataclass_fields__ if getattr(new, key) is None]
         return replace(new, **{name: getattr(old, name) for name in names})
     return new

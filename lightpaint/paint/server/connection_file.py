@@ -25,17 +25,17 @@ class ConnectionFile:
     def write(self) -> None:
         """Write the file, replacing one that a killed painter has left.
 
-        Raises OutputError for whatever the system refuses.
+        Raises OutputError if the file cannot be written.
         """
-        with replacing(self.path) as beside:
-            # Nobody else may read it, not even before it has its name; nor is a link followed.
-            number = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with open(number, "w", encoding="utf-8") as file:
+        with replacing(self.path) as temporary:
+            # No other user may read it, even under its temporary name, and no link is followed.
+            descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with open(descriptor, "w", encoding="utf-8") as file:
                 file.write(json.dumps(self._about) + "\n")
 
     def remove(self) -> None:
         """Delete the file, unless it is another painter's by now."""
         with suppress(OSError, ValueError, AttributeError):
-            found = json.loads(self.path.read_text(encoding="utf-8"))
-            if found.get("token") == self._about["token"]:
+            record = json.loads(self.path.read_text(encoding="utf-8"))
+            if record.get("token") == self._about["token"]:
                 self.path.unlink()

@@ -160,8 +160,8 @@ def _is_address(name: str) -> bool:
     return True
 
 
-def _is_equal(one: str, other: str) -> bool:
-    return secrets.compare_digest(one.encode("utf-8", "replace"), other.encode())
+def _is_equal(first: str, second: str) -> bool:
+    return secrets.compare_digest(first.encode("utf-8", "replace"), second.encode())
 
 
 def _header(scope: Scope, name: bytes) -> list[str]:
@@ -171,16 +171,16 @@ def _header(scope: Scope, name: bytes) -> list[str]:
 def _bearer_token(scope: Scope) -> str | None:
     """Return the key in a header, which a browser sends for nobody but the page's own script."""
     token_ = [value.partition(" ") for value in _header(scope, b"authorization")]
-    [(scheme, _, shown)] = token_ if len(token_) == 1 else [("", "", "")]
-    return shown if scheme.lower() == "bearer" else None
+    [(scheme, _, token)] = token_ if len(token_) == 1 else [("", "", "")]
+    return token if scheme.lower() == "bearer" else None
 
 
 def _subprotocol_key(scope: Scope) -> str | None:
     """Return the key among a socket's subprotocols: a page cannot give a socket headers."""
     # From the header itself: what servers make of it differs.
     names = ",".join(_header(scope, b"sec-websocket-protocol")).split(",")
-    found = [name for x in names if (name := x.strip()).startswith(KEY_PROTOCOL)]
-    return found[0].removeprefix(KEY_PROTOCOL) if len(found) == 1 else None
+    keys = [name for x in names if (name := x.strip()).startswith(KEY_PROTOCOL)]
+    return keys[0].removeprefix(KEY_PROTOCOL) if len(keys) == 1 else None
 
 
 def _with_headers(send: Send, scope: Scope) -> Send:

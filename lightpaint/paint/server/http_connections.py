@@ -1,8 +1,8 @@
-"""HTTP connections to the painter's server: few without a key, and none of these for long.
+"""HTTP connections to the painter's server; unauthenticated ones are few and short.
 
-Whoever reaches the server can open connections and send nothing on them, or half of a request.
-Until a connection has shown the key it is unauthenticated: one that requests nothing is closed
-soon, and when there are too many the oldest makes room, so that a page always gets through.
+Any program that reaches the server can open connections and send nothing, or half a request.
+A connection is unauthenticated until it has shown the key. One that requests nothing is closed
+soon, and if there are too many, the oldest is closed, so that a page always gets through.
 
 Imported only where uvicorn is installed.
 """
@@ -78,7 +78,7 @@ class BoundedHttp(H11Protocol):
     def _on_deadline(self) -> None:
         is_answered = self.cycle is None or self.cycle.response_complete
         if not is_answered or self.transport.get_write_buffer_size():
-            self._start_deadline()  # it is the answer that takes long
+            self._start_deadline()  # the answer is what takes long
         else:
             self._abort()
 
@@ -95,8 +95,8 @@ class BoundedHttp(H11Protocol):
 
 def bounded_http_protocol(is_allowed: Callable[[Any], bool]) -> type[BoundedHttp]:
     """Return the protocol of one server. is_allowed: whether a request shows the server's key."""
-    made = type(
+    protocol = type(
         "PageHttp", (BoundedHttp,), {"is_allowed": staticmethod(is_allowed), "unauthenticated": {}}
     )
-    assert issubclass(made, BoundedHttp)
-    return made
+    assert issubclass(protocol, BoundedHttp)
+    return protocol

@@ -1,7 +1,7 @@
 """The painter's server: carries messages and pictures between one session and its pages.
 
 It knows nothing of light. The page is a table of files; pictures are raw bytes by name and
-generation; all else goes over one WebSocket. `guard.py` says who may ask.
+generation; all else goes over one WebSocket. `guard.py` decides which requests are allowed.
 """
 
 from collections.abc import AsyncIterator, Callable
@@ -60,7 +60,7 @@ def page_app(
         return Response(file.content, headers={"content-type": file.kind})
 
     async def data(request: "Request") -> "Response":
-        name, asked = request.path_params["name"], request.query_params.get("g")
+        name, generation = request.path_params["name"], request.query_params.get("g")
         if is_program(request.scope):
             await connections.wait_for_rest()
         before = connections.generations.get(name)
@@ -68,20 +68,22 @@ def page_app(
             picture = await picture_message(connections, name)
         except PaintError as error:
             return Response(str(error), 404, media_type="text/plain")
-        [about], [content] = picture.content()["buffers"], picture.buffers()
+        [description], [content] = picture.content()["buffers"], picture.buffers()
         headers = {
             "content-type": "application/octet-stream",
-            "x-dtype": about["dtype"],
-            "x-shape": ",".join(map(str, about["shape"])),
+            "x-dtype": description["dtype"],
+            "x-shape": ",".join(map(str, description["shape"])),
         }
-        if asked is not None and asked == str(before) == str(connections.generations.get(name)):
+        if generation is not None and generation == str(before) == str(
+            connections.generations.get(name)
+        ):
             # Another launch has another key, and other pictures.
-            kept = "private, max-age=31536000, immutable"
-            headers |= {"cache-control": kept, "vary": "Authorization"}
+            caching = "private, max-age=31536000, immutable"
+            headers |= {"cache-control": caching, "vary": "Authorization"}
         return Response(content, headers=headers)
 
     async def live(websocket: "WebSocket") -> None:
-        # A program may have offered none, and is not answered with what it did not offer.
+        # A program may offer no subprotocol, and then gets none in the answer.
         await websocket.accept(PROTOCOL if PROTOCOL in websocket.scope["subprotocols"] else None)
         await connections.serve(Client(websocket, websocket.query_params.get("page", "")))
 
@@ -145,8 +147,8 @@ class Server:
     def connection(self) -> dict[str, Any]:
         """Values that a program of this machine needs to connect."""
         token = self._guard.program_token
-        about = {"version": __version__, "protocol": VERSION}
-        return {"address": self.address.local_url, "token": token, **about}
+        versions = {"version": __version__, "protocol": VERSION}
+        return {"address": self.address.local_url, "token": token, **versions}
 
     def one_time_url(self) -> str:
         """Return the URL for a browser that is started now; its token is good once."""
@@ -173,7 +175,7 @@ class Server:
 
     def run(self) -> None:
         """Serve until Ctrl-C or a signal, which is raised again at a clean end."""
-        # Whoever comes meanwhile waits at the socket.
+        # Connections wait at the socket during these imports.
         import uvicorn
 
         from lightpaint.paint.server.http_connections import bounded_http_protocol
@@ -193,7 +195,7 @@ class Server:
             ws_ping_interval=10.0,
             ws_ping_timeout=20.0,
             log_config=None,
-            log_level="error",  # junk of strangers is no news for the terminal
+            log_level="error",  # invalid requests of strangers do not belong in the terminal
             access_log=False,
             proxy_headers=False,
             server_header=False,
@@ -205,9 +207,9 @@ class Server:
         with stop_on_hangup(self._uvicorn):
             self._uvicorn.run(sockets=[self._socket])
 
-    def stop(self, why: str = "") -> None:
-        """End `run`, from another thread. why: text for the pages, instead of the usual one."""
-        self._connections.farewell = why or self._connections.farewell
+    def stop(self, farewell: str = "") -> None:
+        """End `run`, from another thread. farewell: text for the pages instead of the usual one."""
+        self._connections.farewell = farewell or self._connections.farewell
         self._stop_requested = True
         if self._uvicorn is not None:
             self._uvicorn.should_exit = True

@@ -1,5 +1,4 @@
-"""The connections between clients and one session: who has it, and in which order requests are
-done.
+"""The connections between clients and one session: its owner, and the order of requests.
 
 One page has the session. Another page is told so, and may take it over; the first one is then told.
 Requests of a page wait in a queue of its own, and one thread does them one after the other; of live
@@ -79,7 +78,7 @@ _Result = TypeVar("_Result")
 class Connections:
     """The clients of one session.
 
-    report: receives, in plain text, what somebody at the terminal should know.
+    report: receives plain text for the terminal.
     """
 
     def __init__(
@@ -135,7 +134,7 @@ class Connections:
         live_answer = asyncio.create_task(self._answer_loop(client))
         try:
             await client.receive_all()
-            # The last stroke of a page counts, though nobody is there for the answer.
+            # The last stroke of a page counts even if the page has gone.
             last = asyncio.ensure_future(client.wait_answered())
             await asyncio.wait((last, live_answer), return_when=asyncio.FIRST_COMPLETED)
             last.cancel()
@@ -179,10 +178,10 @@ class Connections:
                 self._update_generations(message)
                 if client is self._owner.page and not isinstance(message, SessionState):
                     self._send_to_observers(message)
-            first, *others = answers or [Acknowledgement()]
+            first, *further = answers or [Acknowledgement()]
             for seq in incoming.replies or (None,):
                 client.send(first, seq)
-            for message in others:
+            for message in further:
                 client.send(message)
 
     async def _handle(self, client: Client, incoming: IncomingMessage) -> list[Message]:
@@ -207,7 +206,7 @@ class Connections:
         except LightpaintError as error:
             return [Failure(text=str(error), tone=error_tone(error))]
         except Exception as error:
-            # A mistake of lightpaint's own: whoever paints goes on, and whoever mends it is told.
+            # A bug in lightpaint: painting goes on, and the terminal shows the traceback.
             self.report("".join(traceback.format_exception(error)))
             return [Failure(text=error_text(error, at_length=False))]
 
@@ -219,7 +218,7 @@ class Connections:
         if isinstance(request, Observe):
             if client is self._owner.page:
                 raise PaintError("this client has the session: observe with a client of its own")
-            others = [one for one in self._clients if one.is_observer and one is not client]
+            others = [other for other in self._clients if other.is_observer and other is not client]
             if len(others) >= MAX_OBSERVERS:
                 raise PaintError(f"{MAX_OBSERVERS} observers are there already: close one of them")
             client.is_observer = True
@@ -282,7 +281,7 @@ class Connections:
             self._owner.page.send(message)
 
     def _update_generations(self, message: Message) -> None:
-        """Store the numbers of the pictures that there are by now."""
+        """Store the generation numbers of the pictures in a message."""
         if isinstance(message, SessionState):
             self.generations = dict(message.resources)
         elif isinstance(message, PictureUpdate):
@@ -290,7 +289,7 @@ class Connections:
 
 
 async def _wait_all(waits: list[Coroutine[Any, Any, None]]) -> None:
-    """Wait for all of them, but not for clients that are too slow."""
+    """Wait for all coroutines, but not for clients that are too slow."""
     tasks = [asyncio.ensure_future(wait) for wait in waits]
     if tasks:
         await asyncio.wait(tasks, timeout=CLOSING_S)
@@ -302,9 +301,9 @@ def _taken_message(text: str) -> Message:
     return Closing(reason="taken", text=text)
 
 
-def _is_same_page(one: Client, other: Client) -> bool:
+def _is_same_page(first: Client, second: Client) -> bool:
     """Return whether two connections are of one page, back after the first was dropped."""
-    return one is other or (one.page != "" and one.page == other.page)
+    return first is second or (first.page != "" and first.page == second.page)
 
 
 async def picture_message(connections: Connections, name: str) -> Message:

@@ -1,1 +1,1 @@
-"""A painting in progress: its canvas, its lighting, its looks, and what pages hear of them."""
+"""A painting in progress: its canvas, its lighting, its looks, and the messages about them."""

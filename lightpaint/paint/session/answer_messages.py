@@ -104,14 +104,18 @@ def _shares(lit: Doubles) -> tuple[float, ...]:
 
 def _light_answer(light: BasisLight, weight: Doubles, share: float) -> LightAnswer:
     colour = photometry(as_rgb(weight), unit=light.unit)
-    now, then = (float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight))
+    present, answered = (
+        float(luminance(np.asarray(x, np.float64))) for x in (light.emission, weight)
+    )
     is_white = colour.kelvin is not None and colour.duv is not None and abs(colour.duv) <= WHITE
     return LightAnswer(
         emission=as_rgb(weight),
-        stops=float(np.log2(then / now)) if now > 0 and then > OFF * now else None,
+        stops=float(np.log2(answered / present))
+        if present > 0 and answered > OFF * present
+        else None,
         kelvin=colour.kelvin if is_white else None,
         swatch=colour.hex or rgb_to_hex(np.asarray(light.emission, np.float64)),
-        is_on=then > OFF * now,
+        is_on=answered > OFF * present,
         share=share,
     )
 
@@ -158,13 +162,13 @@ def judge(analyses: Sequence[Analysis], painted: Sequence[int]) -> Judgement:
     solution = analyses[0].solution
     errors = spoken_errors(analyses[0].uncertainty, len(solution.basis.names))
     settings = solution.lighting.lights
-    of_views = {view: _closeness(its) for view, its in zip(painted, analyses, strict=True)}
+    of_views = {view: _closeness(entry) for view, entry in zip(painted, analyses, strict=True)}
     return Judgement(
-        worst=max(of_views.values(), key=lambda its: its.delta_e),
+        worst=max(of_views.values(), key=lambda entry: entry.delta_e),
         of_views=tuple(of_views.get(k) for k in range(max(painted) + 1)),
         lights=tuple(
-            (error, its.is_active, not any(its.reached))
-            for error, its in zip(errors, settings, strict=True)
+            (error, entry.is_active, not any(entry.reached))
+            for error, entry in zip(errors, settings, strict=True)
         ),
     )
 
@@ -282,9 +286,11 @@ def preview_text(
     closes: share of the miss that it takes away. rest: its change where nobody painted. delta_e:
     over the paint, now and then. is_at_cost: whether it changes the rest by more than it gains.
     """
-    now, then = map(spoken_amount, delta_e)
+    current, expected = map(spoken_amount, delta_e)
     if closes >= 0.005:
-        text = f"Removes {spoken_percent(closes)} of the difference (ΔE {now} becomes {then})"
+        text = (
+            f"Removes {spoken_percent(closes)} of the difference (ΔE {current} becomes {expected})"
+        )
     else:
         text = "The answer comes no closer"
     if rest is None or rest.worst < INVISIBLE:

@@ -87,17 +87,17 @@ class Canvas:
 
     def put(self, region: Region, pixels: Pixels) -> None:
         """Put pixels onto the canvas; unpainted ones show the present look."""
-        where = slices(region)
+        area = slices(region)
         image, importance, at_least = pixels
         painted = (importance > 0)[..., None]
-        self.image[where] = np.where(painted, image, self.present[where])
-        same = np.array_equal(self.importance[where], importance)
-        self.importance[where] = importance
+        self.image[area] = np.where(painted, image, self.present[area])
+        is_same_importance = np.array_equal(self.importance[area], importance)
+        self.importance[area] = importance
         if at_least is not None and self.painting.at_least is None:
             self.painting = self.painting._replace(at_least=np.zeros(self.image.shape, bool))
         if self.painting.at_least is not None:
-            self.painting.at_least[where] = False if at_least is None else at_least & painted
-        self.live.update(where, with_importance=not same)
+            self.painting.at_least[area] = False if at_least is None else at_least & painted
+        self.live.update(area, with_importance=not is_same_importance)
 
     def paint(self, region: Region, pixels: Pixels) -> None:
         """Paint pixels by hand: they belong to the open stroke."""
@@ -229,8 +229,8 @@ class Canvases:
         for k, (image, importance, at_least) in paintings.items():
             view = self[k]
             light, counts = np.asarray(image, np.float32), np.asarray(importance, np.float32)
-            given = Pixels(light, counts, at_least).copy()
-            patches.append(Patch(view.full_region, view.pixels(view.full_region), given, k))
+            pixels = Pixels(light, counts, at_least).copy()
+            patches.append(Patch(view.full_region, view.pixels(view.full_region), pixels, k))
         return tuple(patches)
 
 

@@ -60,17 +60,17 @@ class History:
 
         Raises NothingToUndoError at either end, PaintError for a step whose pixels are lost.
         """
-        steps, now = self._store.steps, self._store.position
-        position, is_back = now + by, by < 0
+        steps, current = self._store.steps, self._store.position
+        position, is_back = current + by, by < 0
         if not 0 <= position <= len(steps):
             raise NothingToUndoError(f"There is nothing to {'undo' if is_back else 'redo'}.")
-        step = steps[position] if is_back else steps[now]
+        step = steps[position] if is_back else steps[current]
         try:
-            found = [patch.before if is_back else patch.after for patch in step.patches]
+            states = [patch.before if is_back else patch.after for patch in step.patches]
         except DamagedError:
             raise PaintError(self._store.recover()) from None
         self._store.move_to(position)
-        for patch, pixels in zip(step.patches, found, strict=True):
+        for patch, pixels in zip(step.patches, states, strict=True):
             self._views[patch.view].put(patch.region, pixels)
         if step.fields:
             requests = step.fields["before" if is_back else "after"]
@@ -88,17 +88,17 @@ class History:
 
     def _label(self, step: Step) -> str:
         """Return the label of a step for undo, with the view's name if there are several."""
-        where = [self._views[patch.view].name for patch in step.patches]
-        names_view = len(self._views) > 1 and len(where) == 1
-        return f"{step.label}, {where[0]}" if names_view else step.label
+        view_names = [self._views[patch.view].name for patch in step.patches]
+        names_view = len(self._views) > 1 and len(view_names) == 1
+        return f"{step.label}, {view_names[0]}" if names_view else step.label
 
 
 def restore(
     bases: Sequence[Basis], presents: Sequence[Floats], store: Store
 ) -> tuple[Canvases, SessionRequests]:
     """Return the canvases and the requests after the steps of the store."""
-    done = store.steps[: store.position]
-    states = [step.fields["after"] for step in done if step.fields]
+    applied = store.steps[: store.position]
+    states = [step.fields["after"] for step in applied if step.fields]
     requests = SessionRequests.of(states[-1]) if states else SessionRequests()
     requests.constraints()
-    return Canvases(bases, presents, done), requests
+    return Canvases(bases, presents, applied), requests

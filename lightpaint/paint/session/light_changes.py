@@ -1,4 +1,4 @@
-"""Changes of what is asked of lights, by the messages of a page: all lights exist and are free."""
+"""Changes of the requests for lights by messages of a page, checked against the lights."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -24,10 +24,10 @@ def constrain_lights(
 ) -> SessionRequests:
     """Return the requests with those on some lights replaced, by their names."""
     _check_names(asked, lights)
-    for name, its in asked.items():
+    for name, constraints in asked.items():
         if lights[lights.names.index(name)].is_fixed:
             raise PaintError(f"{name} is kept as it is, and cannot be asked for anything")
-        requests = requests.with_light(name, its)
+        requests = requests.with_light(name, constraints)
     return requests
 
 

@@ -113,5 +113,5 @@ class LiveAnswer:
         )
 
     def _constraints(self, requests: SessionRequests) -> Constraints:
-        asked = constraints_of(self._basis.requests).and_then(self._base_constraints)
-        return asked.and_then(requests.constraints())
+        constraints = constraints_of(self._basis.requests).and_then(self._base_constraints)
+        return constraints.and_then(requests.constraints())

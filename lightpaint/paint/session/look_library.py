@@ -161,12 +161,12 @@ class LookLibrary:
                 raise PaintError(
                     f"no light is called {light!r}: expected one of {some_names(names)}"
                 )
-            its = lights[names.index(light)]
-            if its.is_fixed:
+            basis_light = lights[names.index(light)]
+            if basis_light.is_fixed:
                 raise PaintError(f"{light} is kept as it is: leave it out of the proposal")
             if not all(math.isfinite(x) and x >= 0 for x in emission):
                 raise PaintError(f"{light} is proposed at {list(emission)}: expected numbers >= 0")
-            if its.is_scalar and len(set(emission)) > 1:
+            if basis_light.is_scalar and len(set(emission)) > 1:
                 raise PaintError(f"{light} has one number for all channels: give it three times")
             weights[names.index(light)] = emission
         proposals = [look for look in session.store.looks() if look.fields.get("is_proposal")]
@@ -190,14 +190,14 @@ class LookLibrary:
         fields = {"name": name, "stamp": time.time(), "wishes": requests.as_json()}
         arrays: dict[str, npt.NDArray[Any]] = {"weights": weights}
         for view, (image, importance, marks) in zip(self._session.views, paintings, strict=True):
-            its: dict[str, npt.NDArray[Any]] = {
+            arrays_of_view: dict[str, npt.NDArray[Any]] = {
                 "image": np.asarray(image, np.float32),
                 "importance": np.asarray(importance, np.float32),
                 "thumbnail": display_thumbnail(view.basis.mix(weights), self._session.transform),
             }
             if marks is not None:
-                its[MARKS_ARRAY] = marks.view(np.uint8)
-            arrays |= {name_in_view(key, view.view): value for key, value in its.items()}
+                arrays_of_view[MARKS_ARRAY] = marks.view(np.uint8)
+            arrays |= {name_in_view(key, view.view): value for key, value in arrays_of_view.items()}
         return StoredLook(self._next_id(), fields, arrays)
 
     def _store(self, look: StoredLook) -> None:
@@ -239,16 +239,16 @@ class LookLibrary:
 
 def _mix_pixels(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pixels:
     """Mix two paintings of a view, each weighted by its share and its importance."""
-    counts = [share * its.importance for share, its in zip(shares, pair, strict=True)]
+    counts = [share * pixels.importance for share, pixels in zip(shares, pair, strict=True)]
     total = counts[0] + counts[1]
     whole = np.where(total > 0, total, 1)[..., None]
     image = np.zeros((*total.shape, 3), np.float32)
-    for count, its in zip(counts, pair, strict=True):
-        image += (count[..., None] / whole * its.image).astype(np.float32)
+    for count, pixels in zip(counts, pair, strict=True):
+        image += (count[..., None] / whole * pixels.image).astype(np.float32)
     # Brighter than the mean is as good where it is of all that counts there.
     unsure = np.zeros(image.shape, bool)
-    for count, its in zip(counts, pair, strict=True):
-        fixed = True if its.at_least is None else ~its.at_least
+    for count, pixels in zip(counts, pair, strict=True):
+        fixed = True if pixels.at_least is None else ~pixels.at_least
         unsure |= fixed & (count > 0)[..., None]
     at_least = ~unsure & (total > 0)[..., None]
     return Pixels(image, total.astype(np.float32), at_least if at_least.any() else None)

@@ -43,13 +43,13 @@ class OpenStroke:
             shared = _intersection(square, self.region)
             if _is_empty(shared):
                 continue
-            to, kept = (
+            area, saved = (
                 slices(_relative_to(shared, self.region)),
                 pixels.part(_relative_to(shared, square)),
             )
-            image[to], importance[to] = kept.image, kept.importance
+            image[area], importance[area] = saved.image, saved.importance
             if at_least is not None:
-                at_least[to] = False if kept.at_least is None else kept.at_least
+                at_least[area] = False if saved.at_least is None else saved.at_least
         is_marked = at_least is not None and at_least.any()
         return Pixels(image, importance, at_least if is_marked else None)
 
@@ -67,16 +67,16 @@ def _is_empty(region: Region) -> bool:
     return top >= bottom or left >= right
 
 
-def _union(one: Region, other: Region) -> Region:
+def _union(first: Region, second: Region) -> Region:
     """Return the smallest region that holds both, of which the first may be empty."""
-    if _is_empty(one):
-        return other
-    (a, b, c, d), (e, f, g, h) = one, other
+    if _is_empty(first):
+        return second
+    (a, b, c, d), (e, f, g, h) = first, second
     return min(a, e), max(b, f), min(c, g), max(d, h)
 
 
-def _intersection(one: Region, other: Region) -> Region:
-    (a, b, c, d), (e, f, g, h) = one, other
+def _intersection(first: Region, second: Region) -> Region:
+    (a, b, c, d), (e, f, g, h) = first, second
     return max(a, e), min(b, f), max(c, g), min(d, h)
 
 

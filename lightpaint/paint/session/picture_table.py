@@ -83,8 +83,8 @@ def light_thumbnail(basis: Basis, k: int) -> Picture:
 def display_thumbnail(light: Floats, transform: ViewTransform) -> Picture:
     """Return a thumbnail of a linear picture (h, w, 3), in display values."""
     factor = min(1, THUMBNAIL_SIDE / max(light.shape[:2]))
-    shown = transform.encode(resized(light, factor) if factor < 1 else light)
-    return np.round(shown * 255).astype(np.uint8)
+    encoded = transform.encode(resized(light, factor) if factor < 1 else light)
+    return np.round(encoded * 255).astype(np.uint8)
 
 
 def lookup_table(transform: ViewTransform) -> Picture:
@@ -97,5 +97,5 @@ def lookup_table(transform: ViewTransform) -> Picture:
     axis[0] = 0.0
     r, g, b = np.meshgrid(axis, axis, axis, indexing="ij")
     light = np.stack([r, g, b], axis=-1).reshape(1, -1, 3)
-    shown = transform.encode(light).reshape(LUT_SIDE, LUT_SIDE, LUT_SIDE, 3)
-    return np.asarray(shown, np.float16)
+    encoded = transform.encode(light).reshape(LUT_SIDE, LUT_SIDE, LUT_SIDE, 3)
+    return np.asarray(encoded, np.float16)

@@ -144,10 +144,14 @@ class Session:
     def snapshot(self, requests: SessionRequests | None = None) -> SessionSnapshot:
         """Return the paintings and `requests`, by default those in effect."""
         live_answer, bases = self.live_answer, tuple(view.basis for view in self.views)
-        asked = requests or live_answer.requests
+        effective = requests or live_answer.requests
         targets = tuple(self.target(k) for k in range(len(bases)))
-        how = live_answer.settings(asked), live_answer.constraints(asked), self.transform
-        return SessionSnapshot(self.version, bases, targets, asked, *how)
+        options = (
+            live_answer.settings(effective),
+            live_answer.constraints(effective),
+            self.transform,
+        )
+        return SessionSnapshot(self.version, bases, targets, effective, *options)
 
     def preview_requests(self, change: protocol.Preview) -> SessionRequests:
         """Return the requests after a change. Raises LightpaintError where it cannot be made."""
@@ -203,11 +207,11 @@ class Session:
                 return [self._append_requests(label, requests)]
         raise PaintError(f"a session has no answer to {type(message).__name__}")
 
-    def answer_update(self, **more: Any) -> AnswerUpdate:
+    def answer_update(self, **fields_of_answer: Any) -> AnswerUpdate:
         """Return the weights as they are, while the brush is down. more: further fields."""
         fields = {"stroke": self._stroke, "exact": False, "version": self.version}
         mode, weights = self.live_answer.mode, self.weights
-        return AnswerUpdate(**{**fields, "mode": mode, "weights": weights, **more})
+        return AnswerUpdate(**{**fields, "mode": mode, "weights": weights, **fields_of_answer})
 
     def accept_solution(
         self,
@@ -251,7 +255,9 @@ class Session:
         fit = self.live_answer.fit
         return {
             "history": self._history.info(),
-            "asked": {name: dict(its) for name, its in self.requests.lights.items()},
+            "asked": {
+                name: dict(constraints) for name, constraints in self.requests.lights.items()
+            },
             "ties": self.requests.ties,
             "settings": dict(self.requests.values),
             "meant": protocol.ResolvedFit(fit.space, fit.hold, fit.colors),
@@ -325,9 +331,9 @@ class Session:
 
     def _drop_stroke(self) -> list[tuple[int, Region]]:
         """Drop the open stroke; return its views and regions."""
-        where = self.views.drop()
+        regions = self.views.drop()
         self._update_answer()
-        return where
+        return regions
 
     # Steps
 
@@ -361,13 +367,13 @@ class Session:
         self.version += 1
         self.live_answer.solve()
 
-    def _patch_messages(self, *where: tuple[int, Region]) -> list[Message]:
+    def _patch_messages(self, *regions: tuple[int, Region]) -> list[Message]:
         """Return the canvases' pixels there: a message for each view, or one for the first if
         nowhere.
         """
-        views = tuple(view for view, _ in where)
+        views = tuple(view for view, _ in regions)
         messages: list[Message] = []
-        for view, region in where or ((0, (0, 0, 0, 0)),):
+        for view, region in regions or ((0, (0, 0, 0, 0)),):
             image, importance, _ = self.views[view].pixels(region)
             patch = CanvasPatch(
                 region=region,

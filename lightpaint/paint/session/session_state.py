@@ -1,4 +1,4 @@
-"""The state of a session, as a client is told that connects: lights, views, pictures and looks."""
+"""The state of a session for a client that connects: lights, views, pictures and looks."""
 
 from typing import Any
 

@@ -88,15 +88,15 @@ class SessionSnapshot:
         """
         target = self.targets[view]
         if target is None:
-            nothing = np.zeros(self.bases[view].size, np.uint8)
-            return ["Nothing is painted here yet."], nothing
+            blank = np.zeros(self.bases[view].size, np.uint8)
+            return ["Nothing is painted here yet."], blank
         solution = self.solution()
         assert solution is not None
         analysis = analyse(solution)[self.painted_views.index(view)]
         best = solution_of(self._problem(fit=replace(self.settings, hold=0.0, colors="free")))
         transform = best.problem.fit.transform or ViewTransform()
-        shown = transform.encode(self.bases[view].mix(best.weights))
-        missed = np.abs(shown - transform.encode(target.image)).max(axis=-1)
+        predicted = transform.encode(self.bases[view].mix(best.weights))
+        missed = np.abs(predicted - transform.encode(target.image)).max(axis=-1)
         missed = np.where(target.importance > 0, np.clip(missed, 0, 1), 0)
         return why_not_closer(analysis), np.round(255 * missed).astype(np.uint8)
 
@@ -112,29 +112,33 @@ class SessionSnapshot:
         solution = self.solution()
         after = weights if solution is None else solution.weights
         planes, transform = clean or self.bases[view], self.transform
-        before, then = (display_thumbnail(planes.mix(x), transform) for x in (weights, after))
+        before, afterwards = (display_thumbnail(planes.mix(x), transform) for x in (weights, after))
         if solution is None:
             return ChangePreview(
-                before, then, *preview_text(0.0, None, delta_e=(0, 0), is_at_cost=False)
+                before, afterwards, *preview_text(0.0, None, delta_e=(0, 0), is_at_cost=False)
             )
-        judged = view if view in self.painted_views else self.painted_views[0]
-        view_solution = solution.views[self.painted_views.index(judged)]
+        judged_view = view if view in self.painted_views else self.painted_views[0]
+        view_solution = solution.views[self.painted_views.index(judged_view)]
         look, target = (
             PaintComparison.of_problem(view_solution.problem),
             view_solution.problem.views.targets[0],
         )
-        pictures = [self.bases[judged].mix(x) for x in (weights, after)]
+        pictures = [self.bases[judged_view].mix(x) for x in (weights, after)]
         lights = [look.pixels(picture) for picture in pictures]
         cost_now, cost_then = (look.mean(look.fit_errors(light)) for light in lights)
         closes = 1 - cost_then / cost_now if cost_now > 0 else 0.0
-        elsewhere = unpainted_change(look, self.bases[judged], target.importance > 0, *pictures)
-        missed_ = look.mean(look.difference(lights[0])), look.mean(look.difference(lights[1]))
-        gained = missed_[0] - missed_[1]
+        elsewhere = unpainted_change(
+            look, self.bases[judged_view], target.importance > 0, *pictures
+        )
+        misses = look.mean(look.difference(lights[0])), look.mean(look.difference(lights[1]))
+        gained = misses[0] - misses[1]
         is_at_cost = (
             elsewhere is not None and elsewhere.worst > NOTICED and elsewhere.delta_e > gained
         )
         return ChangePreview(
-            before, then, *preview_text(closes, elsewhere, delta_e=missed_, is_at_cost=is_at_cost)
+            before,
+            afterwards,
+            *preview_text(closes, elsewhere, delta_e=misses, is_at_cost=is_at_cost),
         )
 
 

@@ -29,9 +29,9 @@ class Pixels(NamedTuple):
 
     def part(self, region: Region) -> "Pixels":
         """Return the pixels of a region, as views of the same arrays."""
-        here = slices(region)
-        at_least = None if self.at_least is None else self.at_least[here]
-        return Pixels(self.image[here], self.importance[here], at_least)
+        area = slices(region)
+        at_least = None if self.at_least is None else self.at_least[area]
+        return Pixels(self.image[area], self.importance[area], at_least)
 
     def copy(self) -> "Pixels":
         """Return a copy; `at_least` is None where no mark is set."""
@@ -47,11 +47,11 @@ class Pixels(NamedTuple):
         return equal_marks(self.at_least, other.at_least)
 
 
-def equal_marks(one: Bools | None, other: Bools | None) -> bool:
+def equal_marks(first: Bools | None, second: Bools | None) -> bool:
     """Return whether two paintings have the same "at least" marks; None for none."""
-    if one is None or other is None:
-        return not any(marks is not None and marks.any() for marks in (one, other))
-    return np.array_equal(one, other)
+    if first is None or second is None:
+        return not any(marks is not None and marks.any() for marks in (first, second))
+    return np.array_equal(first, second)
 
 
 def slices(region: Region) -> tuple[slice, slice]:

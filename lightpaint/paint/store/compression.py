@@ -55,7 +55,9 @@ def pack_patches(patches: Sequence[Patch]) -> tuple[bytes, bytes]:
     """
     places = [(patch.region, is_marked(patch)) for patch in patches]
     before, after = (
-        np.concatenate([_to_bits(one, *place) for one, place in zip(pixels, places, strict=True)])
+        np.concatenate(
+            [_to_bits(entry, *place) for entry, place in zip(pixels, places, strict=True)]
+        )
         for pixels in ([x.before for x in patches], [x.after for x in patches])
     )
     return pack(before), pack(before ^ after)
@@ -70,11 +72,11 @@ def unpack_patch(
     damaged file.
     """
     ends = np.cumsum([0, *(_value_count(*place) for place in places)]).tolist()
-    was, is_other = (
+    before_bits, change_bits = (
         np.asarray(unpack(x, "uint32", (ends[-1],)))[ends[k] : ends[k + 1]]
         for x in (before, change)
     )
-    return _from_bits(was, *places[k]), _from_bits(was ^ is_other, *places[k])
+    return _from_bits(before_bits, *places[k]), _from_bits(before_bits ^ change_bits, *places[k])
 
 
 def _size(region: Region) -> tuple[int, int]:

@@ -114,33 +114,33 @@ START_AFRESH = f"{OTHER_FOLDER}, or start afresh, which keeps it under another n
 
 def _check_identity(database: sqlite3.Connection, path: Path | None, identity: Identity) -> None:
     """Raise PaintError for a session of something else."""
-    for (said,) in database.execute("SELECT value FROM about WHERE name = 'identity'"):
-        its = read_record(Identity, strict_json(said))
-        if len(its.views) > len(identity.views):
+    for (text,) in database.execute("SELECT value FROM about WHERE name = 'identity'"):
+        stored = read_record(Identity, strict_json(text))
+        if len(stored.views) > len(identity.views):
             raise PaintError(
-                f"{path} is a session of {len(its.views)} views, and this is of "
+                f"{path} is a session of {len(stored.views)} views, and this is of "
                 f"{len(identity.views)}: {START_AFRESH}"
             )
         # Views may have come after those that it has.
-        for old, new in zip(its.views, identity.views, strict=False):
+        for old, new in zip(stored.views, identity.views, strict=False):
             _check_view(path, identity.scene, old, new)
-        if its.lights != identity.lights:
+        if stored.lights != identity.lights:
             raise PaintError(
-                f"{path} is a session of the lights {some_names(its.lights)}, and "
+                f"{path} is a session of the lights {some_names(stored.lights)}, and "
                 f"{identity.scene} has {some_names(identity.lights)}: {START_AFRESH}"
             )
 
 
-def _check_view(path: Path | None, scene: str, its: ViewIdentity, now: ViewIdentity) -> None:
-    if its.size != now.size:
+def _check_view(path: Path | None, scene: str, stored: ViewIdentity, current: ViewIdentity) -> None:
+    if stored.size != current.size:
         raise PaintError(
-            f"{path} is a session of {its.size[1]}x{its.size[0]} pixels, and {scene} has "
-            f"{now.size[1]}x{now.size[0]}: {START_AFRESH}"
+            f"{path} is a session of {stored.size[1]}x{stored.size[0]} pixels, and {scene} has "
+            f"{current.size[1]}x{current.size[0]}: {START_AFRESH}"
         )
-    if its.sensor and now.sensor and its.sensor != now.sensor:
+    if stored.sensor and current.sensor and stored.sensor != current.sensor:
         raise PaintError(
-            f"{path} is a session of the view through {its.sensor}, and this is through "
-            f"{now.sensor}: {START_AFRESH}"
+            f"{path} is a session of the view through {stored.sensor}, and this is through "
+            f"{current.sensor}: {START_AFRESH}"
         )
 
 
@@ -193,10 +193,10 @@ def _sqlite_error(path: Path | None, error: sqlite3.Error) -> LightpaintError:
 def file_id(path: Path | None) -> tuple[int, int] | None:
     """Return the system's own identity of a file; None if there is none."""
     try:
-        about = None if path is None else path.stat()
+        status = None if path is None else path.stat()
     except OSError:
         return None
-    return None if about is None else (about.st_dev, about.st_ino)
+    return None if status is None else (status.st_dev, status.st_ino)
 
 
 def rewrite(
@@ -207,16 +207,16 @@ def rewrite(
     The system keeps a file that somebody has open. Raises LightpaintError where it cannot be
     written; the old one is open then.
     """
-    beside = path.with_name(f".{path.name}.new")
+    temporary = path.with_name(f".{path.name}.new")
     with _translated_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         try:
-            database.execute("VACUUM INTO ?", (str(beside),))
-            flush(beside)
-            os.replace(beside, path)
+            database.execute("VACUUM INTO ?", (str(temporary),))
+            flush(temporary)
+            os.replace(temporary, path)
         except BaseException:
-            beside.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
             raise
     database.close()  # before its place is taken: it removes what is called like its own log
     return open_database(path, identity)
@@ -232,9 +232,9 @@ def free_name(path: Path) -> Path:
 
 def check_pages(database: sqlite3.Connection) -> None:
     """Raise sqlite3.Error where pages of an open database are not as they were written."""
-    [(found,)] = database.execute("PRAGMA quick_check(1)")
-    if found != "ok":
-        raise sqlite3.DatabaseError(found)
+    [(verdict,)] = database.execute("PRAGMA quick_check(1)")
+    if verdict != "ok":
+        raise sqlite3.DatabaseError(verdict)
 
 
 def set_aside(path: Path) -> Path | None:

@@ -41,8 +41,8 @@ class StoredPatch(Patch):
         return self._pixels()[1]
 
     def _pixels(self) -> tuple[Pixels, Pixels]:
-        found: tuple[Pixels, Pixels] = vars(self)["_read"]()
-        return found
+        pixels: tuple[Pixels, Pixels] = vars(self)["_read"]()
+        return pixels
 
 
 class LookFile(Protocol):
@@ -83,9 +83,9 @@ class LookArrays(Mapping[str, npt.NDArray[Any]]):
 
 def pack_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> PackedArrays:
     """Return the arrays of a look, packed. Raises PaintError for an unexpected type."""
-    found = {}
+    packed = {}
     for name, array in arrays.items():
         if array.dtype.name not in DTYPES:
             raise PaintError(f"a look of {array.dtype.name}: expected {', '.join(DTYPES)}")
-        found[name] = (array.dtype.name, json.dumps(array.shape), pack(array))
-    return found
+        packed[name] = (array.dtype.name, json.dumps(array.shape), pack(array))
+    return packed

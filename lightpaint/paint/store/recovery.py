@@ -64,8 +64,10 @@ def recover(path: Path, identity: Identity | None) -> str:
         if os.path.exists(f"{path}-wal"):
             os.rename(f"{path}-wal", f"{aside}-wal")
         os.replace(new, path)
-    what = f"{', '.join(lost)} could not be read" if lost else "nothing that counts was lost"
-    return f"{path} was damaged: {what}; all else is there, and the damaged file is kept as {aside}"
+    losses = f"{', '.join(lost)} could not be read" if lost else "nothing that counts was lost"
+    return (
+        f"{path} was damaged: {losses}; all else is there, and the damaged file is kept as {aside}"
+    )
 
 
 def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None) -> list[str]:
@@ -79,15 +81,15 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
             [(version,)] = old.execute("PRAGMA user_version")
             if (application, version) != (APPLICATION, VERSION):
                 raise PaintError("not of this version")
-            its = _read_identity(old) or identity
-            steps, lost_steps = _read_steps(old, its)
+            stored_identity = _read_identity(old) or identity
+            steps, lost_steps = _read_steps(old, stored_identity)
             looks, lost_looks = _read_looks(old)
-            if its is None or not (steps or looks or not (lost_steps or lost_looks)):
+            if stored_identity is None or not (steps or looks or not (lost_steps or lost_looks)):
                 raise PaintError("nothing of it can be read")
             position = _read_position(old, [row[0][0] for row in steps])
     except (sqlite3.Error, PaintError) as error:
         raise damaged_error(path, error) from None
-    with closing(open_database(new, its)) as database, transaction(database):
+    with closing(open_database(new, stored_identity)) as database, transaction(database):
         for row, pixels in steps:
             database.execute("INSERT INTO step VALUES (?, ?, ?, ?, ?)", row)
             if pixels is not None:
@@ -96,8 +98,8 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
             database.execute("INSERT INTO look VALUES (?, ?)", row)
             rows = [(row[0], *array) for array in arrays]
             database.executemany("INSERT INTO look_array VALUES (?, ?, ?, ?, ?)", rows)
-        about = [("position", position), ("identity", json.dumps(asdict(its)))]
-        database.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", about)
+        values = [("position", position), ("identity", json.dumps(asdict(stored_identity)))]
+        database.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", values)
     lost = [f"{len(lost_steps)} step{'s' * (len(lost_steps) > 1)}"] * bool(lost_steps)
     if lost_looks:
         lost.append(f"the look{'s' * (len(lost_looks) > 1)} {some_names(lost_looks)}")
@@ -106,8 +108,8 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
 
 def _read_identity(old: sqlite3.Connection) -> Identity | None:
     with suppress(*DAMAGE_ERRORS):
-        [(said,)] = old.execute("SELECT value FROM about WHERE name = 'identity'")
-        return read_record(Identity, strict_json(said))
+        [(text,)] = old.execute("SELECT value FROM about WHERE name = 'identity'")
+        return read_record(Identity, strict_json(text))
     return None
 
 
@@ -115,10 +117,10 @@ def _read_position(old: sqlite3.Connection, ids: Sequence[int]) -> int:
     """Return how many of the readable steps are done."""
     with suppress(*DAMAGE_ERRORS):
         [(position,)] = old.execute("SELECT value FROM about WHERE name = 'position'")
-        before = [number for (number,) in _readable_rows(old, "SELECT id FROM step ORDER BY id")]
-        if 0 <= int(position) <= len(before):
-            done = set(before[: int(position)])
-            return sum(number in done for number in ids)
+        numbers = [number for (number,) in _readable_rows(old, "SELECT id FROM step ORDER BY id")]
+        if 0 <= int(position) <= len(numbers):
+            done_numbers = set(numbers[: int(position)])
+            return sum(number in done_numbers for number in ids)
     return len(ids)
 
 
@@ -126,7 +128,7 @@ def _read_steps(
     old: sqlite3.Connection, identity: Identity | None
 ) -> tuple[list[tuple[Row, Row | None]], list[int]]:
     """Return rows of steps and their pixels, and numbers of those that cannot be read."""
-    found: list[tuple[Row, Row | None]] = []
+    steps: list[tuple[Row, Row | None]] = []
     lost = []
     for number in _row_numbers(old, "step", "id") | _row_numbers(old, "pixels", "step"):
         row = _read_row(
@@ -139,8 +141,8 @@ def _read_steps(
             lost.append(number)
         else:
             assert row is not None
-            found.append((row, pixels))
-    return sorted(found, key=lambda one: int(one[0][0])), lost
+            steps.append((row, pixels))
+    return sorted(steps, key=lambda step: int(step[0][0])), lost
 
 
 def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) -> None:
@@ -148,14 +150,14 @@ def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) 
     if row is None:
         raise ValueError("no row")
     _, kind, label, fields, places = row
-    values, where = strict_json(fields), strict_json(places)
+    values, stored_places = strict_json(fields), strict_json(places)
     if not (isinstance(kind, str) and isinstance(label, str) and isinstance(values, dict)):
         raise TypeError("other values")
     if values:
-        for its in (values["before"], values["after"]):
-            SessionRequests.of(its).constraints()
+        for requests in (values["before"], values["after"]):
+            SessionRequests.of(requests).constraints()
     regions = []
-    for view, top, bottom, left, right, *marked in where:
+    for view, top, bottom, left, right, *marked in stored_places:
         if not (0 <= top <= bottom and 0 <= left <= right and view >= 0):
             raise ValueError("no region")
         if identity is not None and view < len(identity.views):
@@ -171,7 +173,7 @@ def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) 
 
 def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], list[str]]:
     """Return rows of looks and of their arrays, and names of those that cannot be read."""
-    found: list[tuple[Row, list[Row]]] = []
+    looks: list[tuple[Row, list[Row]]] = []
     lost = []
     for number in _row_numbers(old, "look", "id") | _row_numbers(old, "look_array", "look"):
         row = _read_row(old, "SELECT id, fields FROM look WHERE id = ?", number)
@@ -184,15 +186,15 @@ def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], l
                 array[0] for array in arrays
             }:
                 raise ValueError("no picture")
-            found.append((row, arrays))
+            looks.append((row, arrays))
         except (AssertionError, *DAMAGE_ERRORS):
             lost.append(name)
-    return sorted(found, key=lambda one: int(one[0][0])), lost
+    return sorted(looks, key=lambda look: int(look[0][0])), lost
 
 
 def _read_arrays(old: sqlite3.Connection, look: int) -> tuple[list[Row], set[str]]:
     """Return arrays of a look that can be read, and names of those that cannot."""
-    found, unreadable = [], set()
+    arrays, unreadable = [], set()
     rows = _readable_rows(old, "SELECT rowid, name FROM look_array WHERE look = ?", look)
     for rowid, name in rows:
         query = "SELECT name, dtype, shape, data FROM look_array WHERE rowid = ?"
@@ -203,22 +205,27 @@ def _read_arrays(old: sqlite3.Connection, look: int) -> tuple[list[Row], set[str
             if dtype not in DTYPES:
                 raise ValueError("no such type")
             unpack(data, dtype, tuple(map(int, strict_json(shape))))
-            found.append(array)
+            arrays.append(array)
         except (AssertionError, *DAMAGE_ERRORS):
             unreadable.add(str(name))
-    return found, unreadable
+    return arrays, unreadable
 
 
 def _row_numbers(old: sqlite3.Connection, table: str, column: str) -> set[int]:
     """Return the numbers of rows, read from both ends of a table that may be damaged in between."""
     query = f"SELECT {column} FROM {table} ORDER BY {column}"
-    found = {
-        x for way in ("", " DESC") for (x,) in _readable_rows(old, query + way) if type(x) is int
+    numbers = {
+        x
+        for order in ("", " DESC")
+        for (x,) in _readable_rows(old, query + order)
+        if type(x) is int
     }
     with suppress(sqlite3.Error):
-        if len(found) > 1 and old.execute(f"PRAGMA integrity_check({table})").fetchone() != ("ok",):
-            found |= set(range(min(found), min(max(found), min(found) + MAX_ROWS)))
-    return {x for x in found if _row_exists(old, table, column, x)}
+        if len(numbers) > 1 and old.execute(f"PRAGMA integrity_check({table})").fetchone() != (
+            "ok",
+        ):
+            numbers |= set(range(min(numbers), min(max(numbers), min(numbers) + MAX_ROWS)))
+    return {x for x in numbers if _row_exists(old, table, column, x)}
 
 
 def _row_exists(old: sqlite3.Connection, table: str, column: str, number: int) -> bool:
@@ -231,15 +238,15 @@ def _row_exists(old: sqlite3.Connection, table: str, column: str, number: int) -
     return bool(count)
 
 
-def _readable_rows(old: sqlite3.Connection, query: str, *given: object) -> Iterator[Row]:
+def _readable_rows(old: sqlite3.Connection, query: str, *values: object) -> Iterator[Row]:
     """Yield rows until one cannot be read."""
     with suppress(sqlite3.Error):
-        yield from old.execute(query, given)
+        yield from old.execute(query, values)
 
 
-def _read_row(old: sqlite3.Connection, query: str, *given: object) -> Row | None:
+def _read_row(old: sqlite3.Connection, query: str, *values: object) -> Row | None:
     """Return one row; None where there is none, or it cannot be read."""
     with suppress(sqlite3.Error):
-        row: Row | None = old.execute(query, given).fetchone()
+        row: Row | None = old.execute(query, values).fetchone()
         return row
     return None

@@ -47,7 +47,7 @@ class SessionRequests:
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
-        lights = {name: dict(asked) for name, asked in self.lights.items()}
+        lights = {name: dict(constraints) for name, constraints in self.lights.items()}
         return {"lights": lights, "ties": [list(x) for x in self.ties], "values": dict(self.values)}
 
     def with_light(self, name: str, asked: Mapping[str, Any]) -> "SessionRequests":
@@ -71,9 +71,9 @@ class SessionRequests:
         if unknown := [key for key in values if key not in (*FIT_KEYS, *ALL_LIGHTS_KEYS)]:
             raise PaintError(f"nothing is called {unknown[0]!r} in what can be set")
         # Not by `in`: 0 lets go of what is held, and equals False.
-        both = {**self.values, **values}
-        kept = {k: v for k, v in both.items() if v is not None and v is not False}
-        return replace(self, values=kept)
+        merged = {**self.values, **values}
+        set_values = {k: v for k, v in merged.items() if v is not None and v is not False}
+        return replace(self, values=set_values)
 
     @classmethod
     def from_constraints(
@@ -84,43 +84,43 @@ class SessionRequests:
         Raises ConstraintError for lights that do not exist, PaintError for what a session cannot
         express.
         """
-        each = zip(lights, tables_by_light(constraints, lights), strict=True)
-        asked = {light.name: its for light, (its, _) in each if its}
-        ties = {id(tie): (tie, its) for tie, its in tied_lights(constraints, lights).values()}
+        pairs = zip(lights, tables_by_light(constraints, lights), strict=True)
+        by_light = {light.name: entry for light, (entry, _) in pairs if entry}
+        ties = {id(tie): (tie, entry) for tie, entry in tied_lights(constraints, lights).values()}
         for tie, _ in ties.values():
             if tie.color is not None:
                 raise PaintError(f"{tie.where}: ask for the colour of each light; ties have none")
-        names = tuple(tuple(lights[k].name for k in its) for _, its in ties.values())
-        kept = {key: value for key, value in values.items() if key in FIT_KEYS}
-        joint_progress = {key: getattr(constraints, key) for key in ALL_LIGHTS_KEYS}
-        return cls(asked, names, kept).with_values({k: v for k, v in joint_progress.items() if v})
+        names = tuple(tuple(lights[k].name for k in entry) for _, entry in ties.values())
+        fit_values = {key: value for key, value in values.items() if key in FIT_KEYS}
+        joint = {key: getattr(constraints, key) for key in ALL_LIGHTS_KEYS}
+        return cls(by_light, names, fit_values).with_values({k: v for k, v in joint.items() if v})
 
     def constraints(self) -> Constraints:
         """Return the constraints on the lights. Raises ConstraintError for invalid ones."""
-        joint_progress = {key: self.values[key] for key in ALL_LIGHTS_KEYS if key in self.values}
-        return Constraints.of(self.lights, tie=self.ties, **joint_progress)
+        joint = {key: self.values[key] for key in ALL_LIGHTS_KEYS if key in self.values}
+        return Constraints.of(self.lights, tie=self.ties, **joint)
 
     def settings(self, base: Settings) -> Settings:
         """Return `base` with the requested settings. Raises LightpaintError for an invalid
         value.
         """
-        asked = {key: self.values[key] for key in FIT_KEYS if key in self.values}
-        if "hold" in asked and base.unpainted:
-            asked["unpainted"] = 0.0
-        return replace(base, **asked)
+        fit_values = {key: self.values[key] for key in FIT_KEYS if key in self.values}
+        if "hold" in fit_values and base.unpainted:
+            fit_values["unpainted"] = 0.0
+        return replace(base, **fit_values)
 
 
 def _hold_once(
     lights: Mapping[str, Mapping[str, Any]], names: Sequence[str]
 ) -> dict[str, Mapping[str, Any]]:
     """Return `lights` in which only the first held light of `names` is still held."""
-    made, is_held = dict(lights), False
+    result, is_held = dict(lights), False
     for name in dict.fromkeys(names):
-        asked = dict(made.get(name, {}))
+        constraints = dict(result.get(name, {}))
         if is_held:
-            asked = {key: value for key, value in asked.items() if key not in HOLD_KEYS}
+            constraints = {key: value for key, value in constraints.items() if key not in HOLD_KEYS}
         # Not by `in`: 0 is a level, and equals False.
-        values = (asked.get(key) for key in HOLD_KEYS)
+        values = (constraints.get(key) for key in HOLD_KEYS)
         is_held = is_held or any(value is not None and value is not False for value in values)
-        made[name] = asked
-    return {name: asked for name, asked in made.items() if asked}
+        result[name] = constraints
+    return {name: constraints for name, constraints in result.items() if constraints}

@@ -108,15 +108,15 @@ def replay(steps: Sequence[Step], start: Pixels, view: int = 0) -> Pixels:
     for patch in (patch for step in reversed(steps) for patch in step.patches):
         if patch.view != view:
             continue
-        here = slices(patch.region)
-        shows = is_open[here]
-        if not shows.any():
+        area = slices(patch.region)
+        is_visible = is_open[area]
+        if not is_visible.any():
             continue
         after = patch.after
-        image[here][shows] = after.image[shows]
-        importance[here][shows] = after.importance[shows]
+        image[area][is_visible] = after.image[is_visible]
+        importance[area][is_visible] = after.importance[is_visible]
         if after.at_least is not None:
             at_least = np.zeros(image.shape, bool) if at_least is None else at_least
-            at_least[here][shows] = after.at_least[shows]
-        is_open[here] = False
+            at_least[area][is_visible] = after.at_least[is_visible]
+        is_open[area] = False
     return Pixels(image, importance, at_least)

@@ -1,4 +1,4 @@
-"""The session file: each step is in it when `append` returns, whatever happens next.
+"""The session file: each step is written when `append` returns, and survives a crash.
 
 It is a SQLite database in WAL mode, and no journal of our own. A process or a machine that stops in
 the middle of a write leaves the last whole step; SQLite has been tested for that far more than a
@@ -64,7 +64,7 @@ class Store:
             from the file when they are needed. Read-only.
         position: How many of them are done.
         unsaved: Why the last steps are in memory only, in one line; None if all is written.
-        remarks: On the file: what of it could not be read.
+        remarks: On the file: its parts that could not be read.
     """
 
     def __init__(self, path: Path | None, identity: Identity | None) -> None:
@@ -128,11 +128,11 @@ class Store:
                 raise PaintError(f"{self.path} is damaged")
             self._database.close()
             try:
-                said = _recover(self.path, self.identity, None)
+                result = _recover(self.path, self.identity, None)
             finally:
                 self._open_file()
-            self.remarks.append(said)
-            return said
+            self.remarks.append(result)
+            return result
 
     def set_identity(self, identity: Identity) -> None:
         """Set the identity, unknown when the file was opened. Raises PaintError if the file has
@@ -148,11 +148,11 @@ class Store:
             patches = step.patches
             fields, places = (
                 _to_json(step.fields),
-                json.dumps([_place_json(one) for one in patches]),
+                json.dumps([_place_json(patch) for patch in patches]),
             )
             blobs = pack_patches(patches) if patches else None
             del self.steps[self.position :], self._ids[self.position :]
-            kept = self._ids[-1] if self._ids else 0
+            last_kept = self._ids[-1] if self._ids else 0
             self._last = number = self._last + 1
             if blobs is not None:
                 self._blobs[number] = blobs
@@ -161,8 +161,8 @@ class Store:
             self.position += 1
 
             def write(database: sqlite3.Connection) -> None:
-                database.execute("DELETE FROM step WHERE id > ?", (kept,))
-                database.execute("DELETE FROM pixels WHERE step > ?", (kept,))
+                database.execute("DELETE FROM step WHERE id > ?", (last_kept,))
+                database.execute("DELETE FROM pixels WHERE step > ?", (last_kept,))
                 values = (number, step.kind, step.label, fields, places)
                 database.execute("INSERT INTO step VALUES (?, ?, ?, ?, ?)", values)
                 if blobs is not None:
@@ -222,7 +222,7 @@ class Store:
             self._enqueue(write)
 
     def flush(self) -> str | None:
-        """Write what is in memory only. Returns why that is not possible, or None."""
+        """Write the steps that are in memory only. Returns why that is not possible, or None."""
         with self._lock:
             if not self._pending and self._is_file_there():
                 return self.unsaved
@@ -248,7 +248,7 @@ class Store:
             return None
 
     def close(self) -> None:
-        """Write what is left, and let others have the file.
+        """Write the remaining steps, and release the file for other processes.
 
         Raises OutputError if something cannot be written; it is lost then.
         """
@@ -273,9 +273,7 @@ class Store:
         return file_id(self._file) == self._file_id
 
     def _restore_file(self) -> None:
-        """Write the file again where somebody has deleted it. Raises LightpaintError if
-        that fails.
-        """
+        """Write the file again if it was deleted. Raises LightpaintError if that fails."""
         if self._file is None or self._is_file_there():
             return
         if file_id(self._file) is not None:
@@ -289,23 +287,25 @@ class Store:
 
     def _read_all(self) -> None:
         """Read all of the file but pixels."""
-        ask = self._database.execute
-        rows = ask("SELECT id, kind, label, fields, places FROM step ORDER BY id").fetchall()
+        execute = self._database.execute
+        rows = execute("SELECT id, kind, label, fields, places FROM step ORDER BY id").fetchall()
         for row in rows:
             self.steps.append(self._make_step(*row))
             self._ids.append(row[0])
         self._last = self._ids[-1] if self._ids else 0
         self.position = len(self.steps)
-        for (position,) in ask("SELECT value FROM about WHERE name = 'position'"):
+        for (position,) in execute("SELECT value FROM about WHERE name = 'position'"):
             self.position = min(int(position), len(self.steps))
-        for number, fields in ask("SELECT id, fields FROM look ORDER BY id").fetchall():
-            self._looks[number] = its = self._make_look(number, fields)
-            if not isinstance(its.fields["name"], str):
+        for number, fields in execute("SELECT id, fields FROM look ORDER BY id").fetchall():
+            self._looks[number] = look = self._make_look(number, fields)
+            if not isinstance(look.fields["name"], str):
                 raise TypeError("a look without a name")
 
-    def _make_step(self, number: int, kind: str, label: str, fields: str, where: str) -> Step:
+    def _make_step(
+        self, number: int, kind: str, label: str, fields: str, stored_places: str
+    ) -> Step:
         views, places = list[int](), list[tuple[Region, bool]]()
-        for view, top, bottom, left, right, *marked in strict_json(where):
+        for view, top, bottom, left, right, *marked in strict_json(stored_places):
             region = int(top), int(bottom), int(left), int(right)
             views.append(int(view))
             places.append((region, bool(marked)))
@@ -325,8 +325,8 @@ class Store:
             blobs = self._blobs.get(number)
             if blobs is None:
                 with self._as_damage():
-                    found = "SELECT before, change FROM pixels WHERE step = ?"
-                    blobs = self._database.execute(found, (number,)).fetchone()
+                    query = "SELECT before, change FROM pixels WHERE step = ?"
+                    blobs = self._database.execute(query, (number,)).fetchone()
         if blobs is None:
             raise PaintError(f"a step that was cut off: {number}")
         with self._as_damage():
@@ -348,18 +348,18 @@ class Store:
         with self._lock:
             if number in self._arrays:
                 return list(self._arrays[number])
-            found = "SELECT name FROM look_array WHERE look = ? ORDER BY rowid"
+            query = "SELECT name FROM look_array WHERE look = ? ORDER BY rowid"
             with self._as_damage():
-                return [name for (name,) in self._database.execute(found, (number,))]
+                return [name for (name,) in self._database.execute(query, (number,))]
 
     def look_array(self, number: int, name: str) -> PackedArray:
         """Return one array of a look, and read no other. Raises KeyError if there is none."""
         with self._lock:
             if number in self._arrays:
                 return self._arrays[number][name]
-            found = "SELECT dtype, shape, data FROM look_array WHERE look = ? AND name = ?"
+            query = "SELECT dtype, shape, data FROM look_array WHERE look = ? AND name = ?"
             with self._as_damage():
-                row = self._database.execute(found, (number, name)).fetchone()
+                row = self._database.execute(query, (number, name)).fetchone()
         if row is None:
             raise KeyError(name)
         dtype, shape, data = row
@@ -372,8 +372,8 @@ def _recover(path: Path, identity: Identity | None, error: DamagedError | None) 
     try:
         return recover(path, identity)
     except OSError as reason:
-        said = f"cannot write beside {path}: {reason.strerror or reason}"
-        raise error or OutputError(said) from None
+        text = f"cannot write beside {path}: {reason.strerror or reason}"
+        raise error or OutputError(text) from None
 
 
 class MemoryStore(Store):
