@@ -629,7 +629,7 @@ def test_a_basis_for_a_time(tmp_path: Path) -> None:
     write_rgb(tmp_path / "warm.exr", np.full((20, 24, 3), 0.3, np.float32))
     arguments = ("basis", room, "--time", "0.05", "--resolution", "1/2", "--seed", 9)
     done = run(tmp_path, *arguments)
-    assert done.stderr == "basis: 1 seconds\n"
+    assert done.stderr == "basis: 1 second\n"
     first = spp_of(done.stdout)
     assert spp_of(succeed(tmp_path, *arguments)) > first
     # The verification has as many samples as the basis: a quarter in each pixel, or the fewer in

@@ -172,12 +172,13 @@ function Tag({ ui, app, pane, panes }) {
   const size = /** @type {[number, number]} */ ([...ui.state.size].reverse());
   if (pane.width < 90) return null;
   const [w] = size;
+  const left = Math.max(pane.x, pane.left);
   const right = Math.min(pane.x + pane.width, pane.left + w * pane.scale);
   const style = {
     top: `${Math.min(Math.max(pane.y, pane.top), pane.y + pane.height - 30) + 8}px`,
-    left: `${(isRight ? right : Math.max(pane.x, pane.left)) + (isRight ? -8 : 8)}px`,
+    left: `${isRight ? right - 8 : left + 8}px`,
     transform: isRight ? 'translateX(-100%)' : '',
-    maxWidth: `${Math.max(74, pane.width - 16)}px`,
+    maxWidth: `${Math.max(74, right - left - 16)}px`,
   };
   const isPart = isPartly(ui, pane.kind);
   const all = () => app.store.set({ solo: [], mute: [] });
