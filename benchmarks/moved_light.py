@@ -1,4 +1,4 @@
-"""What moving one lamp costs: the processor's time of a solve after it, against the first one.
+"""Cost of moving one lamp: the processor's time of a solve after it, against the first one.
 
     python benchmarks/moved_light.py [--light spot_vase] [--rounds 3]
 

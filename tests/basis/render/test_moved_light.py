@@ -44,7 +44,7 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def rendered(monkeypatch: pytest.MonkeyPatch) -> Rendered:
-    """What is rendered from now on."""
+    """List what is rendered from now on."""
     log: Rendered = []
 
     def render(scene: Scene, **how: Any) -> Basis:

@@ -100,7 +100,7 @@ def test_who_paints_green_gets_green(make_basis: Any, space: Any) -> None:
 
 
 def test_a_red_lamp_keeps_nobody_from_painting_green(make_basis: Any) -> None:
-    """What is allowed beside whites follows from lamps that are nearly white."""
+    """Lamps that are nearly white decide what is allowed beside whites."""
     basis = _room(make_basis, 1)
     emission = [light.emission for light in basis.lights]
     emission[0] = (1.0, 0.05, 0.02)
