@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.planes import BLOCK
+from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
@@ -64,8 +64,8 @@ def gram(repeats: int) -> None:
     print(f"{'lights':>8s}{'ours':>10s}{'product':>10s}{'ratio':>8s}")
     for n in (12, 64):
         images, target, importance = picture(n)
-        plain = np.random.default_rng(0).random((n + 1, BLOCK))
-        blocks = 3 * HEIGHT * WIDTH / BLOCK
+        plain = np.random.default_rng(0).random((n + 1, BLOCK_PIXELS))
+        blocks = 3 * HEIGHT * WIDTH / BLOCK_PIXELS
 
         def product(plain: Any = plain, blocks: float = blocks) -> None:
             with one_thread():

@@ -25,8 +25,8 @@ import numpy.typing as npt
 from hall import write_hall
 
 from lightpaint import load_scene
-from lightpaint.basis.render.render import render_basis
-from lightpaint.basis.render.separate import BLACK, WHITE
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render_loaded
 

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis.basis import Basis, Origin
-from lightpaint.basis.file import write_basis
+from lightpaint.basis.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan

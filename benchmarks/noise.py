@@ -27,7 +27,6 @@ import numpy.typing as npt
 from hall import write_hall
 
 from lightpaint import Basis, Scene, load_scene, render_basis
-from lightpaint.basis import clean
 from lightpaint.images.denoiser import denoised
 from lightpaint.scene.scene_render import Stream, render_loaded
 
@@ -44,8 +43,10 @@ ALONE = 12
 
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
-#: Denoises a plane, under the name that an earlier version may have.
-clean_halves = clean.clean_halves if hasattr(clean, "clean_halves") else clean.clean_plane
+try:
+    from lightpaint.basis.denoised_planes import denoise_to_halves
+except ImportError:  # as earlier versions call it
+    from lightpaint.basis.clean import clean_halves as denoise_to_halves
 
 Errors = npt.NDArray[np.float64]
 
@@ -151,7 +152,7 @@ def measure(scene: Scene, spp: int, repeats: int, out: Path) -> None:
         pass_s += seconds
         begin_s = time.process_time()
         for k in range(len(scene.lights)):
-            halves, scale = clean_halves(basis, k)
+            halves, scale = denoise_to_halves(basis, k)
             pictures.append(halves.astype(np.float32) * np.float32(scale))
         clean_s += time.process_time() - begin_s
         planes += list(basis.images)

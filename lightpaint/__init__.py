@@ -32,11 +32,11 @@ from lightpaint.version import __version__
 
 if TYPE_CHECKING:
     from lightpaint.basis.basis import Basis as Basis
-    from lightpaint.basis.file import read_basis as read_basis
-    from lightpaint.basis.file import write_basis as write_basis
-    from lightpaint.basis.lightgroups.read import LightGroups as LightGroups
-    from lightpaint.basis.lightgroups.read import read_light_groups as read_light_groups
-    from lightpaint.basis.render.render import render_basis as render_basis
+    from lightpaint.basis.basis_file import read_basis as read_basis
+    from lightpaint.basis.basis_file import write_basis as write_basis
+    from lightpaint.basis.lightgroups.light_groups import LightGroups as LightGroups
+    from lightpaint.basis.lightgroups.light_groups import read_light_groups as read_light_groups
+    from lightpaint.basis.render.basis_render import render_basis as render_basis
     from lightpaint.colour.display.view_transform import TransformChoice as TransformChoice
     from lightpaint.colour.display.view_transform import ViewTransform as ViewTransform
     from lightpaint.demo import Demo as Demo
@@ -102,7 +102,7 @@ _HOMES = {
     "Estimate": "images.estimate",
     "Fit": "lighting.fit",
     "Job": "pipeline.job",
-    "LightGroups": "basis.lightgroups.read",
+    "LightGroups": "basis.lightgroups.light_groups",
     "Lighting": "lighting.answer.lighting",
     "LightpaintError": "errors",
     "Look": "pipeline.results",
@@ -128,14 +128,14 @@ _HOMES = {
     "error_bars": "lighting.analysis.noise.uncertainty",
     "load_scene": "scene.scene",
     "paint_with_light": "pipeline.one_call",
-    "read_basis": "basis.file",
+    "read_basis": "basis.basis_file",
     "read_constraints": "lighting.constraints.constraints_file",
-    "read_light_groups": "basis.lightgroups.read",
+    "read_light_groups": "basis.lightgroups.light_groups",
     "read_lighting": "lighting.answer.lighting_file",
     "read_target": "target.target_reader",
     "refine": "lighting.analysis.noise.refinement",
     "relight": "relit.relight",
-    "render_basis": "basis.render.render",
+    "render_basis": "basis.render.basis_render",
     "render_template": "pipeline.templates",
     "template_of_basis": "pipeline.templates",
     "run": "pipeline.pipeline",
@@ -145,7 +145,7 @@ _HOMES = {
     "verdict": "report.verdict",
     "verify": "relit.verification_render",
     "what_is_seen": "lighting.analysis.appearance.appearance",
-    "write_basis": "basis.file",
+    "write_basis": "basis.basis_file",
     "write_demo": "demo",
     "write_exports": "relit.export.exports",
     "write_lighting": "lighting.answer.lighting_file",

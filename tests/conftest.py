@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.scene.scene import Scene, load_scene
 
 # Shared machines are slow now and then, which is no failure; a fixed choice of examples makes

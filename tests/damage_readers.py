@@ -49,7 +49,7 @@ class Reader:
             template = read_template(path.parent)
             return template.transform, template.scene, template.content, template.sensor
         if self.kind == "basis":
-            from lightpaint.basis.file import read_basis, read_origin
+            from lightpaint.basis.basis_file import read_basis, read_origin
 
             basis = read_basis(path)
             assert read_origin(path) == (
@@ -60,7 +60,7 @@ class Reader:
             arrays = (basis.images, basis.half_differences, basis.emitters_seen)
             return basis.lights, basis.origin, [(a.shape, a.tobytes()) for a in arrays]
         if self.kind == "groups":
-            from lightpaint.basis.lightgroups.read import read_light_groups
+            from lightpaint.basis.lightgroups.light_groups import read_light_groups
 
             found = read_light_groups(path)
             return found.basis.names, found.basis.images.tobytes()

@@ -119,7 +119,7 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
         gc.collect()
         return planes
     tracer = Tracer(scene, seed)
-    tracer.end_lesson()
+    tracer.end_training()
     rows = range(scene.size[0])
     traced = tracer.planes(rows)
     tracer.add(traced, 0, rows, 0, spp)
@@ -129,21 +129,21 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
 
 def render_in_parts(scene: Scene, *, spp: int, seed: int = 0, start: Basis | None = None) -> Basis:
     """Render all parts of a basis one after the other, as processes of a batch share them."""
-    from lightpaint.basis.render.lessons import lesson
-    from lightpaint.basis.render.parts import PartRenderer, PartSums, plan_parts
+    from lightpaint.basis.render.guide_training import train_guide
+    from lightpaint.basis.render.render_parts import PartRenderer, PartSums, plan_parts
 
-    learned = None if start is None else start.learned
-    if learned is None:
-        learned = lesson(scene, seed)
+    guide_table = None if start is None else start.guide_table
+    if guide_table is None:
+        guide_table = train_guide(scene, seed)
     parts = plan_parts(scene, spp, start=start)
     sums = PartSums(scene, parts, seed=seed, start=start)
-    renderer = PartRenderer(scene, seed, learned)
+    renderer = PartRenderer(scene, seed, guide_table)
     try:
         for part in parts:
             sums.add(part, *renderer.render(part))
     finally:
         renderer.close()
-    return sums.basis(learned)
+    return sums.basis(guide_table)
 
 
 def same_basis(a: Basis, b: Basis, *, of_file: bool = False) -> None:

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.render import lessons
+from lightpaint.basis.render import guide_training
 from lightpaint.batch.work import work
 
 #: Of a lesson, here and in the tests: what is learned does not matter to them.
@@ -31,4 +31,4 @@ def _slowly(item: Any, *others: Any) -> Any:
 
 
 work._run = _slowly
-lessons.LESSON = LESSON
+guide_training.TRAINING_SAMPLES = LESSON

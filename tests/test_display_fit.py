@@ -11,8 +11,8 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import write_basis
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.cli import main
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError

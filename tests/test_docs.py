@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.cache import LARGEST
+from lightpaint.basis.cache import MAX_BYTES
 from lightpaint.batch.cluster.cluster import LIMIT_FACTOR, MIN_LIMIT_S
 from lightpaint.batch.manifest.checks import SOLVE_STEPS
 from lightpaint.batch.manifest.entries import MAX_LOOKS
@@ -290,7 +290,7 @@ def test_numbers_in_documents_are_those_of_the_code() -> None:
     assert f"chooses the port ({DEFAULT_PORT}, or any if that is taken)" in text("painter.md")
     assert f"Of such connections {MAX_UNAUTHENTICATED} may be open" in text("painter.md")
     assert f"More than {MAX_SEPARATE} emitters that are alike" in text("lights.md")
-    assert f"{LARGEST // 2**30} GiB at most" in text("solving.md")
+    assert f"{MAX_BYTES // 2**30} GiB at most" in text("solving.md")
     limits = text("limits.md")
     for said in (
         f"at most {MAX_PAGES} tabs at a time",

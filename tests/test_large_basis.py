@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import lightpaint as lp
-from lightpaint.basis import clean, file, file_planes
+from lightpaint.basis import basis_file, denoised_planes, file_planes
 from lightpaint.images import bands, denoiser
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.loss import loss
@@ -23,9 +23,9 @@ BYTES_A_PIXEL = 480
 
 def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
     """Let planes stay in their file, and pictures of so many pixels be large."""
-    patch.setattr(file, "IN_MEMORY", 0)
-    patch.setattr(file_planes, "STRIPS", large)
-    patch.setattr(file_planes, "PICKED", large)
+    patch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
+    patch.setattr(file_planes, "STRIP_CACHE_BYTES", large)
+    patch.setattr(file_planes, "PICKED_MAX_BYTES", large)
     patch.setattr(bands, "BAND_PIXELS", large // 8)
     patch.setattr(loss, "MAX_KEPT_PIXELS", large)
     patch.setattr(loss, "STRIP_PIXELS", min(loss.STRIP_PIXELS, large // 4))
@@ -96,7 +96,7 @@ def test_memory_of_a_large_film_is_that_of_a_few_pictures(
     size = 360, 640
     files = written(tmp_path, make_basis, size)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(clean, "MOST_WANTED", 0)
+    monkeypatch.setattr(denoised_planes, "ON_DEMAND_MAX_PIXELS", 0)
     stay_in_the_file(monkeypatch, 2**15)
     tracemalloc.start()
     try:

@@ -13,7 +13,7 @@ import pytest
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.cli import main
 from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.colour.display.view_transform import ViewTransform

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, read_only
 from lightpaint.basis.lights import Lights
-from lightpaint.basis.planes import BLOCK, Planes, as_planes
+from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.dataframes import CHANNELS, by_channel, pandas, xarray
@@ -98,8 +98,8 @@ class Basis(Shown):
             the array.
         emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
         origin: Where it comes from: scene, sensor, seed, samples.
-        learned: (2, cells, emitters) float32, what the renderer found out on the way about which
-            emitter matters where, or None. Going on needs it, nobody else.
+        guide_table: (2, cells, emitters) float32, what the renderer has learned about which emitter
+            matters where, or None. Only rendering more samples needs it.
         features: Albedo and normals of what is seen, to denoise pictures by, or None.
         objects: Whose surfaces are seen, or None.
         indirect: The indirect part of `planes` and `noise`, to denoise pictures by; None where it
@@ -121,7 +121,7 @@ class Basis(Shown):
     noise: Planes
     emitters_seen: Bools
     origin: Origin
-    learned: Floats | None = None
+    guide_table: Floats | None = None
     features: Features | None = None
     objects: Objects | None = None
     indirect: IndirectLight | None = None
@@ -241,7 +241,7 @@ class Basis(Shown):
             planes=as_planes(planes),
             noise=as_planes(noise),
             emitters_seen=emitters_seen,
-            learned=None,
+            guide_table=None,
             features=None,
             objects=None,
             indirect=None,
@@ -302,9 +302,9 @@ class Basis(Shown):
         counted = (~self.emitters_seen.ravel()).astype(np.float64)
         # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
         # is as exact as the sum, and needs no copy of the basis.
-        for start in range(0, counted.size, BLOCK):
-            its = counted[start : start + BLOCK]
-            block = self.planes.pixels(slice(start, start + BLOCK)).astype(np.float64)
+        for start in range(0, counted.size, BLOCK_PIXELS):
+            its = counted[start : start + BLOCK_PIXELS]
+            block = self.planes.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
             totals += np.ones(its.size) @ block
             block *= block
             power += its @ block

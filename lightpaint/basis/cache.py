@@ -15,20 +15,20 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.basis_file import FORMAT, read_basis, read_origin, write_basis
 from lightpaint.basis.cache_folder import (
     BASIS_NAME,
     COMPANION_NAME,
     LEFTOVER_NAME,
     SUFFIX,
-    claim,
     folder,
     is_own,
+    mark_folder,
 )
-from lightpaint.basis.file import FORMAT, read_basis, read_origin, write_basis
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 
 #: Bytes above which the bases that were not used for longest are deleted.
-LARGEST = 8 * 2**30
+MAX_BYTES = 8 * 2**30
 #: Seconds after which an unfinished file belongs to nobody.
 LEFTOVER_S = 3600.0
 #: And after which what was made of a basis that is not kept here is made again if need be.
@@ -74,14 +74,16 @@ def _read(path: Path) -> Basis | None:
     return basis
 
 
-def spp_of(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> int:
+def cached_spp(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> int:
     """Return the samples per pixel of the cached basis for these arguments; 0 if there is none."""
     path = _path(scene_identity, sensor, seed, size)
     kept = _entry(path).origin if is_own(path) else None
     return 0 if kept is None else kept.spp
 
 
-def any_of(scene_identity: str, sensor: str, *, samples: int, largest: int) -> Basis | None:
+def find_most_sampled(
+    scene_identity: str, sensor: str, *, samples: int, largest: int
+) -> Basis | None:
     """Return the cached basis of any size and seed with the most samples; None if there is none.
 
     samples: of all pixels together, that it has at least. largest: bytes of its file, at most.
@@ -107,7 +109,7 @@ def keep(basis: Basis) -> bool:
     """
     try:
         path = _path_of(basis)
-        claim()
+        mark_folder()
         write_basis(path, basis)
         _prune(path)
     except (OutputError, OSError):
@@ -115,13 +117,13 @@ def keep(basis: Basis) -> bool:
     return True
 
 
-def kept_at(basis: Basis) -> Path | None:
+def file_of(basis: Basis) -> Path | None:
     """Return the file that holds just `basis`; None if it is not, or has more samples there."""
     path = _path_of(basis)
     return path if is_own(path) and _entry(path).origin == basis.origin else None
 
 
-def place_beside(basis: Basis, ending: str) -> Path:
+def companion_path(basis: Basis, ending: str) -> Path:
     """Return the place for data derived from `basis`, whether that is cached or not.
 
     ending: CLEAN or KNOWN, what stands before it included.
@@ -129,13 +131,13 @@ def place_beside(basis: Basis, ending: str) -> Path:
     return folder() / f"{_path_of(basis).name.removesuffix(SUFFIX)}{ending}"
 
 
-def beside(path: Path) -> list[Path]:
+def companions_of(path: Path) -> list[Path]:
     """Return the data derived from the basis at `path`."""
     name = path.name.removesuffix(SUFFIX)
     return [other for other, its in _companions() if its == name]
 
 
-def sweep(unused_s: float = 0.0) -> int:
+def delete_orphans(unused_s: float = 0.0) -> int:
     """Delete what lies beside no kept basis and was not used for that long; how many bytes."""
     freed = 0
     for path, name in _companions():
@@ -154,7 +156,7 @@ def _companions() -> list[tuple[Path, str]]:
     return [(path, match[1]) for path, match in found if match is not None and is_own(path)]
 
 
-def is_kept(basis: Basis) -> bool:
+def is_cached(basis: Basis) -> bool:
     """Return True if `basis`, or the same with more samples, is in the cache."""
     path = _path_of(basis)
     kept = _entry(path).origin if is_own(path) else None
@@ -167,14 +169,14 @@ def _prune(path: Path) -> None:
         # What a killed process was writing.
         if _is_leftover(leftover) and time.time() - leftover.stat().st_mtime > LEFTOVER_S:
             shutil.rmtree(leftover, ignore_errors=True)
-    sweep(UNUSED_S)
-    rest = LARGEST - _entry(path).size
+    delete_orphans(UNUSED_S)
+    rest = MAX_BYTES - _entry(path).size
     for entry in reversed(entries()):
         if entry.path == path:
             continue
         rest -= entry.size
         if rest < 0:
-            for gone in (*beside(entry.path), entry.path):
+            for gone in (*companions_of(entry.path), entry.path):
                 gone.unlink(missing_ok=True)
 
 
@@ -193,7 +195,7 @@ def entries() -> list[Entry]:
     return [_entry(path) for path in files]
 
 
-def named(pattern: str) -> list[Entry]:
+def entries_named(pattern: str) -> list[Entry]:
     """Return the entries of a scene, or of a file, of that name; `*` matches anything.
 
     A scene goes by the name of its file, with or without its ending.
@@ -201,12 +203,12 @@ def named(pattern: str) -> list[Entry]:
     return [entry for entry in entries() if any(fnmatchcase(x, pattern) for x in _names(entry))]
 
 
-def drop(kept: Iterable[Entry]) -> int:
+def delete_entries(kept: Iterable[Entry]) -> int:
     """Delete these. Returns how many bytes that freed."""
     freed = 0
     for entry in kept:
         try:
-            for gone in (*beside(entry.path), entry.path):
+            for gone in (*companions_of(entry.path), entry.path):
                 gone.unlink(missing_ok=True)
         except OSError as error:
             raise OutputError(f"cannot delete {entry.path}: {error.strerror or error}") from error
@@ -233,7 +235,7 @@ def _path_of(basis: Basis) -> Path:
 
 
 def _entry(path: Path) -> Entry:
-    size = sum(file.stat().st_size for file in (path, *beside(path)))
+    size = sum(file.stat().st_size for file in (path, *companions_of(path)))
     try:
         origin, image_size, identities = read_origin(path)
     except LightpaintError:

@@ -20,8 +20,8 @@ from lightpaint.screen import some_names
 #: Names the folder, where it is not that of the user's cache.
 VARIABLE = "LIGHTPAINT_CACHE"
 
-#: Ending of a basis; of what is put beside: pictures made of one, what is known of its scene.
-SUFFIX, CLEAN, KNOWN = ".basis.exr", ".clean.npz", ".known.json"
+#: Suffix of a basis, and of the files beside it: its denoised planes, facts about its scene.
+SUFFIX, DENOISED_SUFFIX, FACTS_SUFFIX = ".basis.exr", ".clean.npz", ".known.json"
 #: Folder of the parts of bases that are being rendered.
 PARTS = "parts"
 
@@ -39,11 +39,15 @@ TAG_TEXT = """Signature: 8a477f597d28d172789f06886806bc55
 """
 
 #: What stands at or near the beginning of each kind of file, and how far in at most, in bytes.
-MARKS = {SUFFIX: b"lightpaint-basis", CLEAN: b"made_of.npy", KNOWN: b'"lightpaint-known'}
-MARK_WITHIN = {SUFFIX: 2**20, CLEAN: 2**8, KNOWN: 2**8}
+MARKS = {
+    SUFFIX: b"lightpaint-basis",
+    DENOISED_SUFFIX: b"made_of.npy",
+    FACTS_SUFFIX: b'"lightpaint-known',
+}
+MARK_WITHIN = {SUFFIX: 2**20, DENOISED_SUFFIX: 2**8, FACTS_SUFFIX: 2**8}
 
 #: Other files that are named of a folder that is none of ours, and looked at before it is one.
-NAMED, LOOKED_AT = 3, 100_000
+NAMES_SHOWN, NAMES_READ = 3, 100_000
 
 
 def folder() -> Path:
@@ -56,7 +60,7 @@ def folder() -> Path:
     if not named:
         return user_cache_path("lightpaint") / "bases"
     path = Path(named)
-    if others := _others(path):
+    if others := _foreign_names(path):
         raise OutputError(
             f"{VARIABLE} names {path}, which has other files in it ({some_names(others)}): name a "
             "folder that is new or empty, where bases may be kept and deleted"
@@ -64,7 +68,7 @@ def folder() -> Path:
     return path
 
 
-def claim() -> None:
+def mark_folder() -> None:
     """Mark the folder as one of ours, where it is not yet. Raises OutputError."""
     tag = folder() / TAG
     if not tag.exists():
@@ -80,27 +84,27 @@ def is_own(path: Path) -> bool:
         # What belongs to somebody else may be a link, or a pipe that never ends.
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as f:
             its = os.fstat(f.fileno())
-            return is_believed(its) and MARKS[ending] in f.read(MARK_WITHIN[ending])
+            return is_trusted_owner(its) and MARKS[ending] in f.read(MARK_WITHIN[ending])
     except OSError:
         return False
 
 
-def is_believed(its: os.stat_result) -> bool:
+def is_trusted_owner(its: os.stat_result) -> bool:
     """Return whether a file or folder belongs to who runs this, or to who runs the machine."""
     return not hasattr(os, "geteuid") or its.st_uid in (os.geteuid(), 0)
 
 
-def _others(path: Path) -> list[str]:
+def _foreign_names(path: Path) -> list[str]:
     """Return some foreign names in the folder; none if it is ours, new or hidden."""
     with suppress(OSError):
         if "created by lightpaint" in (path / TAG).read_text("utf-8", "replace")[:1000]:
             return []
     found: list[str] = []
     with suppress(OSError):
-        for name in _names(path):
+        for name in _names_in(path):
             if not (name.startswith(".") or _is_own_name(name)):
                 found.append(name)
-            if len(found) == NAMED:
+            if len(found) == NAMES_SHOWN:
                 break
     return found
 
@@ -110,7 +114,7 @@ def _is_own_name(name: str) -> bool:
     return name in (PARTS, TAG) or any(kind.fullmatch(name) for kind in kinds)
 
 
-def _names(path: Path) -> Iterator[str]:
+def _names_in(path: Path) -> Iterator[str]:
     with os.scandir(path) as entries:
-        for entry, _ in zip(entries, range(LOOKED_AT), strict=False):
+        for entry, _ in zip(entries, range(NAMES_READ), strict=False):
             yield entry.name

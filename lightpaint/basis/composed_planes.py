@@ -9,10 +9,12 @@ from lightpaint.basis.file_planes import RowPlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes
 
 #: A plane by its number among others; None for a black one.
-Pick = tuple[Planes, int] | None
+PlaneReference = tuple[Planes, int] | None
 
 
-def compose_planes(picks: Sequence[Pick], size: tuple[int, int], *, in_memory: bool) -> Planes:
+def compose_planes(
+    picks: Sequence[PlaneReference], size: tuple[int, int], *, in_memory: bool
+) -> Planes:
     """Return planes of (height, width) pixels, one for each of `picks`.
 
     in_memory: whether they are copied there, or else stay where they are.
@@ -24,7 +26,7 @@ def compose_planes(picks: Sequence[Pick], size: tuple[int, int], *, in_memory: b
 class ComposedPlanes(RowPlanes):
     """Planes that stay with the others that they come from. picks: one for each light."""
 
-    def __init__(self, picks: Sequence[Pick], size: tuple[int, int]) -> None:
+    def __init__(self, picks: Sequence[PlaneReference], size: tuple[int, int]) -> None:
         self._picks, self._size = tuple(picks), size
 
     @property

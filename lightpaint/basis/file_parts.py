@@ -1,4 +1,4 @@
-"""Parts of a basis file: those of its lights, emitters seen, what was learned, surfaces."""
+"""Parts of a basis file: its lights, visible emitters, the table of the guide, surfaces."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,31 +19,31 @@ from lightpaint.images.formats.exr import Channels, ExrPart, rgb_channels
 from lightpaint.images.object_map import Objects
 from lightpaint.storage.json_records import fields_of, strict_json
 
-EMITTERS_SEEN = "emitters seen"
-LEARNED = "learned"
-FEATURES, FEATURES_KEY = "features", "lightpaint.features"
-OBJECTS, OBJECTS_KEY, NAMES_KEY = "objects", "lightpaint.objects", "lightpaint.names"
+VISIBLE_EMITTERS_PART = "emitters seen"
+GUIDE_PART = "learned"
+FEATURES_PART, FEATURES_KEY = "features", "lightpaint.features"
+OBJECTS_PART, OBJECTS_KEY, NAMES_KEY = "objects", "lightpaint.objects", "lightpaint.names"
 
 LIGHT_KEY, SCALE_KEY = "lightpaint.light", "lightpaint.scale"
 
 #: Channels that each light has: of its image, and of its noise.
-IMAGE, NOISE = (*"RGB",), (*(f"{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
-NAMES = {*IMAGE, *NOISE}
+IMAGE_CHANNELS, NOISE_CHANNELS = (*"RGB",), (*(f"{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
+LIGHT_CHANNELS = {*IMAGE_CHANNELS, *NOISE_CHANNELS}
 
 #: Channels of the indirect part of both, where it was kept apart.
-INDIRECT = (*(f"indirect.{c}" for c in "RGB"),)
-INDIRECT_NOISE = (*(f"indirect_{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
-INDIRECT_NAMES = {*INDIRECT, *INDIRECT_NOISE}
+INDIRECT_IMAGE_CHANNELS = (*(f"indirect.{c}" for c in "RGB"),)
+INDIRECT_NOISE_CHANNELS = (*(f"indirect_{HALF_DIFFERENCE}.{c}" for c in "RGB"),)
+INDIRECT_CHANNELS = {*INDIRECT_IMAGE_CHANNELS, *INDIRECT_NOISE_CHANNELS}
 
 #: All planes that a light may have, by their channels.
-PLANES = (IMAGE, NOISE, INDIRECT, INDIRECT_NOISE)
+PLANE_CHANNELS = (IMAGE_CHANNELS, NOISE_CHANNELS, INDIRECT_IMAGE_CHANNELS, INDIRECT_NOISE_CHANNELS)
 
 #: What a plane may be multiplied by.
 LEAST_SCALE, LARGEST_SCALE = 2.0**-126, 2.0**126
 
 
 def planes_of(basis: Basis, k: int) -> list[Floats]:
-    """Return the planes of light k that are stored, (h, w, 3) each, in the order of `PLANES`."""
+    """Return the stored planes of light k, (h, w, 3) each, in the order of `PLANE_CHANNELS`."""
     sets = [basis.planes, basis.noise]
     if basis.indirect is not None:
         sets += [basis.indirect.planes, basis.indirect.noise]
@@ -70,7 +70,7 @@ def light_texts(light: BasisLight, encodings: Sequence[PlaneEncoding]) -> dict[s
 def light_channels(planes: Sequence[Floats], encodings: Sequence[PlaneEncoding]) -> Channels:
     """Return the channels of a light as they are stored. planes: as `planes_of` returns them."""
     made: dict[str, Any] = {}
-    for plane, encoding, names in zip(planes, encodings, PLANES, strict=False):
+    for plane, encoding, names in zip(planes, encodings, PLANE_CHANNELS, strict=False):
         stored = encoding.encoded(plane)
         made |= {name: stored[..., k] for k, name in enumerate(names)}
     return made
@@ -82,7 +82,7 @@ def checked_text(texts: Mapping[str, str]) -> str:
 
 
 def scales_of(texts: Mapping[str, str]) -> tuple[float, ...]:
-    """Return what the stored planes of a light are to be multiplied by, in the order of `PLANES`.
+    """Return the factors of the stored planes of a light, in the order of `PLANE_CHANNELS`.
 
     Raises BasisError for anything else than two or four numbers above 0.
     """
@@ -96,11 +96,11 @@ def _is_scale(scale: object) -> bool:
     return type(scale) in (int, float) and LEAST_SCALE <= scale <= LARGEST_SCALE  # type: ignore[operator]
 
 
-def stacked(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Floats:
+def stack_channels(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Floats:
     """Return some channels of parts times a scale each, (n, h, w, 3)."""
     first = parts[0][0]
-    stacked = np.empty((len(parts), *first.size, 3), np.float32)
-    for image, (part, scale) in zip(stacked, parts, strict=True):
+    stack_channels = np.empty((len(parts), *first.size, 3), np.float32)
+    for image, (part, scale) in zip(stack_channels, parts, strict=True):
         if part.size != first.size:
             raise BasisError(f"parts {first.name!r} and {part.name!r} differ in size")
         for k, name in enumerate(names):
@@ -109,32 +109,32 @@ def stacked(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Flo
             image[..., k] = part.channels[name]
         if scale != 1:
             image *= np.float32(scale)
-    return stacked
+    return stack_channels
 
 
 def other_parts(basis: Basis) -> Iterator[ExrPart]:
     """Yield all parts but those of the lights, the emitters that are seen first."""
     seen = {"Y": basis.emitters_seen.astype(np.float16)}
     # The format's rule: a part name never repeats, so a light may not take this one.
-    yield ExrPart(free_name(EMITTERS_SEEN, basis.names), seen)
-    if basis.learned is not None:
-        learned = dict(zip(("received", "asked"), basis.learned, strict=True))
+    yield ExrPart(free_name(VISIBLE_EMITTERS_PART, basis.names), seen)
+    if basis.guide_table is not None:
+        guide_table = dict(zip(("received", "asked"), basis.guide_table, strict=True))
         # A table and no picture; the format wants one display window for all parts.
-        yield ExrPart(free_name(LEARNED, basis.names), learned, display=basis.size)
+        yield ExrPart(free_name(GUIDE_PART, basis.names), guide_table, display=basis.size)
     if basis.features is not None:
         its = _feature_channels(basis.features)
         about_them = {FEATURES_KEY: checksum("", its)}
-        yield ExrPart(free_name(FEATURES, basis.names), its, about_them)
+        yield ExrPart(free_name(FEATURES_PART, basis.names), its, about_them)
     if basis.objects is not None:
         named = json.dumps(basis.objects.names, ensure_ascii=False)
         # Whole numbers that float32 holds.
         index = {"index": basis.objects.index.astype(np.float32)}
         about_it = {NAMES_KEY: named, OBJECTS_KEY: checksum(named, index)}
-        yield ExrPart(free_name(OBJECTS, basis.names), index, about_it)
+        yield ExrPart(free_name(OBJECTS_PART, basis.names), index, about_it)
 
 
-def learned_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
-    """Return the learned table; None if it is missing or damaged, since nothing needs it."""
+def guide_table_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
+    """Return the table of the emitter guide; None if missing or damaged: nothing needs it."""
     for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
         if checksums is not None and checksum("", channels) != checksums.learned:
             return None

@@ -17,10 +17,10 @@ from lightpaint.threads import parallel_map
 
 #: Bytes of strips of rows that are kept, of all planes together; and how many strips these are, so
 #: that each thread may walk along one of its own.
-STRIPS, KEPT = 2**27, (os.cpu_count() or 1) + 2
+STRIP_CACHE_BYTES, STRIP_CACHE_COUNT = 2**27, (os.cpu_count() or 1) + 2
 
 #: Bytes of picked pixels that are kept in memory.
-PICKED = 2**27
+PICKED_MAX_BYTES = 2**27
 
 
 class RowPlanes(PlanesBase):
@@ -36,7 +36,7 @@ class RowPlanes(PlanesBase):
     @cached_property
     def _strips(self) -> "_Strips":
         height, width = self.size
-        step = max(1, STRIPS // (KEPT * 12 * self.count * width))
+        step = max(1, STRIP_CACHE_BYTES // (STRIP_CACHE_COUNT * 12 * self.count * width))
         return _Strips(step, lambda k: self.rows(k * step, min((k + 1) * step, height)))
 
     def pixels(self, where: slice | Indices) -> Floats:
@@ -68,7 +68,7 @@ class RowPlanes(PlanesBase):
         height, width = self.size
         if isinstance(where, slice):
             where = np.arange(height * width)[where]
-        if self.count * len(where) * 12 <= PICKED:
+        if self.count * len(where) * 12 <= PICKED_MAX_BYTES:
             return MemoryPlanes(np.ascontiguousarray(self.pixels(where)[:, None]))
         return PickedPlanes(self, where)
 
@@ -108,7 +108,7 @@ class _Strips:
             if made is None:
                 made = self._kept[k] = Future()
             self._kept.move_to_end(k)
-            while len(self._kept) > KEPT:
+            while len(self._kept) > STRIP_CACHE_COUNT:
                 self._kept.popitem(last=False)
         if is_mine:
             try:

@@ -18,7 +18,7 @@ HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 
 #: Part of the noise of a tile that rounding may have at most, root mean square: it adds 1/512 to
 #: the standard deviation. Pixels along the side of a tile.
-HIDDEN, TILE = 1 / 16, 32
+HIDDEN_SHARE, TILE = 1 / 16, 32
 
 #: Power of two to which the brightest value is scaled, of 15 that half floats reach.
 BRIGHTEST = 14
@@ -49,7 +49,7 @@ class PlaneEncoding:
 
 def encodings_of(image: Floats, noise: Floats) -> tuple[PlaneEncoding, PlaneEncoding]:
     """Return how the image of a light and its half difference, (h, w, 3), are best stored."""
-    hidden = HIDDEN**2 * _power(noise)
+    hidden = HIDDEN_SHARE**2 * _power(noise)
     found = []
     for plane in (image, noise):
         halves = (PlaneEncoding(HALF, scale) for scale in dict.fromkeys((1.0, _scale_of(plane))))

@@ -16,7 +16,7 @@ from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.threads import one_thread
 
 #: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
-BLOCK = 2**13
+BLOCK_PIXELS = 2**13
 
 #: Lights up to which the product of a block is too small for BLAS to share it out to threads.
 FEW_LIGHTS = 256
@@ -102,8 +102,8 @@ class PlanesBase:
     def squares(self) -> Doubles:
         """Return Σ Φ² of all pixels and channels, (n,)."""
         made, pixels = np.zeros(self.count), self.size[0] * self.size[1]
-        for start in range(0, pixels, BLOCK):
-            block = self.pixels(slice(start, start + BLOCK)).astype(np.float64)
+        for start in range(0, pixels, BLOCK_PIXELS):
+            block = self.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
             made += np.einsum("npc,npc->n", block, block)
         return made
 
@@ -116,10 +116,10 @@ class PlanesBase:
         counted = np.flatnonzero(weights.any(axis=1) if apart else weights)
         colours = image.reshape(-1, 3)
         gram = np.zeros((3, n + 1, n + 1))
-        room = np.empty((n + 1, min(BLOCK, counted.size)))
+        room = np.empty((n + 1, min(BLOCK_PIXELS, counted.size)))
         with one_thread() if n <= FEW_LIGHTS else nullcontext():
-            for start in range(0, counted.size, BLOCK):
-                where = run_of(counted[start : start + BLOCK])
+            for start in range(0, counted.size, BLOCK_PIXELS):
+                where = as_slice(counted[start : start + BLOCK_PIXELS])
                 lit, painted = self.pixels(where), colours[where]
                 root = np.sqrt(weights[where].astype(np.float64))
                 # (n + 1, block): the target goes along as one more row.
@@ -204,7 +204,7 @@ def joined_planes(
     return MemoryPlanes(joint.reshape(n, rows, width, 3)), tuple(made)
 
 
-def run_of(pixels: Indices) -> slice | Indices:
+def as_slice(pixels: Indices) -> slice | Indices:
     """Return a slice for pixels in one run, which are looked at where they are."""
     first, last = int(pixels[0]), int(pixels[-1])
     return slice(first, last + 1) if last - first + 1 == pixels.size else pixels

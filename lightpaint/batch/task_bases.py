@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import write_basis
+from lightpaint.basis.basis_file import write_basis
 from lightpaint.batch.work.basis_parts import PartwiseRender
 from lightpaint.batch.work.engine import Engine
 from lightpaint.batch.work.task import Task
@@ -31,7 +31,7 @@ def has_basis(task: Task, worker_cache: WorkerCache) -> bool:
     film = on_film(scene.content, settings.quality, settings.resolution)
     requested_spp = samples(settings.quality, spp=settings.spp, time_s=None)
     sensor = film.sensor_names[film.sensor]
-    cached_spp = cache.spp_of(film.identity, sensor, settings.seed, film.size)
+    cached_spp = cache.cached_spp(film.identity, sensor, settings.seed, film.size)
     exact = settings.exact_spp or not settings.use_cache
     return not exact and cached_spp >= (film.spp if requested_spp is None else requested_spp)
 

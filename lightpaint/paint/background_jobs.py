@@ -9,7 +9,7 @@ from threading import Lock
 from typing import Any, Literal, Protocol
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes, as_halves
+from lightpaint.basis.denoised_planes import DenoisedPlanes, as_halves
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
 from lightpaint.lighting.answer.lighting import Lighting
@@ -54,7 +54,7 @@ class JobHost(Protocol):
         requests: replace those of the session, if given.
         """
 
-    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
+    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
         """Return the denoised planes of these bases; None for each that has none yet."""
 
     def publish_picture(self, name: str, picture: Picture) -> None:

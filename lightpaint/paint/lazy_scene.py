@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any
 
-from lightpaint.basis import known
+from lightpaint.basis import scene_facts
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.known import Known
+from lightpaint.basis.scene_facts import SceneFacts
 from lightpaint.errors import PaintError
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile, vars_of
@@ -34,10 +34,10 @@ class LazyScene:
     _lock: Any = field(default_factory=Lock)
 
     def __post_init__(self) -> None:
-        self.record: Known | None = None
+        self.record: SceneFacts | None = None
         if self.settings.use_cache:
-            self._key = known.key_of(self._cache_fields)
-            self.record = known.recall(self._key)
+            self._key = scene_facts.facts_key(self._cache_fields)
+            self.record = scene_facts.recall_facts(self._key)
         if self.record is not None:
             self.remarks = self.record.remarks
 
@@ -82,10 +82,10 @@ class LazyScene:
         """Cache what the next session needs to begin without loading. basis: the one that is
         cached.
         """
-        if abs(_clock_s() - self._clock_s) > known.COARSE_S / 2:
+        if abs(_clock_s() - self._clock_s) > scene_facts.COARSE_S / 2:
             return  # the clock was set, so that file times do not tell the last change
         if self.record is None and self._scene is not None and self.settings.use_cache:
-            known.remember(
+            scene_facts.remember_facts(
                 self._key, self._scene, basis, remarks=self.remarks, began_s=self._began_s
             )
 

@@ -7,8 +7,13 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes, clean_halves, keep_planes, kept_planes
-from lightpaint.basis.clean_mix import clean_present
+from lightpaint.basis.denoised_mixes import denoise_present_look
+from lightpaint.basis.denoised_planes import (
+    DenoisedPlanes,
+    denoise_to_halves,
+    read_denoised_planes,
+    write_denoised_planes,
+)
 from lightpaint.paint.session.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.store.steps import name_in_view
@@ -19,13 +24,13 @@ class _ViewPlanes:
     """Denoised planes of one view. basis: their source. is_cached: whether a file has them."""
 
     basis: Basis
-    planes: CleanPlanes
+    planes: DenoisedPlanes
     is_cached: bool = False
 
     def matches(self, basis: Basis) -> bool:
         return self.basis.planes is basis.planes
 
-    def scaled_to(self, basis: Basis) -> CleanPlanes:
+    def scaled_to(self, basis: Basis) -> DenoisedPlanes:
         """Return planes that stand in until those of `basis` are denoised."""
         return self.planes if self.matches(basis) else self.planes.scaled_as(basis)
 
@@ -51,15 +56,15 @@ class PlaneDenoiser:
         """Load cached planes. Returns the present look of each view, denoised."""
         presents = []
         for k, basis in enumerate(bases):
-            cached = kept_planes(basis) if self._use_cache else None
+            cached = read_denoised_planes(basis) if self._use_cache else None
             if cached is None:
-                presents.append(clean_present(basis))
+                presents.append(denoise_present_look(basis))
             else:
                 self._by_view[k] = _ViewPlanes(basis, cached, is_cached=True)
                 presents.append(cached.present)
         return presents
 
-    def planes_for(self, bases: Sequence[Basis]) -> list[CleanPlanes | None]:
+    def planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
         """Return each view's denoised planes, of fewer samples if need be; None if it has none."""
         return [
             self._by_view[k].scaled_to(basis) if k in self._by_view else None
@@ -79,11 +84,11 @@ class PlaneDenoiser:
             np.empty((len(basis.lights), *basis.size, 3), np.float16),
             np.ones(len(basis.lights)),
         )
-        planes = CleanPlanes(halves, scales, view.present)
+        planes = DenoisedPlanes(halves, scales, view.present)
         for k in range(len(basis.lights)):
             if not self._is_needed() or view.basis is not basis:
                 return
-            planes.halves[k], planes.scales[k] = clean_halves(basis, k)
+            planes.halves[k], planes.scales[k] = denoise_to_halves(basis, k)
             self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
         self._by_view[view.view] = _ViewPlanes(basis, planes)
 
@@ -92,4 +97,4 @@ class PlaneDenoiser:
         if self._use_cache:
             for planes_of_view in self._by_view.values():
                 if not planes_of_view.is_cached:
-                    keep_planes(planes_of_view.basis, planes_of_view.planes)
+                    write_denoised_planes(planes_of_view.basis, planes_of_view.planes)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes
+from lightpaint.basis.denoised_planes import DenoisedPlanes
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting import Lighting
@@ -258,7 +258,7 @@ class Studio:
                 message = make()
             self.publish(message)
 
-    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[CleanPlanes | None]:
+    def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
         """Return the denoised planes of these bases; None for each that has none yet."""
         return self._denoiser.planes_for(bases)
 

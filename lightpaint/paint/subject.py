@@ -8,8 +8,8 @@ import numpy as np
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, meter_exposure
-from lightpaint.basis.known import Known
-from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis.scene_facts import SceneFacts
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -59,7 +59,7 @@ class Subject:
         return self.scene.scene if isinstance(self.scene, LazyScene) else self.scene
 
     @property
-    def record(self) -> Known | None:
+    def record(self) -> SceneFacts | None:
         """Cached facts of a scene that need not be loaded for them."""
         return self.scene.record if isinstance(self.scene, LazyScene) else None
 
@@ -129,7 +129,7 @@ class Subject:
         return replace(cached, lights=record.lights)
 
     def _obtain_at(self, spp: int, progress: Progress) -> Basis:
-        from lightpaint.basis.render.obtain import obtain_basis
+        from lightpaint.basis.render.cached_render import obtain_basis
 
         scene = self.loaded_scene
         basis = obtain_basis(scene, spp=spp, seed=self.settings.seed, progress=progress)
@@ -201,9 +201,9 @@ def painting_transform(subjects: Sequence[Subject], bases: Sequence[Basis]) -> V
     return subjects[0].choice.over(ViewTransform("srgb", meter_exposure(whole, *bases)))
 
 
-def sensor_name(scene: Scene | Known) -> str:
+def sensor_name(scene: Scene | SceneFacts) -> str:
     """Return the name of the sensor that a scene is seen through."""
-    return scene.sensor if isinstance(scene, Known) else scene.sensor_names[scene.sensor]
+    return scene.sensor if isinstance(scene, SceneFacts) else scene.sensor_names[scene.sensor]
 
 
 def painting_path(folder: Path, sensor: str) -> Path:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import PaintError, SceneError
@@ -106,7 +106,7 @@ def _scene_on_film(
     """Return a scene on the film of its basis, or one that is loaded when it is needed."""
 
     def check(scene: Scene) -> None:
-        from lightpaint.basis.render.render import basis_lights
+        from lightpaint.basis.render.basis_render import basis_lights
 
         _check_constraints(basis_lights(scene), constraints)
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.result_folder import ResultFolder

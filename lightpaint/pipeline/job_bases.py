@@ -6,9 +6,9 @@ from dataclasses import replace
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache_folder import folder
-from lightpaint.basis.clean import MOST, clean_planes
-from lightpaint.basis.render.obtain import Render, obtain_basis
-from lightpaint.basis.render.render import render_basis, samples_for
+from lightpaint.basis.denoised_planes import MAX_PIXELS, obtain_denoised_planes
+from lightpaint.basis.render.basis_render import render_basis, samples_for
+from lightpaint.basis.render.cached_render import Render, obtain_basis
 from lightpaint.pipeline.job import Job, PaintedView
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Listener, Progress, labelled, listener
@@ -62,13 +62,15 @@ def obtain(
     )
     if is_all_rendered and not is_reused:
         basis = replace(basis, render_s=time.perf_counter() - began_s)
-    if settings.use_cache and not cache.is_kept(basis):
+    if settings.use_cache and not cache.is_cached(basis):
         listen.say(
             f"the basis could not be saved in {folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
         )
     elif settings.use_cache and is_rendered:
-        clean_planes(basis, most=MOST, progress=lambda k, n: listen("denoising", k, n, "planes"))
+        obtain_denoised_planes(
+            basis, most=MAX_PIXELS, progress=lambda k, n: listen("denoising", k, n, "planes")
+        )
     _remark_on_samples(scene, basis, settings, spp, listen, is_rendered=is_rendered)
     return basis
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from lightpaint.basis import cache
+from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.basis.render.obtain import obtain_basis
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_bytes
 from lightpaint.images.denoiser import denoiser_text
@@ -47,7 +47,7 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
     the reason why nothing was written, if rendering would take too long.
     """
     sensor = scene.sensor_names[scene.sensor]
-    basis = cache.any_of(
+    basis = cache.find_most_sampled(
         scene.identity, sensor, samples=SHEET.spp * LIGHT_MIN_PIXELS, largest=MAX_BASIS_BYTES
     )
     if basis is None:

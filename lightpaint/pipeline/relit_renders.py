@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.render.separate import emitters_seen
+from lightpaint.basis.render.separate_renders import emitters_seen
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.images.denoiser import denoised, denoiser_text
 from lightpaint.images.estimate import Estimate, write_estimate

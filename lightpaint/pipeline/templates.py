@@ -7,10 +7,10 @@ from pathlib import Path
 from lightpaint.arrays import Floats
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, meter_exposure
-from lightpaint.basis.clean_mix import clean_plane, clean_present
+from lightpaint.basis.denoised_mixes import denoise_plane, denoise_present_look
+from lightpaint.basis.render.basis_render import is_of, render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.basis.render.render import is_of, render_basis
-from lightpaint.basis.render.separate import emitters_seen
+from lightpaint.basis.render.separate_renders import emitters_seen
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.denoiser import Features, denoised, denoiser_text
@@ -141,7 +141,7 @@ def _look_of_basis(basis: Basis) -> tuple[Floats, Floats | None, Features | None
     look = basis.present_look
     if not basis.knows_noise:
         return look, None, None
-    return look, clean_present(basis, quality="high"), basis.features
+    return look, denoise_present_look(basis, quality="high"), basis.features
 
 
 def render_look(
@@ -197,7 +197,7 @@ def _look(
     if basis is not None:
         features = basis.features or render_features(scene, seed=settings.seed)
         basis = replace(basis, features=features)
-        clean = clean_present(basis, quality="high")
+        clean = denoise_present_look(basis, quality="high")
         return basis.present_look, clean, features
     image = render(
         scene,
@@ -239,6 +239,6 @@ def _small_planes(basis: Basis, factor: int) -> dict[str, Floats]:
     if not basis.knows_noise:
         return small
     if factor == 1:
-        return {name: clean_plane(basis, k) for k, name in enumerate(basis.names)}
+        return {name: denoise_plane(basis, k) for k, name in enumerate(basis.names)}
     features = None if basis.features is None else basis.features.reduced(factor)
     return {name: denoised(image, features) for name, image in small.items()}

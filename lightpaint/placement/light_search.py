@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Floats, Position, as_rgb
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
-from lightpaint.basis.render.render import render_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.progress import Listener

@@ -10,7 +10,7 @@ from threading import Lock, Thread
 from typing import Any, TypeVar
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes, clean_planes
+from lightpaint.basis.denoised_planes import DenoisedPlanes, obtain_denoised_planes
 
 Made = TypeVar("Made")
 
@@ -42,9 +42,9 @@ def make_once(basis: Basis, key: Hashable, make: Callable[[], Made]) -> Made:
     return result
 
 
-def cached_clean_planes(basis: Basis) -> CleanPlanes | None:
-    """Return `clean_planes` of a basis, made once."""
-    return make_once(basis, "planes", lambda: clean_planes(basis))
+def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:
+    """Return `obtain_denoised_planes` of a basis, made once."""
+    return make_once(basis, "planes", lambda: obtain_denoised_planes(basis))
 
 
 def make_ahead(basis: Basis, makes: Callable[[Basis], object]) -> None:

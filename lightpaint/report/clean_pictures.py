@@ -6,7 +6,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean_mix import clean_mix, clean_present
+from lightpaint.basis.denoised_mixes import denoise_mix, denoise_present_look
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.bands import LARGE_PICTURE, by_bands
 from lightpaint.images.denoiser import DENOISED_KEY, Features, denoised, denoiser_text
@@ -77,7 +77,7 @@ class CleanLooks:
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
         texts = denoiser_text(features, raw=raw)
         if (planes := cached_clean_planes(basis)) is None:
-            shown = clean_present(basis), clean_mix(basis, weights, mixed=predicted)
+            shown = denoise_present_look(basis), denoise_mix(basis, weights, mixed=predicted)
         else:
             shown = planes.present, planes.mix(weights)
         return cls(*shown, verified, texts)

@@ -11,8 +11,7 @@ import OpenEXR
 import pytest
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.checksums import CHECKSUMS_KEY
-from lightpaint.basis.file import (
+from lightpaint.basis.basis_file import (
     FORMAT_KEY,
     ORIGIN_KEY,
     as_stored,
@@ -21,6 +20,7 @@ from lightpaint.basis.file import (
     read_origin,
     write_basis,
 )
+from lightpaint.basis.checksums import CHECKSUMS_KEY
 from lightpaint.basis.file_parts import LIGHT_KEY, NAMES_KEY, OBJECTS_KEY
 from lightpaint.errors import BasisError, ImageError, SizeError
 from lightpaint.images.estimate import HALF_DIFFERENCE

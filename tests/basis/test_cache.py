@@ -13,13 +13,13 @@ import pytest
 from command import run
 from renderer import LIGHTS, same_basis, write_room
 
-from lightpaint.basis import cache, cache_folder, file
+from lightpaint.basis import basis_file, cache, cache_folder
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis_file import read_basis, write_basis
 from lightpaint.basis.cache_folder import SUFFIX, TAG
-from lightpaint.basis.file import read_basis, write_basis
 from lightpaint.basis.file_planes import FilePlanes
-from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.render import is_on_the_way, render_basis
+from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
+from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.errors import LightpaintError, OutputError, SceneError
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.settings import Settings
@@ -81,8 +81,8 @@ def test_what_is_large_is_read_from_its_file_as_soon_as_it_is_kept(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     expected = obtain_basis(scene, spp=16)
-    cache.drop(cache.entries())
-    monkeypatch.setattr(file, "IN_MEMORY", 0)
+    cache.delete_entries(cache.entries())
+    monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     large = obtain_basis(scene, spp=16)
     assert isinstance(large.planes, FilePlanes)
     assert isinstance(large.noise, FilePlanes)
@@ -125,7 +125,7 @@ def test_exactly_what_is_asked_for_whatever_is_kept(scene: Scene) -> None:
     same_basis(exact, fresh)
     # The one with more samples is not thrown away.
     assert [entry.path.read_bytes() for entry in cache.entries()] == before
-    cache.drop(cache.entries())
+    cache.delete_entries(cache.entries())
     obtain_basis(scene, spp=8)
     same_basis(obtain_basis(scene, spp=16, exact_spp=True), fresh)
     [entry] = cache.entries()
@@ -162,7 +162,7 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
         gone_on = obtain_basis(scene, spp=64, exact_spp=True, progress=passes(log))
         same_basis(gone_on, fresh, of_file=True)
         assert 0 < sum(now > 0 for now in log) < max(whole)
-        cache.drop(cache.entries())
+        cache.delete_entries(cache.entries())
     # One that fewer samples ended has other passes.
     assert not is_on_the_way(scene, obtain_basis(scene, spp=6, use_cache=False), 64)
 
@@ -226,13 +226,13 @@ def test_the_longest_unused_goes_first(scene: Scene, monkeypatch: pytest.MonkeyP
     oldest, *_ = by_age = cache.entries()
     for age, entry in enumerate(by_age):
         os.utime(entry.path, (1000 + age, 1000 + age))
-    monkeypatch.setattr(cache, "LARGEST", int(2.5 * oldest.size))
+    monkeypatch.setattr(cache, "MAX_BYTES", int(2.5 * oldest.size))
     obtain_basis(scene, spp=2, seed=3)
     left = {entry.path for entry in cache.entries()}
     assert by_age[2].path in left
     assert len(left) == 2
     left_over = cache.entries()
-    assert cache.drop(left_over) == sum(entry.size for entry in left_over)
+    assert cache.delete_entries(left_over) == sum(entry.size for entry in left_over)
     assert cache.entries() == []
 
 
@@ -265,16 +265,16 @@ def test_bases_are_dropped_by_scene_or_file(
     (empty_cache / f"{DAMAGED}{SUFFIX}").write_bytes(whole[: whole.index(b"lightpaint-basis") + 20])
 
     def scenes(pattern: str) -> list[str]:
-        return sorted(x.origin.scene if x.origin else "?" for x in cache.named(pattern))
+        return sorted(x.origin.scene if x.origin else "?" for x in cache.entries_named(pattern))
 
     assert scenes("hall.xml") == scenes("hall") == scenes("h*") == ["hall.xml"] * 2
     assert scenes("*.xml") == ["hall.xml"] * 2 + ["room.xml"]
     assert scenes(DAMAGED) == scenes("da*") == ["?"]
     assert scenes("hal") == scenes("") == []
-    [file] = {entry.path.name for entry in cache.named("room")}
+    [file] = {entry.path.name for entry in cache.entries_named("room")}
     assert scenes(file) == scenes(file.removesuffix(SUFFIX)) == ["room.xml"]
     here = {"LIGHTPAINT_CACHE": str(empty_cache)}
-    size = sum(entry.size for entry in cache.named("hall"))
+    size = sum(entry.size for entry in cache.entries_named("hall"))
     done = run(tmp_path, "cache", "drop", "hall", "h*", **here)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("hall.xml") == 2
@@ -383,11 +383,11 @@ def test_what_somebody_else_has_put_there_is_not_believed(
     assert cache.find(*asked) is not None
     [path] = empty_cache.glob("*.basis.exr")
     its = path.stat().st_uid
-    monkeypatch.setattr(cache_folder, "is_believed", lambda status: status.st_uid != its)
+    monkeypatch.setattr(cache_folder, "is_trusted_owner", lambda status: status.st_uid != its)
     assert cache.find(*asked) is None
     assert cache.entries() == []
-    assert cache.spp_of(*asked) == 0
-    assert cache.any_of(*asked[:2], samples=1, largest=2**30) is None
+    assert cache.cached_spp(*asked) == 0
+    assert cache.find_most_sampled(*asked[:2], samples=1, largest=2**30) is None
 
 
 def test_who_is_believed() -> None:
@@ -395,7 +395,8 @@ def test_who_is_believed() -> None:
     me = os.geteuid()
     for owner, believed in ((me, True), (0, True), (me + 1, False)):
         assert (
-            cache_folder.is_believed(os.stat_result((0o644, 1, 1, 1, owner, *5 * [0]))) == believed
+            cache_folder.is_trusted_owner(os.stat_result((0o644, 1, 1, 1, owner, *5 * [0])))
+            == believed
         )
 
 

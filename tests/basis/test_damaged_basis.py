@@ -13,11 +13,11 @@ from damaged_files import Case, cut_and_read, damaged, outcomes, turned, wrong
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis_file import ORIGIN_KEY, as_stored, read_basis, read_origin, write_basis
 from lightpaint.basis.checksums import CHECKSUMS_KEY
-from lightpaint.basis.file import ORIGIN_KEY, as_stored, read_basis, read_origin, write_basis
 from lightpaint.basis.file_parts import LIGHT_KEY
-from lightpaint.basis.lightgroups.folder import MAX_FILES, is_light_groups
-from lightpaint.basis.lightgroups.read import read_light_groups
+from lightpaint.basis.lightgroups.folder_files import MAX_FILES, is_light_groups
+from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb
 
@@ -28,7 +28,7 @@ SIZE = (6, 5)
 def basis(make_basis: Any) -> Basis:
     made = make_basis(3, SIZE, names=["key", "fill", "rim"], seen=np.eye(*SIZE, dtype=bool))
     halves = np.random.default_rng(1).normal(size=made.images.shape).astype(np.float32)
-    return as_stored(replace(made, noise=halves, learned=np.ones((2, 4, 3), np.float32)))
+    return as_stored(replace(made, noise=halves, guide_table=np.ones((2, 4, 3), np.float32)))
 
 
 @pytest.fixture
@@ -155,7 +155,7 @@ def test_a_table_that_is_not_as_it_was_is_left_out(path: Path, basis: Basis) -> 
     table = {k: c * 2 for k, c in parts[-1].channels.items()}
     write_parts(path, [*parts[:-1], replace(parts[-1], channels=table)])
     back = read_basis(path)
-    assert back.learned is None
+    assert back.guide_table is None
     assert back.images.tobytes() == basis.images.tobytes()
 
 

@@ -8,10 +8,17 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.file import FORMAT_KEY, as_stored, read_basis, write_basis
+from lightpaint.basis.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
 from lightpaint.basis.file_parts import SCALE_KEY
 from lightpaint.basis.file_planes import RowPlanes
-from lightpaint.basis.half_floats import FLOAT, HALF, HIDDEN, TILE, PlaneEncoding, encodings_of
+from lightpaint.basis.half_floats import (
+    FLOAT,
+    HALF,
+    HIDDEN_SHARE,
+    TILE,
+    PlaneEncoding,
+    encodings_of,
+)
 from lightpaint.basis.planes import as_planes
 from lightpaint.errors import BasisError
 from lightpaint.images.formats.exr import read_parts, write_parts
@@ -54,7 +61,7 @@ def test_rounding_is_hidden_in_the_noise_of_every_tile() -> None:
     for top in range(0, SIZE[0], TILE):
         for left in range(0, SIZE[1], TILE):
             tile = np.s_[top : top + TILE, left : left + TILE]
-            assert (missed[tile].sum((0, 1)) <= HIDDEN**2 * noise[tile].sum((0, 1))).all()
+            assert (missed[tile].sum((0, 1)) <= HIDDEN_SHARE**2 * noise[tile].sum((0, 1))).all()
 
 
 @pytest.mark.parametrize("light", [1e-30, 1e-7, 1e5, 1e30])
@@ -151,7 +158,7 @@ def test_a_file_of_the_format_before_is_read() -> None:
     assert back.lights[0].unit_flux == (1.5, 1.5, 1.5)
     assert back.lights[1].members == ("a", "b")
     assert back.origin.halves == (32, 32)
-    assert back.learned is not None
+    assert back.guide_table is not None
     assert back.features is not None
     assert back.objects is not None
     assert back.objects.names == ("vase", "")

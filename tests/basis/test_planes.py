@@ -9,7 +9,7 @@ import pytest
 
 import lightpaint
 import lightpaint as lp
-from lightpaint.basis import file, file_planes
+from lightpaint.basis import basis_file, file_planes
 from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
@@ -96,7 +96,7 @@ def written(
     if smooth:  # which ZIP packs well, where noise is left as it is
         images[...] = np.linspace(0, 1, size[1], dtype=np.float32)[:, None]
         images[1] *= 2
-    basis: lp.Basis = file.as_stored(make_basis(images=images, half_differences=images / 8))
+    basis: lp.Basis = basis_file.as_stored(make_basis(images=images, half_differences=images / 8))
     lp.write_basis(path, basis)
     return basis
 
@@ -117,15 +117,15 @@ def test_planes_of_a_file_are_those_in_memory(
 ) -> None:
     path = tmp_path / "it.basis.exr"
     basis = written(path, make_basis, smooth=smooth, size=size)
-    monkeypatch.setattr(file, "IN_MEMORY", 0)
-    monkeypatch.setattr(file_planes, "STRIPS", room)
+    monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
+    monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
     found = lp.read_basis(path)
     assert isinstance(found.planes, FilePlanes)
     assert RowFile(path).parts[0].is_packed == (smooth or size != PLAIN)
     check_alike(found.planes, basis.images)
     check_alike(found.noise, basis.half_differences)
     some = np.sort(np.random.default_rng(6).permutation(size[0] * size[1])[:500])
-    monkeypatch.setattr(file_planes, "PICKED", 0)
+    monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
     picked = found.planes.picked(some)
     assert isinstance(picked, file_planes.PickedPlanes)
     check_alike(picked, basis.images.reshape(N, 1, -1, 3)[:, :, some])
@@ -143,8 +143,8 @@ def test_a_basis_in_a_file_is_solved_as_one_in_memory(
     image = basis.mix(np.full((N, 3), 0.7)) + np.float32(0.1)
     target = lp.Target.of(image, (np.arange(67) > 20)[:, None] * np.ones((67, 90), np.float32))
     expected = lp.solve(basis, target, **how)
-    monkeypatch.setattr(file, "IN_MEMORY", 0)
-    monkeypatch.setattr(file_planes, "PICKED", 0)
+    monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
+    monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
     found = lp.solve(lp.read_basis(path), target, **how)
     # The same sums in the same order.
     np.testing.assert_allclose(found.weights, expected.weights, rtol=1e-12)
@@ -161,7 +161,7 @@ def test_a_large_file_that_was_changed_says_so(
 ) -> None:
     path = tmp_path / "it.basis.exr"
     written(path, make_basis, size=PLAIN)
-    monkeypatch.setattr(file, "IN_MEMORY", 0)
+    monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     data = bytearray(path.read_bytes())
     data[len(data) // 3] ^= 1
     path.write_bytes(data)

@@ -21,8 +21,8 @@ from batches import contents
 from command import run
 from renderer import write_room
 
-from lightpaint.basis.render import lessons
-from lightpaint.basis.render import parts as parts_module
+from lightpaint.basis.render import guide_training
+from lightpaint.basis.render import render_parts as parts_module
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
@@ -153,8 +153,8 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[st
 
 
 def in_small_parts(patch: pytest.MonkeyPatch, cache: Path) -> None:
-    patch.setattr(parts_module, "SAMPLES", 2**10)
-    patch.setattr(lessons, "LESSON", (2**12,))
+    patch.setattr(parts_module, "PART_SAMPLES", 2**10)
+    patch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
     patch.setattr(scene_render, "SAMPLES_PER_RANGE", 1)
     patch.setenv("LIGHTPAINT_CACHE", str(cache))
 
@@ -231,7 +231,7 @@ def test_a_cluster_does_what_one_process_does(
     assert len(parts) == len(plan_of_parts(here)) >= 4
     assert all(hears.begun[name] == 1 for name in parts)
     # One for the basis, and one for the lighting that is had by sums.
-    assert hears.begun["lesson"] == 2
+    assert hears.begun["training"] == 2
     assert all(hears.begun[f"{name}: answer"] == 1 for name in ("bright", "third", "third-warmer"))
     # The only final render is one of both workers.
     assert hears.begun["bright 0"] == hears.begun["bright 1"] == 1
@@ -256,7 +256,7 @@ def test_a_worker_killed_in_the_middle_of_a_basis_costs_one_part(
     assert killer.thread is not None
     assert contents(here / "killed") == expected
     again = {name: count for name, count in hears.begun.items() if count > 1}
-    assert again == {"lesson": 2, "part 3": 2}
+    assert again == {"training": 2, "part 3": 2}
     assert any("is lost; trying elsewhere" in text for text in hears.said)
     # What was kept of the parts has gone.
     assert list(spool.iterdir()) == []
@@ -279,7 +279,7 @@ def test_a_worker_killed_in_the_middle_of_a_look_costs_one_try(
     assert killer.thread is not None
     assert contents(here / "look") == expected
     again = {name: count for name, count in hears.begun.items() if count > 1}
-    assert again == {"lesson": 2, "bright: answer": 2}
+    assert again == {"training": 2, "bright: answer": 2}
 
 
 def test_a_worker_that_hangs_and_one_without_memory_are_replaced(
@@ -322,7 +322,7 @@ def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
     assert contents(here / "stopped") == expected
     parts = sum(name.startswith("part ") for name in second.begun)
     assert parts == len(plan_of_parts(here)) - kept
-    assert "lesson" not in second.begun
+    assert "training" not in second.begun
 
 
 def plan_of_parts(here: Path) -> list[Any]:

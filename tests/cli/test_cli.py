@@ -19,7 +19,7 @@ from PIL import Image
 from renderer import LIGHTS, REPOSITORY, write_room
 
 from lightpaint import paint_with_light
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts, write_rgb

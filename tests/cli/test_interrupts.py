@@ -14,9 +14,9 @@ from nightly import at_night
 from renderer import CORNELL, LIGHTS, PATH, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis
-from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.render import ONE_PASS, SEPARATE
+from lightpaint.basis.basis_file import read_basis
+from lightpaint.basis.render.basis_render import ONE_PASS, SEPARATE
+from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.scene.scene import load_scene
 
 SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
@@ -28,7 +28,7 @@ SPP = {ONE_PASS: 2500, SEPARATE: 250}
 #: `lightpaint …` with passes of a hundredth of a second, each of which is kept.
 MAIN = """
 import os, sys, time
-import lightpaint.basis.render.budget as budget, lightpaint.scene.scene_render as render
+import lightpaint.basis.render.render_budget as budget, lightpaint.scene.scene_render as render
 from lightpaint.cli import main
 budget.KEEP_EVERY_S, render.SAMPLES_PER_PASS = 0, 2**15
 if "SLOWLY" in os.environ:
@@ -258,8 +258,8 @@ def test_killed_at_any_moment_leaves_a_readable_basis(
     """However far the writing of a part has come."""
     code = f"""
 import lightpaint.scene.scene_render, lightpaint as lp, sys
-from lightpaint.basis.render.obtain import obtain_basis
-sys.modules["lightpaint.basis.render.budget"].KEEP_EVERY_S = 0
+from lightpaint.basis.render.cached_render import obtain_basis
+sys.modules["lightpaint.basis.render.render_budget"].KEEP_EVERY_S = 0
 lightpaint.scene.scene_render.SAMPLES_PER_PASS = 2**17
 scene = lp.load_scene({str(CORNELL)!r})
 print("ready", flush=True)

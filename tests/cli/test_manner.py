@@ -11,7 +11,7 @@ import pytest
 from command import refused, run, succeed
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.file import write_basis
+from lightpaint.basis.basis_file import write_basis
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.images.formats.exr import write_rgb

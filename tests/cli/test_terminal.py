@@ -12,7 +12,7 @@ from renderer import write_room
 from rich.markup import escape
 
 from lightpaint.basis import cache
-from lightpaint.basis.file import write_basis
+from lightpaint.basis.basis_file import write_basis
 from lightpaint.cli.output import lines, terminal
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting

@@ -10,7 +10,7 @@ from command import run, succeed
 from PIL import Image
 from renderer import write_room
 
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.images.denoiser import (
     DENOISED_KEY,
     MISSING_REMARK,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.white_range import white_range

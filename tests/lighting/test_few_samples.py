@@ -13,7 +13,7 @@ import pytest
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise

@@ -12,7 +12,7 @@ from conftest import BasisFactory
 from threadpoolctl import threadpool_limits
 
 import lightpaint as lp
-from lightpaint.basis import file, file_planes
+from lightpaint.basis import basis_file, file_planes
 from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.threads import limit_jobs
 
@@ -93,8 +93,8 @@ def test_not_from_where_planes_lie(
     path = tmp_path / "it.basis.exr"
     lp.write_basis(path, basis)
     expected = emissions(lp.read_basis(path), target, fit)
-    monkeypatch.setattr(file, "IN_MEMORY", 0)
-    monkeypatch.setattr(file_planes, "PICKED", 0)
+    monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
+    monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
     stored = lp.read_basis(path)
     assert isinstance(stored.planes, FilePlanes)
     found = emissions(stored, target, fit)

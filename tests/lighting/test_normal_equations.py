@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.basis.planes import BLOCK
+from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 
 # Sums of float64 products, a few thousand of them: round-off well below 1e-12.
@@ -44,7 +44,9 @@ def test_equal_to_dense_algebra(n: int, size: tuple[int, int]):
         np.testing.assert_allclose(norm2[c], dense_norm2, rtol=PRECISION)
 
 
-@pytest.mark.parametrize("pixels", [BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 17])
+@pytest.mark.parametrize(
+    "pixels", [BLOCK_PIXELS - 1, BLOCK_PIXELS, BLOCK_PIXELS + 1, 2 * BLOCK_PIXELS + 17]
+)
 def test_images_larger_than_a_block(pixels: int):
     images, target, _ = _problem(2, (1, pixels))
     # Every second pixel counts: blocks are counted in pixels that do.

@@ -16,7 +16,7 @@ from qp import least
 from scipy.optimize import nnls
 
 import lightpaint as lp
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 
 ROOT = Path(__file__).parent.parent.parent
 

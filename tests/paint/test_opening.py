@@ -13,8 +13,8 @@ from command import spawn
 from renderer import write_room
 
 import lightpaint as lp
-from lightpaint.basis import cache, known
-from lightpaint.basis.render.render import basis_lights
+from lightpaint.basis import cache, scene_facts
+from lightpaint.basis.render.basis_render import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.object_map import Objects
@@ -33,7 +33,7 @@ from lightpaint.pipeline.sources import SceneFile
 def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty cache, and a process that has loaded no renderer."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(known, "sys", SimpleNamespace(modules={}, version="3"))
+    monkeypatch.setattr(scene_facts, "sys", SimpleNamespace(modules={}, version="3"))
 
 
 @pytest.fixture

@@ -16,7 +16,11 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.clean import CleanPlanes, keep_planes, kept_planes
+from lightpaint.basis.denoised_planes import (
+    DenoisedPlanes,
+    read_denoised_planes,
+    write_denoised_planes,
+)
 from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import plane_denoiser, protocol, session_exports, studio, subject
@@ -220,7 +224,7 @@ def test_an_exact_answer_tells_of_each_light(heard: IncomingMessage, basis: lp.B
     assert any(light["error"] for light in fields["lights"])
 
 
-def test_clean_halvess_of_few_samples_do_until_there_are_better_ones(
+def test_denoised_planes_of_few_samples_do_until_there_are_better_ones(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """A picture without grain is not shown with it again while the lights are still rendered."""
@@ -228,16 +232,16 @@ def test_clean_halvess_of_few_samples_do_until_there_are_better_ones(
     better = replace(basis, planes=basis.images * np.float32(1.5))
     is_taken, goes_on = threading.Event(), threading.Event()
     cleaned: list[lp.Basis] = []
-    real = plane_denoiser.clean_halves
+    real = plane_denoiser.denoise_to_halves
 
-    def clean_halves(its: lp.Basis, k: int) -> Any:
+    def denoise_to_halves(its: lp.Basis, k: int) -> Any:
         if its.images is better.images:
             is_taken.set()
             goes_on.wait(30)
         cleaned.append(its)
         return real(its, k)
 
-    monkeypatch.setattr(plane_denoiser, "clean_halves", clean_halves)
+    monkeypatch.setattr(plane_denoiser, "denoise_to_halves", denoise_to_halves)
     monkeypatch.setattr(studio, "obtain_bases", lambda *_: iter([[basis], [better]]))
     heard = IncomingMessage(tmp_path, basis)
     assert is_taken.wait(30)
@@ -305,7 +309,7 @@ def test_what_is_said_comes_in_the_order_in_which_it_came_about(
     heard.studio.close()
 
 
-def test_clean_halvess_come_later_and_keep_the_light(
+def test_denoised_planes_come_later_and_keep_the_light(
     basis: lp.Basis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
@@ -324,7 +328,7 @@ def test_clean_halvess_come_later_and_keep_the_light(
         heard.studio.resource("painting"), heard.studio.session.views[0].image
     )
     until = time.monotonic() + 30
-    while not kept_planes(basis) and time.monotonic() < until:
+    while not read_denoised_planes(basis) and time.monotonic() < until:
         time.sleep(0.01)
     # The next session has the same at once, and one of other pixels has not.
     again = IncomingMessage(tmp_path / "again", basis)
@@ -335,7 +339,7 @@ def test_clean_halvess_come_later_and_keep_the_light(
         np.testing.assert_array_equal(*same)
     presents = (one.studio.session.views[0].present for one in (heard, again))
     np.testing.assert_array_equal(*presents)
-    assert kept_planes(replace(basis, planes=2 * basis.images)) is None
+    assert read_denoised_planes(replace(basis, planes=2 * basis.images)) is None
     for one in (heard, again):
         one.studio.close()
 
@@ -345,18 +349,18 @@ def test_kept_pictures_that_are_damaged_are_made_again(
 ):
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
     scales = np.ones(len(basis.lights))
-    clean = CleanPlanes(basis.images.astype(np.float16), scales, basis.present_look)
-    assert kept_planes(basis) is None
-    assert keep_planes(basis, clean)
+    clean = DenoisedPlanes(basis.images.astype(np.float16), scales, basis.present_look)
+    assert read_denoised_planes(basis) is None
+    assert write_denoised_planes(basis, clean)
     [path] = tmp_path.iterdir()
     data = path.read_bytes()
     for damage in (b"", b"no file", data[: len(data) // 2], data[:2000] + bytes(99) + data[2099:]):
         path.write_bytes(damage)
-        assert kept_planes(basis) is None
-    assert keep_planes(basis, replace(clean, halves=clean.halves[:1]))
-    assert kept_planes(basis) is None
-    assert keep_planes(basis, clean)
-    found = kept_planes(basis)
+        assert read_denoised_planes(basis) is None
+    assert write_denoised_planes(basis, replace(clean, halves=clean.halves[:1]))
+    assert read_denoised_planes(basis) is None
+    assert write_denoised_planes(basis, clean)
+    found = read_denoised_planes(basis)
     assert found is not None
     np.testing.assert_array_equal(found.halves, clean.halves)
 

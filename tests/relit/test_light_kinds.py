@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
-from lightpaint.basis.render.render import render_basis
-from lightpaint.basis.render.separate import WHITE
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.separate_renders import WHITE
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.combination import combine

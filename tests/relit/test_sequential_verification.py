@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting

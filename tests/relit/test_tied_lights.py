@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, mitsuba_render, one_pass, write_room
 
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError, LightingError, SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.combination import combine

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.render.budget import Budget, Keeper
-from lightpaint.basis.render.render import _render_one_by_one, render_basis
+from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
+from lightpaint.basis.render.render_budget import Budget, Keeper
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
 from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_target

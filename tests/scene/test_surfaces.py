@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.scene.scene import load_scene
 from lightpaint.scene.surfaces import BACKGROUND, Surfaces, render_first_hits, render_surfaces
 
@@ -61,7 +61,7 @@ def test_one_picture_in_every_variant(seen: Surfaces, tmp_path: Path) -> None:
     code = f"""
 import numpy as np
 from lightpaint.scene.scene import load_scene
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.scene.surfaces import BACKGROUND, Surfaces, render_first_hits, render_surfaces
 seen = render_surfaces(load_scene({str(room)!r}, variant="scalar_rgb"))
 np.savez({str(tmp_path / "seen.npz")!r}, **seen.coverage)

@@ -8,7 +8,7 @@ lights equals `mi.render` up to round-off, and one pass serves all lights.
 
 That is its plain mode, `trace_plainly`, which tests hold against Mitsuba's. For a basis two things
 are done better, at the same cost: numbers come from an evenly spread sequence instead of from
-chance (see sobol.py), and emitters are chosen by what a lesson has learned (see lessons.py).
+chance (see sobol.py), and emitters are chosen by a guide that was trained (guide_training.py).
 
 Import it once a variant is set and not a scalar one: its arrays do not exist before.
 """
@@ -21,31 +21,31 @@ import drjit as dr
 import mitsuba as mi
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.render.guide import Guide
+from lightpaint.basis.render.emitter_guide import EmitterGuide
 from lightpaint.basis.render.integrators import (
     depth_limit,
     has_indirect_planes,
     needs_a_bounce,
 )
 from lightpaint.basis.render.light_planes import LightPlanes, lights_by_instance
-from lightpaint.basis.render.paths import Rules, View, trace_paths, trace_samples
+from lightpaint.basis.render.path_tracer import Rules, View, trace_paths, trace_samples
 from lightpaint.basis.render.sobol import SobolPairs
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
-#: How many emitters are asked at the first vertex, and at later ones where there are fewer emitters
-#: than that.
-FIRST_QUESTIONS = 8
-LATER_QUESTIONS = {32: 2, 128: 4, 2**32: 8}
+#: How many emitters are sampled at the first vertex, and at later ones where there are fewer
+#: emitters than that.
+FIRST_EMITTER_SAMPLES = 8
+LATER_EMITTER_SAMPLES = {32: 2, 128: 4, 2**32: 8}
 
 
 class Tracer:
     """A loaded scene, all lights at unit emission, whose samples are traced for `LightPlanes`.
 
-    Close it before another scene is loaded. seed: of all random numbers. learned: how it chooses
-    emitters, as a lesson has found out; without, it chooses by what it is taught. questions: how
-    many emitters the first vertex asks and later ones, if other than usual.
+    Close it before another scene is loaded. seed: of all random numbers. guide_table: of a
+    trained guide; without one, the guide is to be trained first. emitter_samples: of the first
+    vertex and of later ones, if other than usual.
 
     The samples of a pixel are terms of one sequence for each half, whatever is traced of them at a
     time. So their sum does not depend on that, nor on the number of threads.
@@ -55,25 +55,25 @@ class Tracer:
         self,
         scene: Scene,
         seed: int,
-        learned: Floats | None = None,
+        guide_table: Floats | None = None,
         *,
-        questions: tuple[int, int] | None = None,
+        emitter_samples: tuple[int, int] | None = None,
     ) -> None:
         self.scene = scene
         self.loaded = scene.load({light.name: (1.0, 1.0, 1.0) for light in scene.lights})
         self.light_of = lights_by_instance(self.loaded, scene.plane_of)
-        self.guide = Guide(self.loaded, self.light_of, scene.eye(self.loaded), learned)
-        self.learned = learned
-        if questions is None:
-            questions = FIRST_QUESTIONS, later_questions(self.guide.count)
-        self._questions = questions
-        # One stream of numbers for each half and for the lesson, far from all others.
+        self.guide = EmitterGuide(self.loaded, self.light_of, scene.eye(self.loaded), guide_table)
+        self.guide_table = guide_table
+        if emitter_samples is None:
+            emitter_samples = FIRST_EMITTER_SAMPLES, later_emitter_samples(self.guide.count)
+        self._emitter_samples = emitter_samples
+        # One stream of numbers for each half and for the training, far from all others.
         self._streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(3)]
 
     def learn(self, rows: range, first: int, spp: int) -> None:
         """Learn from some samples of some rows, whose light is not kept.
 
-        first: samples of a pixel that were learned from before.
+        first: number of samples of a pixel that earlier passes took.
         """
         nowhere = LightPlanes.nowhere(self.light_of)
         with kernels():
@@ -81,16 +81,16 @@ class Tracer:
             self.guide.evaluate()
         self.guide.update()
 
-    def end_lesson(self) -> Floats:
-        """Learn no more. Returns what was learned, (2, cells, emitters)."""
-        self.learned = self.guide.learned()
+    def end_training(self) -> Floats:
+        """Stop training, and return the table of the guide, (2, cells, emitters)."""
+        self.guide_table = self.guide.table()
         self.guide.freeze()
-        return self.learned
+        return self.guide_table
 
     @property
-    def is_taught(self) -> bool:
-        """True once it has learned all that it will."""
-        return self.learned is not None
+    def is_trained(self) -> bool:
+        """True once the guide is trained."""
+        return self.guide_table is not None
 
     def planes(self, rows: range) -> LightPlanes:
         """Return planes of some rows, to which nothing is added yet."""
@@ -122,18 +122,18 @@ class Tracer:
         )
         pixel = (row * step + start) * view.width + column
         numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, self._streams[stream]))
-        first, later = self._questions
+        first, later = self._emitter_samples
         rules = rules_of(self.scene)._replace(
-            first_questions=dr.opaque(mi.UInt32, first),
-            later_questions=dr.opaque(mi.UInt32, later),
+            first_emitter_samples=dr.opaque(mi.UInt32, first),
+            later_emitter_samples=dr.opaque(mi.UInt32, later),
         )
         end = begin + count
         trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
 
 
-def later_questions(emitters: int) -> int:
-    """Return how many emitters are asked at vertices but the first, of so many."""
-    return next(its for fewer, its in LATER_QUESTIONS.items() if emitters < fewer)
+def later_emitter_samples(emitters: int) -> int:
+    """Return how many of so many emitters are sampled at vertices but the first."""
+    return next(its for fewer, its in LATER_EMITTER_SAMPLES.items() if emitters < fewer)
 
 
 def view_of(scene: Scene, loaded: Any) -> View:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import job_fields

@@ -5,19 +5,19 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.lessons import LESSON
-from lightpaint.basis.render.parts import Part, PartSums, plan_parts
-from lightpaint.basis.render.render import (
+from lightpaint.basis.render.basis_render import (
     ONE_PASS,
     check_memory,
     method_of,
     render_basis,
     with_first_hits,
 )
+from lightpaint.basis.render.guide_training import TRAINING_SAMPLES
+from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
 from lightpaint.batch.work.engine import Engine
 from lightpaint.batch.work.render_cost import render_seconds
 from lightpaint.batch.work.spool import Spool
-from lightpaint.batch.work.work_items import Lesson, PartOfBasis, SceneFilm
+from lightpaint.batch.work.work_items import GuideTraining, PartOfBasis, SceneFilm
 from lightpaint.errors import BasisError
 from lightpaint.progress import Progress
 from lightpaint.scene.scene import Scene
@@ -59,10 +59,10 @@ class PartwiseRender:
         parts = plan_parts(scene, spp, start=start)
         spool = Spool(scene, parts, seed=seed, start=start)
         film = self._film_of(scene)
-        learned = obtain_lesson(self._engine, film, scene, seed, start, spool)
+        guide_table = obtain_guide_table(self._engine, film, scene, seed, start, spool)
         sums = PartSums(scene, parts, seed=seed, start=start)
         self._add_all(scene, parts, sums, seed, spool, progress)
-        basis = sums.basis(learned)
+        basis = sums.basis(guide_table)
         spool.drop()
         return basis
 
@@ -80,7 +80,7 @@ class PartwiseRender:
         progress: Progress,
     ) -> None:
         """Add all parts to `sums`: those that are cached, and those that the engine renders."""
-        learned = str(spool.learned) if spool.learned.is_file() else ""
+        guide_file = str(spool.guide_file) if spool.guide_file.is_file() else ""
         missing = {}
         for k, part in enumerate(parts):
             cached = spool.part(part)
@@ -91,7 +91,9 @@ class PartwiseRender:
             lights = len(scene.lights) if part.light is None else 1
             samples = pixels * part.spp * (2 if part.half is None else 1)
             expected_s = render_seconds(samples, lights)
-            item = PartOfBasis(f"part {k}", self._film_of(scene), part, seed, learned, expected_s)
+            item = PartOfBasis(
+                f"part {k}", self._film_of(scene), part, seed, guide_file, expected_s
+            )
             missing[item.name] = item
         progress("basis", len(parts) - len(missing), len(parts), "parts")
         for count, result in enumerate(self._engine.run(list(missing.values()))):
@@ -103,7 +105,7 @@ class PartwiseRender:
             progress("basis", len(parts) - len(missing) + count + 1, len(parts), "parts")
 
 
-def obtain_lesson(
+def obtain_guide_table(
     engine: Engine,
     film: SceneFilm,
     scene: Scene,
@@ -111,19 +113,20 @@ def obtain_lesson(
     start: Basis | None,
     spool: Spool,
 ) -> Floats | None:
-    """Return the emission that guides the samples of parts, and store it in the spool.
-    Returns None if the parts need none.
+    """Return the guide's table by which parts choose emitters, and store it in the spool.
+
+    None where parts do without, as in separate renders.
     """
     if method_of(scene) != ONE_PASS:
         return None
-    learned = spool.lesson() if start is None else start.learned
-    if learned is None:
-        expected_s = render_seconds(sum(LESSON), len(scene.lights))
-        [result] = engine.run([Lesson("lesson", film, seed, expected_s)])
+    table = spool.guide_table() if start is None else start.guide_table
+    if table is None:
+        expected_s = render_seconds(sum(TRAINING_SAMPLES), len(scene.lights))
+        [result] = engine.run([GuideTraining("training", film, seed, expected_s)])
         if result.failure:
             raise BasisError(result.failure)
-        learned = result.value
-        assert learned is not None
-    if not spool.learned.is_file():
-        spool.keep_lesson(learned)
-    return learned
+        table = result.value
+        assert table is not None
+    if not spool.guide_file.is_file():
+        spool.keep_guide_table(table)
+    return table

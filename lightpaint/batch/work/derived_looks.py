@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.batch.manifest.variations import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting

@@ -5,9 +5,9 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from lightpaint.basis.render.parts import plan_parts
-from lightpaint.basis.render.render import basis_lights
-from lightpaint.batch.work.basis_parts import obtain_lesson
+from lightpaint.basis.render.basis_render import basis_lights
+from lightpaint.basis.render.render_parts import plan_parts
+from lightpaint.batch.work.basis_parts import obtain_guide_table
 from lightpaint.batch.work.engine import Engine
 from lightpaint.batch.work.render_cost import render_seconds
 from lightpaint.batch.work.spool import Spool
@@ -66,7 +66,7 @@ def _render_sums(
     file = replace(job_fields(task, cache)["scenes"][0])
     film = SceneFilm(file, settings.quality, settings.resolution, tuple(map(str, scene.read_files)))
     spool = Spool(scene, parts, seed=settings.seed, start=None)
-    obtain_lesson(engine, film, scene, settings.seed, None, spool)
+    obtain_guide_table(engine, film, scene, settings.seed, None, spool)
     paintings = tuple(
         PaintingOfSums(_file_of(job), job.fit.emitters, job.settings.resize) for job in jobs
     )
@@ -76,7 +76,7 @@ def _render_sums(
         pixels = (part.bottom - part.top) * scene.size[1]
         expected_s = render_seconds(2 * pixels * part.spp, len(scene.lights))
         options: dict[str, Any] = {"film": film, "part": part, "seed": settings.seed}
-        options |= {"learned": str(spool.learned), "paintings": paintings, "files": reads}
+        options |= {"guide_file": str(spool.guide_file), "paintings": paintings, "files": reads}
         items.append(SumsOfRows(f"rows {k}", expected_s=expected_s, **options))
     results: dict[str, list[Sums]] = {}
     total: list[Sums] = []

@@ -15,8 +15,8 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache_folder import PARTS, folder, is_believed
-from lightpaint.basis.render.parts import Part
+from lightpaint.basis.cache_folder import PARTS, folder, is_trusted_owner
+from lightpaint.basis.render.render_parts import Part
 from lightpaint.errors import BasisError, OutputError
 from lightpaint.files import first_line
 from lightpaint.scene.scene import Scene
@@ -50,26 +50,26 @@ class Spool:
             self.folder = folder() / PARTS / name
             self._delete_leftovers()
             self.folder.mkdir(parents=True, exist_ok=True)
-            if not is_believed(self.folder.stat()):
+            if not is_trusted_owner(self.folder.stat()):
                 raise PermissionError(f"{self.folder} is somebody else's")
         except (OSError, OutputError):
             self.folder = Path(tempfile.mkdtemp(prefix="lightpaint-"))
 
     @property
-    def learned(self) -> Path:
-        """Path of the lesson."""
+    def guide_file(self) -> Path:
+        """Path of the guide's table."""
         return self.folder / "learned.npz"
 
-    def lesson(self) -> Floats | None:
-        """Return the lesson; None before it is learned."""
+    def guide_table(self) -> Floats | None:
+        """Return the table of the emitter guide; None before it is trained."""
         try:
-            return read_lesson(str(self.learned))
+            return read_guide_table(str(self.guide_file))
         except BasisError:
             return None
 
-    def keep_lesson(self, learned: Floats) -> None:
-        """Store the lesson. Raises OSError."""
-        _write(self.learned, compressed=True, learned=learned)
+    def keep_guide_table(self, table: Floats) -> None:
+        """Store the table of the emitter guide. Raises OSError."""
+        _write(self.guide_file, compressed=True, learned=table)
 
     def part(self, part: Part) -> tuple[Floats, Floats] | None:
         """Return the sums of a part; None if they are not stored, or damaged."""
@@ -101,12 +101,12 @@ class Spool:
                     shutil.rmtree(leftover, ignore_errors=True)
 
 
-def read_lesson(file: str) -> Floats:
-    """Return a saved lesson. Raises BasisError."""
+def read_guide_table(file: str) -> Floats:
+    """Return the table of the emitter guide that `file` holds. Raises BasisError."""
     try:
         with np.load(file, allow_pickle=False) as arrays:
-            learned: Floats = arrays["learned"]
-            return learned
+            table: Floats = arrays["learned"]
+            return table
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise BasisError(f"cannot read {file}: {first_line(error)}") from error
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.read import LightGroups
-from lightpaint.basis.render.lessons import lesson
+from lightpaint.basis.lightgroups.light_groups import LightGroups
+from lightpaint.basis.render.guide_training import train_guide
 from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
@@ -17,8 +17,8 @@ from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, p
 from lightpaint.batch.work.sums_answer import answer_by_sums, sums_of_rows
 from lightpaint.batch.work.task import EXPORT, Task
 from lightpaint.batch.work.work_items import (
+    GuideTraining,
     ItemResult,
-    Lesson,
     PartOfBasis,
     Passes,
     SumsOfRows,
@@ -78,9 +78,9 @@ def attempt(item: WorkItem, work: Callable[[], Any]) -> ItemResult:
 
 def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
     """Run an item; return its value, or None if it writes files instead."""
-    if isinstance(item, Lesson):
+    if isinstance(item, GuideTraining):
         cache.release_renderer()
-        return lesson(cache.film(item.film), item.seed)
+        return train_guide(cache.film(item.film), item.seed)
     if isinstance(item, PartOfBasis):
         return cache.renderer(item).render(item.part)
     if isinstance(item, SumsOfRows):

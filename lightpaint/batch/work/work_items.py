@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
-from lightpaint.basis.render.parts import Part
+from lightpaint.basis.render.render_parts import Part
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.lighting.fit import Emitters
 from lightpaint.pipeline.sources import Painting, SceneFile, vars_of
@@ -27,7 +27,7 @@ class WorkItem(Protocol):
 
     @property
     def kind(self) -> str:
-        """Kind: `answer` or `render` of a look, `lesson`, `part`, `rows`, `passes`."""
+        """Kind: `answer` or `render` of a look, `training`, `part`, `rows`, `passes`."""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -105,14 +105,14 @@ class SceneFilm:
 
 
 @dataclass(frozen=True)
-class Lesson:
-    """An item that learns the emission by which parts of a basis sample."""
+class GuideTraining:
+    """An item that trains the emitter guide of a basis."""
 
     name: str
     film: SceneFilm
     seed: int
     expected_s: float
-    kind: Literal["lesson"] = "lesson"
+    kind: Literal["training"] = "training"
     writes: str = ""
     carried: tuple[str, ...] = ()
 
@@ -121,20 +121,20 @@ class Lesson:
         """Files of the scene."""
         return self.film.files
 
-    def with_paths(self, move: PathMap) -> "Lesson":
+    def with_paths(self, move: PathMap) -> "GuideTraining":
         """Return the same item with other paths."""
         return replace(self, film=self.film.with_paths(move))
 
 
 @dataclass(frozen=True)
 class PartOfBasis:
-    """An item that renders a part of a basis. learned: file of the lesson; "" if there is none."""
+    """An item that renders a part of a basis. guide_file: of the guide's table; "" if none."""
 
     name: str
     film: SceneFilm
     part: Part
     seed: int
-    learned: str
+    guide_file: str
     expected_s: float
     kind: Literal["part"] = "part"
     writes: str = ""
@@ -146,13 +146,13 @@ class PartOfBasis:
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """File of the lesson."""
-        return (self.learned,) if self.learned else ()
+        """File of the guide's table."""
+        return (self.guide_file,) if self.guide_file else ()
 
     def with_paths(self, move: PathMap) -> "PartOfBasis":
         """Return the same item with other paths."""
-        learned = move(self.learned) if self.learned else ""
-        return replace(self, film=self.film.with_paths(move), learned=learned)
+        guide_file = move(self.guide_file) if self.guide_file else ""
+        return replace(self, film=self.film.with_paths(move), guide_file=guide_file)
 
 
 @dataclass(frozen=True)
@@ -177,14 +177,14 @@ class PaintingOfSums:
 class SumsOfRows:
     """An item that renders rows of a basis, and returns only their sums with paintings.
 
-    part: the rows with all their samples. learned: see `PartOfBasis`. files: of the paintings.
+    part: the rows with all their samples. guide_file: see `PartOfBasis`. files: of the paintings.
     """
 
     name: str
     film: SceneFilm
     part: Part
     seed: int
-    learned: str
+    guide_file: str
     paintings: tuple[PaintingOfSums, ...]
     files: tuple[str, ...]
     expected_s: float
@@ -198,15 +198,15 @@ class SumsOfRows:
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """File of the lesson."""
-        return (self.learned,)
+        """File of the guide's table."""
+        return (self.guide_file,)
 
     def with_paths(self, move: PathMap) -> "SumsOfRows":
         """Return the same item with other paths."""
         return replace(
             self,
             film=self.film.with_paths(move),
-            learned=move(self.learned),
+            guide_file=move(self.guide_file),
             paintings=tuple(painting.with_paths(move) for painting in self.paintings),
             files=tuple(map(move, self.files)),
         )

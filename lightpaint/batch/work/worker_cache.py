@@ -3,10 +3,10 @@
 from collections.abc import Collection
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis
-from lightpaint.basis.render.parts import PartRenderer
+from lightpaint.basis.basis_file import read_basis
+from lightpaint.basis.render.render_parts import PartRenderer
 from lightpaint.batch.work.render_passes import PassRenderer
-from lightpaint.batch.work.spool import read_lesson
+from lightpaint.batch.work.spool import read_guide_table
 from lightpaint.batch.work.task import key_of_basis
 from lightpaint.batch.work.work_items import (
     PaintingOfSums,
@@ -60,12 +60,12 @@ class WorkerCache:
 
     def renderer(self, item: PartOfBasis | SumsOfRows) -> PartRenderer:
         """Return the renderer of a part; it stays loaded until an item of another basis comes."""
-        key = repr((item.film.key, item.seed, item.learned))
+        key = repr((item.film.key, item.seed, item.guide_file))
         if not isinstance(self._renderer, PartRenderer) or self._rendered != key:
             self.release_renderer()
             scene = self.film(item.film)
-            learned = read_lesson(item.learned) if item.learned else None
-            self._renderer, self._rendered = PartRenderer(scene, item.seed, learned), key
+            guide_table = read_guide_table(item.guide_file) if item.guide_file else None
+            self._renderer, self._rendered = PartRenderer(scene, item.seed, guide_table), key
         return self._renderer
 
     def frame(self, item: Passes) -> PassRenderer:

@@ -17,16 +17,16 @@ def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
     if action != "drop" and names:
         raise BasisError(f"cache {action} takes no name: did you mean cache drop {names[0]}?")
     if action == "list":
-        kept, about = bases.entries(), {"folder": str(folder()), "largest": bases.LARGEST}
+        kept, about = bases.entries(), {"folder": str(folder()), "largest": bases.MAX_BYTES}
         tables.show_kept(kept)
         size = sum(entry.size for entry in kept) / 1e6
-        terminal.write(f"kept in {folder()}: {size:.0f} of at most {bases.LARGEST / 1e6:.0f} MB")
+        terminal.write(f"kept in {folder()}: {size:.0f} of at most {bases.MAX_BYTES / 1e6:.0f} MB")
         listed = [documents.kept_document(entry) for entry in reversed(kept)]
         return CommandOutcome(lambda: {**about, "kept": listed})
     dropped = bases.entries() if action == "clear" else _kept_by_names(names)
-    freed = bases.drop(dropped)
+    freed = bases.delete_entries(dropped)
     if action == "clear":
-        freed += bases.sweep()
+        freed += bases.delete_orphans()
     if action == "drop":
         tables.show_kept(dropped)
     terminal.write(f"{len(dropped)} deleted from {folder()}: {freed / 1e6:.1f} MB are free")
@@ -42,7 +42,7 @@ def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
         )
     found: dict[Path, bases.Entry] = {}
     for name in names:
-        if not (its := bases.named(name)):
+        if not (its := bases.entries_named(name)):
             scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
             there = some_names(sorted(scenes)) or "none"
             raise BasisError(f"no basis of {name!r} is kept in {folder()}: it has {there}")

@@ -56,7 +56,7 @@ def _value(text: str) -> Any:
 
 
 def lock(text: str) -> tuple[str, Any]:
-    """Parse a light to keep as it is, `NAME`, or at a level, `NAME=LEVEL`."""
+    """Parse a light to keep as it is, `NAME_FIELD`, or at a level, `NAME=LEVEL`."""
     return named(text) if "=" in text else (text.strip(), True)
 
 

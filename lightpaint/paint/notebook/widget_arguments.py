@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.answer.lighting import Lighting

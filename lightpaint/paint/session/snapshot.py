@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes
+from lightpaint.basis.denoised_planes import DenoisedPlanes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
@@ -101,7 +101,7 @@ class SessionSnapshot:
         return why_not_closer(analysis), np.round(255 * missed).astype(np.uint8)
 
     def preview(
-        self, weights: Doubles, view: int = 0, *, clean: CleanPlanes | None = None
+        self, weights: Doubles, view: int = 0, *, clean: DenoisedPlanes | None = None
     ) -> "ChangePreview":
         """Return what the answer to these requests would change of the present one, (n, 3), in a
         view.

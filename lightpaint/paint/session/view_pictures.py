@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.clean import CleanPlanes, RoughPlanes, as_halves, scale_of
+from lightpaint.basis.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.paint.protocol import ViewInfo
 from lightpaint.paint.session import picture_table
@@ -23,7 +23,7 @@ def offer_transforms(table: PictureTable, transforms: Sequence[ViewTransform]) -
 
 
 def offer_view(
-    table: PictureTable, view: Canvas, transform: ViewTransform, clean: CleanPlanes | None
+    table: PictureTable, view: Canvas, transform: ViewTransform, clean: DenoisedPlanes | None
 ) -> None:
     """Offer the pictures of a view; rough planes stand in for denoised ones that are not
     made yet.

@@ -10,7 +10,7 @@ from string import Template
 
 import numpy as np
 
-from lightpaint.basis.lightgroups.read import LightGroups
+from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.colour.color import luminance
 from lightpaint.files import write_text
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts

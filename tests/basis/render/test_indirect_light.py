@@ -8,9 +8,9 @@ import pytest
 from renderer import write_room
 
 from lightpaint.basis.render import integrators
-from lightpaint.basis.render.lessons import lesson
-from lightpaint.basis.render.parts import PartRenderer, PartSums, plan_parts
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.guide_training import train_guide
+from lightpaint.basis.render.render_parts import PartRenderer, PartSums, plan_parts
 from lightpaint.scene.scene import Scene, load_scene
 
 SPP = 16
@@ -50,19 +50,19 @@ def test_sums_of_both_do_not_depend_on_keeping_them_apart(
 
 
 def test_parts_in_any_order_make_the_same(small_room: Scene, monkeypatch: pytest.MonkeyPatch):
-    from lightpaint.basis.render import parts
+    from lightpaint.basis.render import render_parts
 
-    monkeypatch.setattr(parts, "SAMPLES", 2**11)
-    learned = lesson(small_room, 0)
+    monkeypatch.setattr(render_parts, "PART_SAMPLES", 2**11)
+    guide_table = train_guide(small_room, 0)
     plan = plan_parts(small_room, SPP)
     assert len(plan) > 2
     order = list(plan)
     random.Random(1).shuffle(order)
-    sums, renderer = PartSums(small_room, plan, seed=0), PartRenderer(small_room, 0, learned)
+    sums, renderer = PartSums(small_room, plan, seed=0), PartRenderer(small_room, 0, guide_table)
     for part in order:
         sums.add(part, *renderer.render(part))
     renderer.close()
-    made, whole = sums.basis(learned).indirect, render_basis(small_room, spp=SPP).indirect
+    made, whole = sums.basis(guide_table).indirect, render_basis(small_room, spp=SPP).indirect
     assert made is not None
     assert whole is not None
     np.testing.assert_array_equal(made.planes.array(), whole.planes.array())
@@ -95,7 +95,7 @@ def test_what_went_on_from_a_basis_without_it_does_not(
 
 def test_planes_of_several_bases_bring_it_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A scene that gained a light: its own plane is rendered, the others come from the cache."""
-    from lightpaint.basis.render.obtain import obtain_basis
+    from lightpaint.basis.render.cached_render import obtain_basis
 
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     scene = load_scene(write_room(tmp_path))

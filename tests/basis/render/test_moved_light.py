@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, render_in_parts, same_basis, write_room
 
-from lightpaint.basis import cache, file
+from lightpaint.basis import basis_file, cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis, write_basis
+from lightpaint.basis.basis_file import read_basis, write_basis
 from lightpaint.basis.file_planes import FilePlanes
-from lightpaint.basis.render import obtain as obtain_module
-from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render import cached_render as obtain_module
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.batch.work.basis_parts import PartwiseRender
 from lightpaint.batch.work.work import run_item
 from lightpaint.batch.work.work_items import ItemResult, SceneFilm
@@ -307,15 +307,15 @@ def test_what_is_larger_than_memory(
 ) -> None:
     first = obtain_basis(room(tmp_path), spp=16)
     expected = obtain_basis(room(tmp_path, MOVED), spp=16)
-    cache.drop([entry for entry in cache.entries() if entry.origin == expected.origin])
-    monkeypatch.setattr(file, "IN_MEMORY", 0)
+    cache.delete_entries([entry for entry in cache.entries() if entry.origin == expected.origin])
+    monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     large = obtain_basis(room(tmp_path, MOVED), spp=16)
     assert [its[0] for its in rendered] == [NAMES, ("bulb",), ("bulb",)]
     assert isinstance(large.planes, FilePlanes)
     assert taken(large, first) == {*NAMES} - {"bulb"}
     assert large.lights == expected.lights
     # Where it cannot be kept it stays in several files.
-    cache.drop([entry for entry in cache.entries() if entry.origin == large.origin])
+    cache.delete_entries([entry for entry in cache.entries() if entry.origin == large.origin])
     monkeypatch.setattr(cache, "keep", lambda basis: False)
     apart = obtain_basis(room(tmp_path, MOVED), spp=16)
     assert taken(apart, large) >= {*NAMES} - {"bulb"}
@@ -355,7 +355,7 @@ def test_planes_without_an_identity_are_none_of_anybodys(
     """As in files of versions that knew of none."""
     first = obtain_basis(room(tmp_path), spp=16)
     lights = tuple(replace(light, identity="") for light in first.lights)
-    cache.drop(cache.entries())
+    cache.delete_entries(cache.entries())
     assert cache.keep(replace(first, lights=lights))
     obtain_basis(room(tmp_path, MOVED), spp=16)
     assert [its[0] for its in rendered] == [NAMES] * 2

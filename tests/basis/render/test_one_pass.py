@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from renderer import CORNELL, LIGHTS, REPOSITORY, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
-from lightpaint.basis.render.budget import Budget, Keeper
-from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
-from lightpaint.basis.render.render import (
+from lightpaint.basis.render.basis_render import (
     ONE_PASS,
     SEPARATE,
     _render_one_by_one,
     memory_needed,
     render_basis,
 )
-from lightpaint.basis.render.separate import BLACK, WHITE
+from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
+from lightpaint.basis.render.render_budget import Budget, Keeper
+from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import SceneError
 from lightpaint.pipeline.remarks import remarks_of_scene
 from lightpaint.progress import silent
@@ -362,9 +362,9 @@ def test_planes_of_the_scenes_that_come_along_add_up_to_their_render(name: str, 
             assert abs(gap[where].sum()) <= 4.5 * np.sqrt(noise[where].sum()), (rows, columns)
 
 
-@pytest.mark.parametrize("questions", [(1, 1), (2, 1), (8, 8)])
-def test_any_number_of_questions_has_the_same_mean(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, questions: tuple[int, int]
+@pytest.mark.parametrize("emitter_samples", [(1, 1), (2, 1), (8, 8)])
+def test_any_number_of_emitter_samples_has_the_same_mean(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, emitter_samples: tuple[int, int]
 ) -> None:
     """By chance, by choice and, on a glossy wall beside a panel, by both."""
     use_variant()
@@ -373,8 +373,8 @@ def test_any_number_of_questions_has_the_same_mean(
     lights = LIGHTS["panel"] + LIGHTS["beam"] + LIGHTS["sky"]
     scene = load_scene(write_room(tmp_path, lights=lights))
     usual = render_basis(scene, spp=1024, seed=1)
-    monkeypatch.setattr(module, "FIRST_QUESTIONS", questions[0])
-    monkeypatch.setattr(module, "LATER_QUESTIONS", {2**32: questions[1]})
+    monkeypatch.setattr(module, "FIRST_EMITTER_SAMPLES", emitter_samples[0])
+    monkeypatch.setattr(module, "LATER_EMITTER_SAMPLES", {2**32: emitter_samples[1]})
     other = render_basis(scene, spp=1024, seed=2)
     gap = (other.images - usual.images).sum(axis=(1, 2), dtype=np.float64)
     noise = np.square(usual.half_differences, dtype=np.float64).sum(axis=(1, 2))

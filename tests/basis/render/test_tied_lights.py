@@ -7,10 +7,10 @@ import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis, write_basis
-from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.render import SEPARATE, is_of, render_basis
-from lightpaint.basis.render.separate import BLACK, WHITE
+from lightpaint.basis.basis_file import read_basis, write_basis
+from lightpaint.basis.render.basis_render import SEPARATE, is_of, render_basis
+from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.scene import Scene, load_scene
 

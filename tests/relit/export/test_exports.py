@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from light_groups import channels, interleaved, multi_part, pictures, write
 
 import lightpaint as lp
-from lightpaint.basis.lightgroups.read import LightGroups, read_light_groups
+from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_groups
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.exports import (
@@ -416,7 +416,7 @@ def test_no_renderer_is_imported(tmp_path: Path):
         "import sys, lightpaint as lp\n"
         "from pathlib import Path\n"
         "from lightpaint.cli.options.job_options import *\n"
-        "from lightpaint.basis.lightgroups.read import read_light_groups\n"
+        "from lightpaint.basis.lightgroups.light_groups import read_light_groups\n"
         "from lightpaint.relit.export.exports import write_exports\n"
         "here = Path(sys.argv[1])\n"
         "groups = read_light_groups(here / 'groups.exr')\n"

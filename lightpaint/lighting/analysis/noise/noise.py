@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
-from lightpaint.basis.planes import BLOCK, FEW_LIGHTS, Planes, run_of
+from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
 from lightpaint.lighting.analysis.noise.peaks import Peaks
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -89,7 +89,7 @@ def noise_sums(solution: Solution) -> Noise:
     # A dimmer, a tie or a limit on luminance couples channels, as the one weight of a scalar light.
     is_coupled = len(problem.full.channel_groups) < 3
     # The same parts on every machine, added in order, give the same bits.
-    length = BLOCK * max(1, -(-counted.size // (BLOCK * PARTS)))
+    length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
     sums = [_Sums.zeros(len(weights))] + (
         parallel_map(lambda its: pixels.sums(its, weights, pulled, is_coupled=is_coupled), parts)
@@ -97,8 +97,8 @@ def noise_sums(solution: Solution) -> Noise:
         else [pixels.sums(its, weights, pulled, is_coupled=is_coupled) for its in parts]
     )
     error, noise = np.zeros((2, 3))
-    for start in range(0, len(weight), BLOCK):
-        its = slice(start, start + BLOCK)
+    for start in range(0, len(weight), BLOCK_PIXELS):
+        its = slice(start, start + BLOCK_PIXELS)
         mixed = residuals.noise(its)
         error += np.square(weight[its] * residuals.residual(its) * mixed).sum(axis=0)
         noise += (weight[its] * np.square(mixed)).sum(axis=0)
@@ -149,8 +149,8 @@ class _Pixels:
         how much noise moves the pull.
         """
         made = _Sums.zeros(len(weights))
-        for start in range(0, counted.size, BLOCK):
-            pixels = run_of(counted[start : start + BLOCK])
+        for start in range(0, counted.size, BLOCK_PIXELS):
+            pixels = as_slice(counted[start : start + BLOCK_PIXELS])
             both = self.noise.pixels(pixels), self.planes.pixels(pixels)
             missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
             rows = [self._rows(made, pixels, both, missed, c, weights, pulled) for c in range(3)]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.planes import BLOCK
+from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
 from lightpaint.lighting.solution import Solution
 
@@ -69,8 +69,8 @@ def _least_power(image: Floats, half: Floats, D: Floats) -> tuple[float, float]:
     That is ‖Φ‖² ≥ (Σ D Φ)² / Σ D. Also returns the standard error of Σ D h². All (pixels,).
     """
     squares = light = lights = total = 0.0
-    for start in range(0, image.size, BLOCK):
-        its = slice(start, start + BLOCK)
+    for start in range(0, image.size, BLOCK_PIXELS):
+        its = slice(start, start + BLOCK_PIXELS)
         d, f, h = (x[its].astype(np.float64) for x in (D, image, half))
         squares += float(np.square(d * h * h).sum())
         light, lights = light + float(d @ f), lights + float(np.square(d * f).sum())

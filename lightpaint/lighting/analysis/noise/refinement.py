@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.basis.planes import BLOCK
+from lightpaint.basis.planes import BLOCK_PIXELS
 from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
@@ -119,8 +119,8 @@ def _push_covariance(solution: Solution, noise: Floats, to: Doubles) -> Doubles:
     weight = solution.weight.reshape(len(noise), -1)
     covariance = np.zeros((to.shape[1], to.shape[1]))
     counted = np.flatnonzero(solution.importance)
-    for start in range(0, counted.size, BLOCK):
-        pixels = counted[start : start + BLOCK]
+    for start in range(0, counted.size, BLOCK_PIXELS):
+        pixels = counted[start : start + BLOCK_PIXELS]
         lit, push = basis.planes.pixels(pixels), np.zeros((to.shape[1], pixels.size))
         for c in np.flatnonzero(along.any(axis=(1, 2))):
             pulls = weight[pixels, c % weight.shape[1]] * noise[pixels, c]

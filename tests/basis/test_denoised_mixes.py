@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lightpaint.basis.basis import Basis, IndirectLight, Origin
-from lightpaint.basis.clean_mix import blend_by_noise, clean_mix, clean_plane
-from lightpaint.basis.file import as_stored, read_basis, write_basis
+from lightpaint.basis.basis_file import as_stored, read_basis, write_basis
+from lightpaint.basis.denoised_mixes import blend_by_noise, denoise_mix, denoise_plane
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import as_planes
 from lightpaint.errors import BasisError
@@ -71,20 +71,20 @@ def test_edges_of_direct_light_survive(rng: np.random.Generator):
     basis, truth = split_basis(pools, smooth, rng), pools + smooth
     whole = denoised(basis.planes.plane(0), None)
     error = {
-        "split": np.square(clean_plane(basis, 0) - truth).mean(),
+        "split": np.square(denoise_plane(basis, 0) - truth).mean(),
         "whole": np.square(whole - truth).mean(),
         "raw": np.square(basis.planes.plane(0) - truth).mean(),
     }
     assert error["split"] < 0.3 * error["whole"]
     assert error["split"] < 0.1 * error["raw"]
-    twice = clean_mix(basis, np.full((1, 3), 2.0))
-    np.testing.assert_allclose(twice, 2 * clean_plane(basis, 0), rtol=2e-3, atol=1e-4)
+    twice = denoise_mix(basis, np.full((1, 3), 2.0))
+    np.testing.assert_allclose(twice, 2 * denoise_plane(basis, 0), rtol=2e-3, atol=1e-4)
 
 
 def test_without_indirect_light_all_of_it_is_denoised(make_basis: Any):
     basis = make_basis(2, SIZE)
     expected = denoised(basis.planes.plane(1), basis.features)
-    np.testing.assert_array_equal(clean_plane(basis, 1), expected)
+    np.testing.assert_array_equal(denoise_plane(basis, 1), expected)
 
 
 def test_indirect_light_is_of_the_lights_of_its_basis(make_basis: Any):

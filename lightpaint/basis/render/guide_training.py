@@ -1,4 +1,4 @@
-"""The lesson that comes before a basis: which emitter matters where.
+"""Training of the emitter guide before a basis is rendered: which emitter matters where.
 
 It is the same for all numbers of samples, budgets and machines, since it depends on the scene and
 the seed alone. So samples choose emitters alike whoever renders them, and none waits for another.
@@ -16,33 +16,36 @@ from lightpaint.scene.scene_render import view_seed
 if TYPE_CHECKING:
     from lightpaint.basis.render.one_pass import Tracer
 
-#: Camera samples of the passes of a lesson. Each chooses by what those before have learned.
-LESSON = (2**16, 2**17, 2**17)
+#: Camera samples of the training passes. Each samples by what those before have learned.
+TRAINING_SAMPLES = (2**16, 2**17, 2**17)
 
 
 @MITSUBA.taken()
-def lesson(scene: Scene, seed: int) -> Floats:
-    """Learn which emitters to choose where in `scene`, as `Basis.learned` says it."""
+def train_guide(scene: Scene, seed: int) -> Floats:
+    """Learn which emitters to choose where in `scene`, and return the `Basis.guide_table`."""
     from lightpaint.basis.render.one_pass import Tracer
 
     tracer = Tracer(scene, view_seed(seed, scene.sensor))
     try:
         with tracing() as let_others_through:
-            return teach(tracer, let_others_through)
+            return train(tracer, let_others_through)
     finally:
         tracer.close()
         gc.collect()
 
 
-def teach(tracer: "Tracer", let_others_through: Callable[[], None]) -> Floats:
-    """Teach `tracer` the lesson. Returns it. let_others_through: called between its passes."""
+def train(tracer: "Tracer", let_others_through: Callable[[], None]) -> Floats:
+    """Train the guide of `tracer`, and return its table.
+
+    let_others_through: called between passes.
+    """
     (height, width), done = tracer.scene.size, 0
-    for k, samples in enumerate(LESSON):
+    for k, samples in enumerate(TRAINING_SAMPLES):
         let_others_through()
-        # Of a large picture some rows tell enough, each time others.
+        # In a large picture some rows are enough, other ones in each pass.
         step = min(max(1, height * width // samples), height)
-        rows = range(k * step // len(LESSON), height, step)
+        rows = range(k * step // len(TRAINING_SAMPLES), height, step)
         spp = max(1, samples // (len(rows) * width))
         tracer.learn(rows, done, spp)
         done += spp
-    return tracer.end_lesson()
+    return tracer.end_training()

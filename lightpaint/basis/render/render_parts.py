@@ -18,9 +18,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import as_planes
-from lightpaint.basis.render.budget import SHORTER, half_of
-from lightpaint.basis.render.integrators import plane_count
-from lightpaint.basis.render.render import (
+from lightpaint.basis.render.basis_render import (
     ONE_PASS,
     basis_lights,
     basis_of_sums,
@@ -28,16 +26,23 @@ from lightpaint.basis.render.render import (
     origin_of,
     with_first_hits,
 )
-from lightpaint.basis.render.separate import LightSums, emitters_seen, light_pass, plan_of_light
+from lightpaint.basis.render.integrators import plane_count
+from lightpaint.basis.render.render_budget import PASS_DIVISOR, half_of
+from lightpaint.basis.render.separate_renders import (
+    LightSums,
+    emitters_seen,
+    light_pass,
+    plan_of_light,
+)
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, largest_pass, view_seed
 
 #: Camera samples of a part: some seconds of one processor, which is what an accident costs.
-SAMPLES = SAMPLES_PER_PASS // 2
+PART_SAMPLES = SAMPLES_PER_PASS // 2
 
 #: Bytes of a part's images, at most.
-BYTES = 2**27
+PART_MAX_BYTES = 2**27
 
 
 @dataclass(frozen=True)
@@ -80,8 +85,8 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
     if left <= 0:
         return []
     # So few rows that they are some seconds of work, for all of the samples.
-    by_work = SAMPLES // (2 * width * left)
-    by_memory = BYTES // (2 * plane_count(scene) * width * 12)
+    by_work = PART_SAMPLES // (2 * width * left)
+    by_memory = PART_MAX_BYTES // (2 * plane_count(scene) * width * 12)
     count = -(-height // max(1, min(by_work, by_memory)))
     edges = [height * k // count for k in range(count + 1)]
     return [Part(top, bottom, done, left) for top, bottom in pairwise(edges)]
@@ -104,11 +109,15 @@ def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:
 class PartRenderer:
     """Renders parts of one scene, which stays loaded between them: close it before another is.
 
-    learned: as `lesson` returned it, or the `learned` of the basis that is gone on from.
+    guide_table: from `train_guide`, or that of the basis to which samples are added.
     """
 
-    def __init__(self, scene: Scene, seed: int, learned: Floats | None) -> None:
-        self._scene, self._seed, self._learned = scene, view_seed(seed, scene.sensor), learned
+    def __init__(self, scene: Scene, seed: int, guide_table: Floats | None) -> None:
+        self._scene, self._seed, self._guide_table = (
+            scene,
+            view_seed(seed, scene.sensor),
+            guide_table,
+        )
         self._tracer: Any = None
         self._light: int | None = None
         self._loaded: Any = None
@@ -125,10 +134,10 @@ class PartRenderer:
         if self._tracer is None:
             from lightpaint.basis.render.one_pass import Tracer
 
-            self._tracer = Tracer(self._scene, self._seed, self._learned)
+            self._tracer = Tracer(self._scene, self._seed, self._guide_table)
         rows, size = range(part.top, part.bottom), (part.bottom - part.top, self._scene.size[1])
         # A kernel that runs cannot be interrupted.
-        step = largest_pass(size[0] * size[1], shorter=SHORTER)
+        step = largest_pass(size[0] * size[1], shorter=PASS_DIVISOR)
         halves = [self._tracer.planes(rows) for _ in range(2)]
         with tracing() as let_others_through:
             for half, planes in enumerate(halves):
@@ -193,10 +202,10 @@ class PartSums:
         self._halves[:, :, part.top : part.bottom] = planes
         self._seen[part.top : part.bottom] = seen.sum(axis=0)
 
-    def basis(self, learned: Floats | None) -> Basis:
+    def basis(self, guide_table: Floats | None) -> Basis:
         """Return the basis, once all parts are added; the sums are released.
 
-        learned: what the parts chose by.
+        guide_table: by which the parts chose emitters.
         """
         assert not self._left
         scene, start = self._scene, self._start
@@ -207,7 +216,9 @@ class PartSums:
             made = start
         else:
             halves, seen = list(self._halves), self._seen > 0
-            made = basis_of_sums(scene, self._seed, halves, seen, self._half, learned, start=start)
+            made = basis_of_sums(
+                scene, self._seed, halves, seen, self._half, guide_table, start=start
+            )
         if start is not None:
             made = replace(made, features=start.features, objects=start.objects)
         return with_first_hits(made, scene, self._seed)

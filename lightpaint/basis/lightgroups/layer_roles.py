@@ -4,15 +4,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from lightpaint.basis.lightgroups.beauty import (
+from lightpaint.basis.lightgroups.beauty_comparison import (
     LayerSum,
-    beauty_among,
-    beauty_by_sum,
-    stranger_among,
+    find_beauty,
+    find_beauty_of_lights,
+    unrelated_layer,
 )
-from lightpaint.basis.lightgroups.conventions import is_known
-from lightpaint.basis.lightgroups.layers import RenderLayer
-from lightpaint.basis.lightgroups.naming import FILES, Choice, choose_files, choose_layers
+from lightpaint.basis.lightgroups.layer_choice import (
+    ONE_FILE_PER_LIGHT,
+    LayerChoice,
+    choose_files,
+    choose_layers,
+)
+from lightpaint.basis.lightgroups.naming_conventions import is_known
+from lightpaint.basis.lightgroups.render_layers import RenderLayer
 
 
 @dataclass(frozen=True)
@@ -35,16 +40,16 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
     pattern: as of `choose_layers`.
     """
     layers = {layer.name: layer for layer in read}
-    choice = _choose(path, layers, pattern)
+    choice = _choose_roles(path, layers, pattern)
     lights = {name: layers[layer] for name, layer in choice.lights.items()}
     beauty = layers[choice.beauty] if choice.beauty is not None else None
     if beauty is None:
         used = {id(layer) for layer in lights.values()}
         others = [layer for layer in layers.values() if id(layer) not in used]
-        beauty = beauty_by_sum(others, list(lights.values()))
+        beauty = find_beauty_of_lights(others, list(lights.values()))
     remarks = list(choice.remarks)
-    if choice.renderer == FILES:
-        beauty, told = _parted(lights, beauty)
+    if choice.renderer == ONE_FILE_PER_LIGHT:
+        beauty, told = _remove_non_lights(lights, beauty)
         remarks += told
     for name, layer in choice.whole.items():
         if beauty is None or beauty is layers[layer]:
@@ -56,12 +61,12 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
     in_order = {n: x for layer in read for n, x in lights.items() if x is layer}
     for name, layer in choice.beside.items():
         # Whether a renderer counts these among its groups depends on version and settings.
-        if beauty is None or _helps(layers[layer], list(in_order.values()), beauty):
+        if beauty is None or _improves_sum(layers[layer], list(in_order.values()), beauty):
             in_order[name] = layers[layer]
     return Roles(choice.renderer, choice.view, in_order, beauty, tuple(remarks))
 
 
-def _parted(
+def _remove_non_lights(
     lights: dict[str, RenderLayer], beauty: RenderLayer | None
 ) -> tuple[RenderLayer | None, list[str]]:
     """Remove from `lights` what is not one; return the picture, and sentences on this.
@@ -70,9 +75,9 @@ def _parted(
     up to it is no light, whatever it shows.
     """
     if beauty is None and len(lights) > 2:
-        beauty = beauty_among(list(lights.values()))
+        beauty = find_beauty(list(lights.values()))
         _drop(lights, beauty)
-    found = stranger_among(list(lights.values()), beauty)
+    found = unrelated_layer(list(lights.values()), beauty)
     if found is None:
         return beauty, []
     stranger, whole = found
@@ -93,7 +98,7 @@ def _is_light(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderL
     return LayerSum.of(lights).and_also(layer).lacks(beauty) < alone.lacks(beauty)
 
 
-def _helps(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
+def _improves_sum(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLayer) -> bool:
     """Return True if the lights, if there are any, come closer to the beauty with that layer."""
     if not lights:
         return True
@@ -101,7 +106,7 @@ def _helps(layer: RenderLayer, lights: Sequence[RenderLayer], beauty: RenderLaye
     return added.and_also(layer).lacks(beauty) < added.lacks(beauty)
 
 
-def _choose(path: Path, layers: dict[str, RenderLayer], pattern: str | None) -> Choice:
+def _choose_roles(path: Path, layers: dict[str, RenderLayer], pattern: str | None) -> LayerChoice:
     by_file: dict[Path, int] = {}
     for layer in layers.values():
         by_file[layer.file] = by_file.get(layer.file, 0) + 1

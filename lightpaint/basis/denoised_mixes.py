@@ -16,7 +16,7 @@ from lightpaint.images.estimate import box_mean
 RADIUS = 3
 
 
-def clean_mix(
+def denoise_mix(
     basis: Basis,
     weights: Doubles,
     *,
@@ -31,7 +31,7 @@ def clean_mix(
     if basis.indirect is None:
         return denoised(total, basis.features, quality=quality)
     parts = basis.indirect
-    return _joined(
+    return _denoise_parts(
         basis,
         total,
         basis.noise.mix(weights),
@@ -41,23 +41,23 @@ def clean_mix(
     )
 
 
-def clean_present(basis: Basis, *, quality: Quality = "fast") -> Floats:
+def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
     """Return the scene as it is without its grain, (h, w, 3) float32."""
     mixed = basis.present_look
-    return clean_mix(basis, basis.present_weights, mixed=mixed, quality=quality)
+    return denoise_mix(basis, basis.present_weights, mixed=mixed, quality=quality)
 
 
-def clean_plane(basis: Basis, k: int, *, quality: Quality = "fast") -> Floats:
+def denoise_plane(basis: Basis, k: int, *, quality: Quality = "fast") -> Floats:
     """Return the image of light k at unit emission without its grain, (h, w, 3) float32."""
     total = basis.planes.plane(k)
     if basis.indirect is None:
         return denoised(total, basis.features, quality=quality)
     parts = basis.indirect
     noise = basis.noise.plane(k)
-    return _joined(basis, total, noise, parts.planes.plane(k), parts.noise.plane(k), quality)
+    return _denoise_parts(basis, total, noise, parts.planes.plane(k), parts.noise.plane(k), quality)
 
 
-def _joined(
+def _denoise_parts(
     basis: Basis,
     total: Floats,
     noise: Floats,

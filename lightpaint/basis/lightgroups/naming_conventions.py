@@ -5,19 +5,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 #: What stands for the name of the light in a pattern.
-NAME = "{name}"
+NAME_FIELD = "{name}"
 
 #: The whole picture, in the words of most renderers; names compare without regard to case.
-BEAUTIES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
+BEAUTY_NAMES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
 
 #: What stands before a marker that no other word looks like: files are often named after a shot.
-PREFIX = r"(?:(?P<prefix>.+?)[ ._-])??"
+PREFIX_PATTERN = r"(?:(?P<prefix>.+?)[ ._-])??"
 
 #: Versions of a layer beside it, which would count a light twice. A pattern may still name them.
-BESIDE = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
+OTHER_VERSION = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
 
 #: What joins a name to what stands around it.
-JOINTS = " ._-"
+SEPARATORS = " ._-"
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Convention:
     beauty: str = ""
     whole: str | None = None
     beside: tuple[str, ...] = ()
-    light: str = NAME
+    light: str = NAME_FIELD
 
 
 CONVENTIONS = (
@@ -56,13 +56,13 @@ CONVENTIONS = (
     ),
     Convention(
         "LuxCore",
-        re.compile(PREFIX + r"RADIANCE_GROUP_(?P<name>\d+)(?:[ ._-].*)?"),
+        re.compile(PREFIX_PATTERN + r"RADIANCE_GROUP_(?P<name>\d+)(?:[ ._-].*)?"),
         "RGBA",
         light="group_{name}",
     ),
     Convention(
         "V-Ray or Corona",
-        re.compile(PREFIX + r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
+        re.compile(PREFIX_PATTERN + r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
         "RGBA",
         beside=("environment", "self illumination", "self_illumination", "selfillum", "rest"),
     ),
@@ -81,10 +81,10 @@ def is_known(name: str) -> bool:
     return any(convention.layer.fullmatch(name) for convention in CONVENTIONS)
 
 
-def beauty_among(names: Iterable[str], *, first: str = "") -> str | None:
+def beauty_name(names: Iterable[str], *, first: str = "") -> str | None:
     """Return the name of the whole picture: `first`, else one of BEAUTIES; None if none is."""
     by_folded: dict[str, str] = {}
     for name in names:
         by_folded.setdefault(name.casefold(), name)
-    wanted = (first.casefold(), *BEAUTIES)
+    wanted = (first.casefold(), *BEAUTY_NAMES)
     return next((by_folded[name] for name in wanted if name in by_folded), None)

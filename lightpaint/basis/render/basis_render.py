@@ -10,16 +10,16 @@ from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis, IndirectLight, Origin
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import as_planes
-from lightpaint.basis.render.budget import Budget, Keeper, half_of, steps
+from lightpaint.basis.render.guide_training import train
+from lightpaint.basis.render.half_sums import add_halves, mean_and_half_difference
 from lightpaint.basis.render.integrators import has_indirect_planes, why_not_one_pass
-from lightpaint.basis.render.lessons import teach
-from lightpaint.basis.render.separate import (
+from lightpaint.basis.render.render_budget import Budget, Keeper, half_of, steps
+from lightpaint.basis.render.separate_renders import (
     LightSums,
     emitters_seen,
     plan_of_light,
     render_separately,
 )
-from lightpaint.basis.render.sums import add_halves, mean_and_half_difference
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
@@ -233,7 +233,7 @@ def basis_of_sums(
     halves: Sequence[Floats],
     seen: Bools,
     half_spp: int,
-    learned: Floats | None,
+    guide_table: Floats | None,
     *,
     start: Basis | None,
     is_finished: bool = True,
@@ -267,7 +267,7 @@ def basis_of_sums(
             (half_spp, half_spp),
             FINISHED if is_finished else UNFINISHED,
         ),
-        learned,
+        guide_table,
         indirect=IndirectLight(*map(as_planes, mean_and_half_difference(indirect, spp)))
         if is_split
         else None,
@@ -290,8 +290,8 @@ def _render_together(
     height, width = scene.size
     rows = range(height)
     begun = done = 0 if start is None else start.origin.halves[0]
-    learned = None if start is None else start.learned
-    tracer = Tracer(scene, view_seed(seed, scene.sensor), learned)
+    guide_table = None if start is None else start.guide_table
+    tracer = Tracer(scene, view_seed(seed, scene.sensor), guide_table)
     halves = [tracer.planes(rows) for _ in range(2)]
 
     def basis(*, is_last: bool = False, is_finished: bool = False) -> Basis:
@@ -302,14 +302,14 @@ def _render_together(
             if is_last:  # saves as much memory again
                 halves[half] = tracer.planes(range(0))
         return basis_of_sums(
-            scene, seed, sums, seen, done, tracer.learned, start=start, is_finished=is_finished
+            scene, seed, sums, seen, done, tracer.guide_table, start=start, is_finished=is_finished
         )
 
     try:
         with tracing() as let_others_through:
             for spp in steps(height * width, budget, done, progress):
-                if not tracer.is_taught:
-                    teach(tracer, let_others_through)
+                if not tracer.is_trained:
+                    train(tracer, let_others_through)
                 for half, planes in enumerate(halves):
                     let_others_through()
                     tracer.add(planes, half, rows, done, spp)

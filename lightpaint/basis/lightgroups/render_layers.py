@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.lightgroups.conventions import is_known
-from lightpaint.basis.lightgroups.folder import files_in
-from lightpaint.basis.lightgroups.naming import short_names
+from lightpaint.basis.lightgroups.folder_files import candidate_files
+from lightpaint.basis.lightgroups.layer_choice import short_names
+from lightpaint.basis.lightgroups.naming_conventions import is_known
 from lightpaint.colour.primaries import are_same, converted, to_rec709
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats.exr import ExrPart, read_parts
@@ -76,7 +76,7 @@ def read_layers(
     path = Path(path)
     remarks: list[str] = []
     if path.is_dir():
-        files, remarks = files_in(path, leave_out)
+        files, remarks = candidate_files(path, leave_out)
         layers = _of_files(files)
     else:
         layers = _of_file(path)

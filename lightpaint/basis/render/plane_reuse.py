@@ -14,12 +14,12 @@ import numpy as np
 from lightpaint.arrays import Bools
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, IndirectLight
-from lightpaint.basis.composed_planes import Pick, compose_planes
-from lightpaint.basis.file import is_large
+from lightpaint.basis.basis_file import is_large
+from lightpaint.basis.composed_planes import PlaneReference, compose_planes
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.planes import Planes
-from lightpaint.basis.render.render import ONE_PASS, basis_lights, method_of, origin_of
-from lightpaint.basis.render.separate import emitters_seen
+from lightpaint.basis.render.basis_render import ONE_PASS, basis_lights, method_of, origin_of
+from lightpaint.basis.render.separate_renders import emitters_seen
 from lightpaint.scene.emission import ENVIRONMENTS
 from lightpaint.scene.scene import Scene
 from lightpaint.version import __version__
@@ -36,17 +36,17 @@ class KeptPlane:
     index: int
 
     @property
-    def plane(self) -> Pick:
+    def plane(self) -> PlaneReference:
         """Its image."""
         return self.basis.planes, self.index
 
     @property
-    def noise(self) -> Pick:
+    def noise(self) -> PlaneReference:
         """Half the difference of its halves."""
         return self.basis.noise, self.index
 
     @property
-    def indirect(self) -> tuple[Pick, Pick] | None:
+    def indirect(self) -> tuple[PlaneReference, PlaneReference] | None:
         """Image and half difference of its indirect part; None where that is not known."""
         parts = self.basis.indirect
         if parts is None:
@@ -65,7 +65,7 @@ def counts_of(basis: Basis) -> Sequence[Counts]:
     return origin.each_light or [(*origin.halves, *origin.passes)] * len(basis.lights)
 
 
-def gather(scene: Scene, kept: Basis | None, *, spp: int | None, seed: int) -> Basis | None:
+def gather_planes(scene: Scene, kept: Basis | None, *, spp: int | None, seed: int) -> Basis | None:
     """Return a basis of `scene` of the planes that the cache has of it, whatever scene they are of.
 
     Lights of which it has none are black, without a sample. None where it has none at all.
@@ -93,15 +93,16 @@ def gather(scene: Scene, kept: Basis | None, *, spp: int | None, seed: int) -> B
         candidates.remove(best)
         if (other := cache.read(best)) is not None:
             found = [
-                _better(its, other, identity) for its, identity in zip(found, wanted, strict=True)
+                _better_sampled(its, other, identity)
+                for its, identity in zip(found, wanted, strict=True)
             ]
     sources = {id(its.basis): its.basis for its in found if its is not None}
     if not sources or [*sources.values()] == [kept]:
         return kept
-    return _composed(scene, seed, found, _seen_in(scene, [*sources.values()]))
+    return _compose_basis(scene, seed, found, _emitters_seen_in(scene, [*sources.values()]))
 
 
-def lights_behind(basis: Basis, spp: int | None) -> tuple[list[str], int | None]:
+def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int | None]:
     """Return which lights are to be rendered next, and how many samples per pixel they come to.
 
     Those with fewest, up to those that come next, until all have `spp`. For None, which stands for
@@ -119,7 +120,7 @@ def lights_behind(basis: Basis, spp: int | None) -> tuple[list[str], int | None]
     return names, min([spp, *(total for total in totals if total > fewest)])
 
 
-def part_of(basis: Basis, scene: Scene) -> Basis | None:
+def restrict(basis: Basis, scene: Scene) -> Basis | None:
     """Return what `basis` has of the lights of `scene`, which is its own with some `only`.
 
     None where it has no samples of them. They have equal numbers.
@@ -127,10 +128,10 @@ def part_of(basis: Basis, scene: Scene) -> Basis | None:
     sources = [KeptPlane(basis, basis.names.index(light.name)) for light in scene.lights]
     if not sum(sources[0].counts[:2]):
         return None
-    return _composed(scene, basis.origin.seed, sources, basis.emitters_seen)
+    return _compose_basis(scene, basis.origin.seed, sources, basis.emitters_seen)
 
 
-def merged(scene: Scene, whole: Basis, part: Basis) -> Basis:
+def merge(scene: Scene, whole: Basis, part: Basis) -> Basis:
     """Return `whole`, a basis of `scene`, with the planes of `part`, of some of its lights."""
     names = part.names
     sources = [
@@ -138,7 +139,7 @@ def merged(scene: Scene, whole: Basis, part: Basis) -> Basis:
         for i, name in enumerate(whole.names)
     ]
     seen = whole.emitters_seen | part.emitters_seen
-    made = _composed(scene, whole.origin.seed, sources, seen)
+    made = _compose_basis(scene, whole.origin.seed, sources, seen)
     return replace(made, features=part.features, objects=part.objects)
 
 
@@ -154,7 +155,7 @@ def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
     )
 
 
-def _better(its: KeptPlane | None, other: Basis, identity: str) -> KeptPlane | None:
+def _better_sampled(its: KeptPlane | None, other: Basis, identity: str) -> KeptPlane | None:
     """Return the plane of that identity in `other`, if it has more samples than `its`."""
     has = 0 if its is None else sum(its.counts[:2])
     for i, light in enumerate(other.lights):
@@ -166,7 +167,9 @@ def _better(its: KeptPlane | None, other: Basis, identity: str) -> KeptPlane | N
     return its
 
 
-def _composed(scene: Scene, seed: int, sources: Sequence[KeptPlane | None], seen: Bools) -> Basis:
+def _compose_basis(
+    scene: Scene, seed: int, sources: Sequence[KeptPlane | None], seen: Bools
+) -> Basis:
     """Return a basis of `scene` of these planes; None stands for a black one."""
     lights, size = basis_lights(scene), scene.size
     methods = [its.basis.origin.method for its in sources if its is not None]
@@ -177,7 +180,7 @@ def _composed(scene: Scene, seed: int, sources: Sequence[KeptPlane | None], seen
     origin = origin_of(scene, seed, methods[-1], counts["halves"], counts["passes"])
     in_memory = not is_large(len(lights), size)
 
-    def compose(picks: Sequence[Pick]) -> Planes:
+    def compose(picks: Sequence[PlaneReference]) -> Planes:
         return compose_planes(picks, size, in_memory=in_memory)
 
     # Known of all lights or of none.
@@ -217,7 +220,7 @@ def _count_fields(each: Sequence[Counts], *, is_one_pass: bool) -> dict[str, Any
     }
 
 
-def _seen_in(scene: Scene, sources: Sequence[Basis]) -> Bools:
+def _emitters_seen_in(scene: Scene, sources: Sequence[Basis]) -> Bools:
     """Return where an emitter is seen in `scene`, of bases of it with other lights.
 
     Shapes that shine are the same in all of them, and what surrounds them may not be.

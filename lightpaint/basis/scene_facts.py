@@ -23,7 +23,7 @@ from typing import Any
 
 from lightpaint.basis import cache as bases
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache_folder import KNOWN, folder, is_own
+from lightpaint.basis.cache_folder import FACTS_SUFFIX, folder, is_own
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text
@@ -40,15 +40,15 @@ FORMAT = "lightpaint-known 2"
 COARSE_S = 2.0
 
 #: What in a process changes how Mitsuba reads a scene.
-VARIABLES = ("MI_", "MITSUBA")
+ENVIRONMENT_PREFIXES = ("MI_", "MITSUBA")
 
 #: Code that reads scenes and makes identities of them; of others the libraries as well.
-OURS = ("scene", "scene/checks", "scene/lights", "basis", "basis/render")
-OTHERS = ("mitsuba", "drjit")
+OWN_FOLDERS = ("scene", "scene/checks", "scene/lights", "basis", "basis/render")
+LIBRARIES = ("mitsuba", "drjit")
 
 
 @dataclass(frozen=True)
-class Known:
+class SceneFacts:
     """Facts about a scene that are known without loading it.
 
     identity, sensor, size: by which its basis is kept. spp: samples that it asks for. path: as
@@ -65,35 +65,35 @@ class Known:
     remarks: tuple[str, ...]
 
 
-def key_of(asking: Mapping[str, Any]) -> str:
+def facts_key(asking: Mapping[str, Any]) -> str:
     """Return a key for everything that is neither in a scene nor in its files.
 
     asking: all that decides how it is loaded and on which film, as plain values.
     """
-    around = {x: y for x, y in os.environ.items() if x.startswith(VARIABLES)}
-    key = [FORMAT, dict(asking), os.getcwd(), around, _code()]
+    around = {x: y for x, y in os.environ.items() if x.startswith(ENVIRONMENT_PREFIXES)}
+    key = [FORMAT, dict(asking), os.getcwd(), around, _code_version()]
     return hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:32]
 
 
-def recall(key: str) -> Known | None:
-    """Return the known facts of a scene, or None. key: as in `key_of`."""
+def recall_facts(key: str) -> SceneFacts | None:
+    """Return the known facts of a scene, or None. key: as in `facts_key`."""
     if "mitsuba" in sys.modules:  # where somebody else may have told it to look for files
         return None
     with suppress(OSError, LightpaintError, LookupError, TypeError, ValueError):
-        for file in folder().glob(f"*.{key}{KNOWN}"):
+        for file in folder().glob(f"*.{key}{FACTS_SUFFIX}"):
             if not is_own(file):
                 continue
             said = strict_json(file.read_text("utf-8"))
-            if said["format"] == FORMAT and _is_as_it_was(said["places"], said["texts"]):
+            if said["format"] == FORMAT and _is_unchanged(said["places"], said["texts"]):
                 its = said["known"]
                 its |= {name: tuple(its[name]) for name in ("size", "remarks")}
                 lights = tuple(read_record(BasisLight, light) for light in its["lights"]["each"])
                 requests = SceneRequests(**its["lights"]["requests"])
-                return Known(**{**its, "lights": Lights(lights, requests)})
+                return SceneFacts(**{**its, "lights": Lights(lights, requests)})
     return None
 
 
-def remember(
+def remember_facts(
     key: str,
     scene: Scene,
     basis: Basis,
@@ -105,9 +105,9 @@ def remember(
 
     began_s: when the scene's files were begun to be read, by the clock of the system.
     """
-    if bases.kept_at(basis) is None:
+    if bases.file_of(basis) is None:
         return False
-    known = Known(
+    known = SceneFacts(
         scene.identity,
         scene.sensor_names[scene.sensor],
         scene.size,
@@ -132,13 +132,13 @@ def remember(
         text = json.dumps(said, allow_nan=False)
         if strict_json(text)["known"]["lights"]["requests"] != asdict(scene.requests):
             return False  # TOML knows values that JSON does not
-        write_text(bases.place_beside(basis, f".{key}{KNOWN}"), text)
+        write_text(bases.companion_path(basis, f".{key}{FACTS_SUFFIX}"), text)
     except (OSError, LightpaintError, TypeError, ValueError):
         return False
     return True
 
 
-def _is_as_it_was(places: Mapping[str, Any], texts: Mapping[str, str]) -> bool:
+def _is_unchanged(places: Mapping[str, Any], texts: Mapping[str, str]) -> bool:
     return all(_stamp(Path(path)) == stamp for path, stamp in places.items()) and all(
         _digest(Path(path)) == digest for path, digest in texts.items()
     )
@@ -175,21 +175,21 @@ def _reads_more(path: Path) -> bool:
 
 
 @cache
-def _code() -> str:
+def _code_version() -> str:
     """Return the version of the code that reads scenes, from its files."""
-    said = [__version__, sys.version, *(list(_files_of(name)) for name in OTHERS)]
+    said = [__version__, sys.version, *(list(_files_of_package(name)) for name in LIBRARIES)]
     package = Path(__file__).parents[1]
-    said += [list(_files_in(package / folder)) for folder in OURS]
+    said += [list(_files_in_folder(package / folder)) for folder in OWN_FOLDERS]
     return hashlib.sha256(repr(said).encode()).hexdigest()
 
 
-def _files_of(package: str) -> Iterator[tuple[str, int, int]]:
+def _files_of_package(package: str) -> Iterator[tuple[str, int, int]]:
     found = find_spec(package)
     if found is not None and found.origin is not None:
-        yield from _files_in(Path(found.origin).parent)
+        yield from _files_in_folder(Path(found.origin).parent)
 
 
-def _files_in(folder: Path) -> Iterator[tuple[str, int, int]]:
+def _files_in_folder(folder: Path) -> Iterator[tuple[str, int, int]]:
     """Return the files of a folder, by name, size and time."""
     for entry in sorted(os.scandir(folder), key=lambda entry: entry.path):
         if entry.is_file():

@@ -6,15 +6,21 @@ from typing import Any
 
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import as_stored, is_large
-from lightpaint.basis.render.compose import counts_of, gather, lights_behind, merged, part_of
-from lightpaint.basis.render.render import (
+from lightpaint.basis.basis_file import as_stored, is_large
+from lightpaint.basis.render.basis_render import (
     ONE_PASS,
     basis_lights,
     is_of,
     is_on_the_way,
     method_of,
     render_basis,
+)
+from lightpaint.basis.render.plane_reuse import (
+    counts_of,
+    gather_planes,
+    least_sampled_lights,
+    merge,
+    restrict,
 )
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.pixel_blocks import whole_factor
@@ -70,9 +76,9 @@ def obtain_basis(
         if start is not None and not is_on_the_way(scene, start, spp):
             start = None
     elif time_s is None and (kept is None or kept.origin.spp < asked):
-        start = gather(scene, kept, spp=asked, seed=seed)
+        start = gather_planes(scene, kept, spp=asked, seed=seed)
     elif kept is None:
-        start = gather(scene, None, spp=None, seed=seed)
+        start = gather_planes(scene, None, spp=None, seed=seed)
 
     is_composed = start is not None and start.origin.is_composed
 
@@ -108,16 +114,16 @@ def _completed(
     how: other arguments of `render`, which adds as many samples to all lights in one pass.
     """
     while start is not None and method_of(scene) == ONE_PASS:
-        names, goal = lights_behind(start, spp)
+        names, goal = least_sampled_lights(start, spp)
         if not names:
             break
         alone, whole = scene.only(names), start
 
         def keep(part: Basis, whole: Basis = whole) -> bool:
-            return bool(how["keep"](merged(scene, whole, part)))
+            return bool(how["keep"](merge(scene, whole, part)))
 
-        part = render(alone, **how | {"spp": goal, "start": part_of(whole, alone), "keep": keep})
-        start = merged(scene, whole, part)
+        part = render(alone, **how | {"spp": goal, "start": restrict(whole, alone), "keep": keep})
+        start = merge(scene, whole, part)
         if spp is None:
             return start
     return render(scene, **how, spp=spp, start=start)

@@ -12,10 +12,10 @@ import pytest
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render import budget, lessons
-from lightpaint.basis.render import parts as parts_module
-from lightpaint.basis.render.parts import Part, PartRenderer, PartSums, plan_parts
-from lightpaint.basis.render.render import render_basis
+from lightpaint.basis.render import guide_training, render_budget
+from lightpaint.basis.render import render_parts as parts_module
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_parts import Part, PartRenderer, PartSums, plan_parts
 from lightpaint.errors import SceneError
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.scene.scene import Scene, load_scene
@@ -24,8 +24,8 @@ SPP = 32
 
 
 @pytest.fixture(autouse=True)
-def _short_lessons(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lessons, "LESSON", (2**12, 2**13))
+def _short_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12, 2**13))
 
 
 @pytest.fixture
@@ -35,23 +35,23 @@ def _all_threads() -> Iterator[None]:
 
 
 @pytest.fixture
-def learned(small_room: Scene) -> np.ndarray:
-    return lessons.lesson(small_room, 0)
+def guide_table(small_room: Scene) -> np.ndarray:
+    return guide_training.train_guide(small_room, 0)
 
 
 def made(
     scene: Scene,
-    learned: np.ndarray | None,
+    guide_table: np.ndarray | None,
     order: list[Part],
     plan: list[Part],
     start: Basis | None = None,
 ) -> Basis:
     sums = PartSums(scene, plan, seed=0, start=start)
-    renderer = PartRenderer(scene, 0, learned)
+    renderer = PartRenderer(scene, 0, guide_table)
     for part in order:
         sums.add(part, *renderer.render(part))
     renderer.close()
-    return sums.basis(learned)
+    return sums.basis(guide_table)
 
 
 def same(one: Basis, other: Basis) -> bool:
@@ -66,7 +66,7 @@ def same(one: Basis, other: Basis) -> bool:
 def test_every_sample_of_every_pixel_is_in_one_part(
     small_room: Scene, spp: int, samples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parts_module, "SAMPLES", samples)
+    monkeypatch.setattr(parts_module, "PART_SAMPLES", samples)
     height, _ = small_room.size
     covered = Counter[int]()
     for part in plan_parts(small_room, spp):
@@ -79,10 +79,10 @@ def test_every_sample_of_every_pixel_is_in_one_part(
 
 
 def test_parts_in_any_order_make_the_basis_of_one_go(
-    small_room: Scene, learned: np.ndarray, monkeypatch: pytest.MonkeyPatch
+    small_room: Scene, guide_table: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = render_basis(small_room, spp=SPP)
-    monkeypatch.setattr(parts_module, "SAMPLES", 2**12)
+    monkeypatch.setattr(parts_module, "PART_SAMPLES", 2**12)
     # Kernels of three samples of a pixel, or of all rows.
     monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 3 * 24 * 3)
     plan = plan_parts(small_room, SPP)
@@ -90,10 +90,10 @@ def test_parts_in_any_order_make_the_basis_of_one_go(
     shuffled = plan.copy()
     random.Random(3).shuffle(shuffled)
     for order in (plan, shuffled):
-        basis = made(small_room, learned, order, plan)
+        basis = made(small_room, guide_table, order, plan)
         assert same(basis, whole)
         assert basis.origin == whole.origin
-        np.testing.assert_array_equal(basis.learned, whole.learned)
+        np.testing.assert_array_equal(basis.guide_table, whole.guide_table)
 
 
 @pytest.mark.usefixtures("_all_threads")
@@ -110,12 +110,12 @@ def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
     # Steps of three samples of a pixel of each half.
     monkeypatch.setattr("lightpaint.scene.scene_render.SAMPLES_PER_PASS", 4 * 3 * 24 * 20)
     seconds = iter(range(1000))
-    monkeypatch.setattr(budget, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
+    monkeypatch.setattr(render_budget, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
     basis = render_basis(small_room, time_s=9)
     assert basis.origin.spp % 6 == 0
     assert basis.origin.spp > 6
     monkeypatch.undo()
-    monkeypatch.setattr(lessons, "LESSON", (2**12, 2**13))
+    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12, 2**13))
     whole = render_basis(small_room, spp=basis.origin.spp)
     assert same(basis, whole)
     assert basis.origin == whole.origin
@@ -124,7 +124,7 @@ def test_any_budget_that_comes_to_the_same_samples_makes_the_same(
 def test_what_is_there_counts(small_room: Scene) -> None:
     half = render_basis(small_room, spp=16)
     plan = plan_parts(small_room, 32, start=half)
-    in_parts = made(small_room, half.learned, plan, plan, start=half)
+    in_parts = made(small_room, half.guide_table, plan, plan, start=half)
     on = render_basis(small_room, spp=32, start=half)
     assert same(in_parts, on)
     whole = render_basis(small_room, spp=32)
@@ -134,11 +134,11 @@ def test_what_is_there_counts(small_room: Scene) -> None:
     assert (np.abs(on.images - whole.images) / scale).max() < 1e-5
 
 
-def test_a_lesson_depends_on_the_seed_alone(small_room: Scene, learned: np.ndarray) -> None:
-    np.testing.assert_array_equal(lessons.lesson(small_room, 0), learned)
+def test_the_training_depends_on_the_seed_alone(small_room: Scene, guide_table: np.ndarray) -> None:
+    np.testing.assert_array_equal(guide_training.train_guide(small_room, 0), guide_table)
     for spp in (2, 64):
-        np.testing.assert_array_equal(render_basis(small_room, spp=spp).learned, learned)
-    assert (lessons.lesson(small_room, 1) != learned).any()
+        np.testing.assert_array_equal(render_basis(small_room, spp=spp).guide_table, guide_table)
+    assert (guide_training.train_guide(small_room, 1) != guide_table).any()
 
 
 def test_what_an_older_version_has_rendered_is_used_but_not_gone_on_with(

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from renderer import write_room
 
-from lightpaint.basis.file import read_basis, write_basis
-from lightpaint.basis.render import lessons
-from lightpaint.basis.render.budget import Budget, Keeper
-from lightpaint.basis.render.render import _render_one_by_one, render_basis
+from lightpaint.basis.basis_file import read_basis, write_basis
+from lightpaint.basis.render import guide_training
+from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
+from lightpaint.basis.render.render_budget import Budget, Keeper
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import load_scene
@@ -28,7 +28,7 @@ BEHIND = '<emitter type="point" id="behind"><point name="position" x="0" y="1" z
 
 def probabilities(received: np.ndarray, asked: np.ndarray, lights: list[int]) -> np.ndarray:
     use_variant()
-    from lightpaint.basis.render.guide import _probabilities
+    from lightpaint.basis.render.emitter_guide import _probabilities
 
     sampled = np.ones(len(lights), dtype=bool)
     return _probabilities(received, asked, np.asarray(lights), sampled)
@@ -37,7 +37,7 @@ def probabilities(received: np.ndarray, asked: np.ndarray, lights: list[int]) ->
 @given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(1, 5))
 def test_probabilities_are_probabilities(seed: int, emitters: int, cells: int) -> None:
     use_variant()
-    from lightpaint.basis.render.guide import EVEN_SHARE
+    from lightpaint.basis.render.emitter_guide import EVEN_SHARE
 
     rng = np.random.default_rng(seed)
     asked = rng.integers(0, 5, (cells, emitters)).astype(float)
@@ -48,7 +48,7 @@ def test_probabilities_are_probabilities(seed: int, emitters: int, cells: int) -
     assert found.min() >= EVEN_SHARE / emitters * (1 - 1e-12)
 
 
-def test_nothing_learned_is_an_even_choice() -> None:
+def test_an_untrained_guide_chooses_evenly() -> None:
     np.testing.assert_allclose(
         probabilities(np.zeros((3, 4)), np.zeros((3, 4)), [0, 1, 2, 3]), 0.25
     )
@@ -56,7 +56,7 @@ def test_nothing_learned_is_an_even_choice() -> None:
 
 def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
     use_variant()
-    from lightpaint.basis.render.guide import EVEN_SHARE
+    from lightpaint.basis.render.emitter_guide import EVEN_SHARE
 
     asked = np.full((2, 2), 1e6)
     found = probabilities(np.array([[1e6, 0], [0, 1.0]]), asked, [0, 1])
@@ -66,12 +66,12 @@ def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
     np.testing.assert_allclose(found, [[sure, 1 - sure], [1 - sure, sure]], atol=2e-6)
 
 
-@pytest.mark.parametrize("lesson", [(2**10,), (2**16, 2**18)])
+@pytest.mark.parametrize("samples", [(2**10,), (2**16, 2**18)])
 def test_guided_planes_are_those_of_separate_renders_within_noise(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lesson: tuple[int, ...]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: tuple[int, ...]
 ) -> None:
-    """However little was learned."""
-    monkeypatch.setattr(lessons, "LESSON", lesson)
+    """However short the training."""
+    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", samples)
     from renderer import LIGHTS
 
     lights = SPOTS + BEHIND + LIGHTS["panel"] + LIGHTS["sky"]
@@ -100,17 +100,17 @@ def test_lights_that_reach_little_get_their_samples_there(tmp_path: Path) -> Non
     assert (variance[:2] < 0.5 * hit_by_chance[:2]).all()
 
 
-def test_what_was_learned_goes_through_the_file(tmp_path: Path) -> None:
+def test_the_table_goes_through_the_file(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path, lights=SPOTS + BEHIND))
     basis = render_basis(scene, spp=8)
-    assert basis.learned is not None
-    received, asked = basis.learned
+    assert basis.guide_table is not None
+    received, asked = basis.guide_table
     assert asked.sum() > 0
     assert (received[asked == 0] == 0).all()
     write_basis(tmp_path / "b.exr", basis)
-    again = read_basis(tmp_path / "b.exr").learned
+    again = read_basis(tmp_path / "b.exr").guide_table
     assert again is not None
-    np.testing.assert_array_equal(again, basis.learned)
+    np.testing.assert_array_equal(again, basis.guide_table)
 
 
 @pytest.mark.parametrize("damage", ["nan", "negative", "shape", "none"])
@@ -119,12 +119,12 @@ def test_a_damaged_memory_is_forgotten(tmp_path: Path, damage: str) -> None:
 
     scene = load_scene(write_room(tmp_path, lights=SPOTS))
     basis = render_basis(scene, spp=4)
-    assert basis.learned is not None
-    learned = basis.learned.copy()
+    assert basis.guide_table is not None
+    guide_table = basis.guide_table.copy()
     if damage in ("nan", "negative"):
-        learned[0, 0, 0] = np.nan if damage == "nan" else -1
-    spoilt = {"shape": learned[:, :1], "none": None}.get(damage, learned)
-    gone_on = render_basis(scene, spp=64, start=replace(basis, learned=spoilt))
+        guide_table[0, 0, 0] = np.nan if damage == "nan" else -1
+    spoilt = {"shape": guide_table[:, :1], "none": None}.get(damage, guide_table)
+    gone_on = render_basis(scene, spp=64, start=replace(basis, guide_table=spoilt))
     assert np.isfinite(gone_on.images).all()
     assert gone_on.images.max() > 0
 

@@ -1,8 +1,8 @@
-"""The choice of the emitter to sample from a place, learned from a lesson.
+"""The choice of the emitter to sample from a place, learned in training.
 
 A path tracer that chooses emitters at random samples most of them in vain: a spot whose cone is
 elsewhere, a window behind a wall. Space is divided into cells, and each cell remembers what
-its surface points received from every emitter, shadows included. What is rendered then draws an
+its surface points received from every emitter, shadows included. A path then draws an
 emitter with a probability that follows that light, relative to what the light of that emitter does
 in the whole picture, so that a faint light gets its rays where it matters as well as a
 bright one. A remainder is drawn evenly: no emitter is left out anywhere, so that the mean of
@@ -29,7 +29,7 @@ from lightpaint.basis.render.sobol import hashed
 EVEN_SHARE = 0.1
 #: Units in which the light of an emitter is counted: so many make up its average contribution, and
 #: one sample counts at most so many.
-UNITS, MOST_UNITS = 2.0**12, 2.0**31
+MEAN_UNITS, MAX_UNITS = 2.0**12, 2.0**31
 #: Units of radiance 1, before anything is known of an emitter.
 FIRST_UNITS = 2.0**20
 #: Weight of the mean over all cells, in samples of the cell itself.
@@ -39,20 +39,20 @@ CELLS_PER_DISTANCE = 24.0
 #: The largest number in [0, 1).
 BELOW_1 = 1 - 2**-24
 #: Largest size of the table: entries in all, and cells.
-ENTRIES, CELLS = 2**22, 2**16
+MAX_ENTRIES, MAX_CELLS = 2**22, 2**16
 
 
-class Guide:
-    """Probabilities of emitters by cell, and what they are learned from.
+class EmitterGuide:
+    """Probabilities of emitters by cell, and the records they are computed from.
 
     scene: an `mi.Scene`, whose emitters it chooses from.
     light_of: UInt32 array, the light that an emitter belongs to, by its Dr.Jit instance id.
     eye: position of the camera; cells are smaller near it.
-    learned: table that `learned()` of an earlier guide returned, which this one then uses as it is;
-        None, or an implausible one, to learn from the passes that sample by this guide.
+    table: what `table()` of an earlier guide returned, which this one then uses as it is; None, or
+        an implausible one, to learn from the passes that sample by this guide.
     """
 
-    def __init__(self, scene: Any, light_of: Any, eye: Any, learned: Floats | None = None) -> None:
+    def __init__(self, scene: Any, light_of: Any, eye: Any, table: Floats | None = None) -> None:
         self.emitters = scene.emitters_dr()
         instances = np.array(dr.reinterpret_array(mi.UInt32, self.emitters))
         self._lights = np.array(light_of)[instances].astype(int)
@@ -63,61 +63,65 @@ class Guide:
         index_of[instances] = np.arange(self.count)
         self._index_of = mi.UInt32(index_of)
         # Emitters that the scene never samples are not chosen; point lights among them are dark.
-        self._sampled = np.array([emitter.sampling_weight() > 0 for emitter in scene.emitters()])
+        self._can_sample = np.array([emitter.sampling_weight() > 0 for emitter in scene.emitters()])
         shape = (2, self.cells, self.count)
-        if learned is not None and (learned.shape != shape or not _is_sane(learned)):
-            learned = None
+        if table is not None and (table.shape != shape or not _is_sane(table)):
+            table = None
         self._units = np.full(self.count, FIRST_UNITS)
-        self._received, self._asked = np.zeros(shape) if learned is None else learned.astype(float)
+        self._received_light, self._sample_counts = (
+            np.zeros(shape) if table is None else table.astype(float)
+        )
         self._learns = dr.opaque(mi.Bool, True)
         self._begin_counting(self.cells * self.count)
-        if learned is not None:
+        if table is not None:
             self.freeze()
         self._set_probabilities()
 
-    def learned(self) -> Floats:
-        """(2, cells, emitters) float32: what was received in all, and how often it was asked."""
-        return np.stack([self._received, self._asked]).astype(np.float32)
+    def table(self) -> Floats:
+        """Return (2, cells, emitters) float32: received light, and number of samples."""
+        return np.stack([self._received_light, self._sample_counts]).astype(np.float32)
 
     def update(self) -> None:
-        """Take what a pass has learned into the probabilities."""
+        """Update the probabilities by what a pass has recorded."""
         shape = self.cells, self.count
-        counted = np.array(self._counted).reshape(shape).astype(float)
-        asked = np.array(self._questions).reshape(shape)
-        self._received += counted / self._units
-        self._asked += asked
-        mean = counted.sum(axis=0) / np.maximum(asked.sum(axis=0), 1)
+        new_light = np.array(self._new_light).reshape(shape).astype(float)
+        new_counts = np.array(self._new_counts).reshape(shape)
+        self._received_light += new_light / self._units
+        self._sample_counts += new_counts
+        mean = new_light.sum(axis=0) / np.maximum(new_counts.sum(axis=0), 1)
         # Powers of two, by which no digit of what is counted changes.
-        units = self._units * 2.0 ** np.round(np.log2(UNITS / np.maximum(mean, 1 / UNITS)))
+        units = self._units * 2.0 ** np.round(
+            np.log2(MEAN_UNITS / np.maximum(mean, 1 / MEAN_UNITS))
+        )
         self._units = np.clip(units, 2.0**-60, 2.0**100)
         self._begin_counting(self.cells * self.count)
         self._set_probabilities()
 
     def freeze(self) -> None:
-        """Learn nothing more."""
+        """Stop learning."""
         self._learns = dr.opaque(mi.Bool, False)
         self._begin_counting(1)
 
     def _begin_counting(self, entries: int) -> None:
-        self._counted = dr.zeros(mi.UInt64, entries)
-        self._questions = dr.zeros(mi.UInt32, entries)
+        self._new_light = dr.zeros(mi.UInt64, entries)
+        self._new_counts = dr.zeros(mi.UInt32, entries)
         self._units_of = mi.Float(self._units.astype(np.float32))
 
     def _set_probabilities(self) -> None:
-        # As they come from a file, so that it makes no difference who has learned.
-        received, asked = self.learned()
+        # Rounded as in a file, so that it makes no difference where the training ran.
+        received_light, sample_counts = self.table()
         # Most cells of the table hold no surface: there the choice is even.
-        known = asked.any(axis=1)
-        even = np.cumsum(self._sampled, dtype=np.float32) / self._sampled.sum()
+        visited = sample_counts.any(axis=1)
+        even = np.cumsum(self._can_sample, dtype=np.float32) / self._can_sample.sum()
         cumulative = np.tile(even, (self.cells, 1))
-        found = _probabilities(
-            received[known].astype(np.float64),
-            asked[known].astype(np.float64),
+        probabilities = _probabilities(
+            received_light[visited].astype(np.float64),
+            sample_counts[visited].astype(np.float64),
             self._lights,
-            self._sampled,
+            self._can_sample,
         )
-        cumulative[known] = np.cumsum(found, axis=1)
-        cumulative[:, np.flatnonzero(self._sampled)[-1] :] = 1
+        cumulative[visited] = np.cumsum(probabilities, axis=1)
+        cumulative[:, np.flatnonzero(self._can_sample)[-1] :] = 1
         self._cumulative = mi.Float(cumulative.ravel())
         dr.eval(self._cumulative)
 
@@ -162,50 +166,51 @@ class Guide:
         below = dr.gather(mi.Float, self._cumulative, first + emitter - 1, active & (emitter > 0))
         return below, above - below
 
-    def learn(self, cell, emitter, contribution, *, asked, lit):
+    def learn(self, cell, emitter, contribution, *, is_sampled, lit):
         """Record the light that `emitter` contributed to the picture from `cell`.
 
-        contribution: RGB, not divided by the probability of the emitter.
+        contribution: RGB, not divided by the probability of the emitter. is_sampled: whether the
+        emitter was sampled at all; lit: whether its light arrived.
         """
         entry = cell * self.count + emitter
-        asked, lit = asked & self._learns, lit & self._learns
-        dr.scatter_add(self._questions, mi.UInt32(1), entry, asked)
+        is_sampled, lit = is_sampled & self._learns, lit & self._learns
+        dr.scatter_add(self._new_counts, mi.UInt32(1), entry, is_sampled)
         gray = dr.mean(contribution)
         units = gray * dr.gather(mi.Float, self._units_of, emitter, lit)
-        units = mi.UInt64(mi.UInt32(dr.clip(units, 0, MOST_UNITS)))
-        dr.scatter_add(self._counted, units, entry, lit & dr.isfinite(gray))
+        units = mi.UInt64(mi.UInt32(dr.clip(units, 0, MAX_UNITS)))
+        dr.scatter_add(self._new_light, units, entry, lit & dr.isfinite(gray))
 
     def evaluate(self) -> None:
         """Run what was traced, and wait for it."""
-        dr.eval(self._counted, self._questions)
+        dr.eval(self._new_light, self._new_counts)
         dr.sync_thread()
 
 
-def _is_sane(learned: Floats) -> bool:
-    return bool(np.isfinite(learned).all() and learned.min() >= 0 and learned.max() < 2**32)
+def _is_sane(table: Floats) -> bool:
+    return bool(np.isfinite(table).all() and table.min() >= 0 and table.max() < 2**32)
 
 
 def table_cells(emitters: int) -> int:
     """Return the number of cells, a power of two, for that many emitters."""
-    return int(2 ** np.floor(np.log2(np.clip(ENTRIES / emitters, 1, CELLS))))
+    return int(2 ** np.floor(np.log2(np.clip(MAX_ENTRIES / emitters, 1, MAX_CELLS))))
 
 
 def _probabilities(
-    received: npt.NDArray[np.float64],
-    asked: npt.NDArray[np.float64],
+    received_light: npt.NDArray[np.float64],
+    sample_counts: npt.NDArray[np.float64],
     lights: npt.NDArray[np.int_],
-    sampled: npt.NDArray[np.bool_],
+    can_sample: npt.NDArray[np.bool_],
 ) -> npt.NDArray[np.float64]:
     """Return (cells, emitters) probabilities, from the received light and the number of samples.
 
-    lights: the light of each emitter; sampled: whether it may be chosen at all.
+    lights: the light of each emitter; can_sample: whether it may be chosen at all.
     """
-    even = sampled / sampled.sum()
-    everywhere = received.sum(axis=0) / np.maximum(asked.sum(axis=0), 1)
-    mean = (received + PRIOR_SAMPLES * everywhere) / (asked + PRIOR_SAMPLES)
-    visits = asked.sum(axis=1, keepdims=True)
+    even = can_sample / can_sample.sum()
+    mean_of_all = received_light.sum(axis=0) / np.maximum(sample_counts.sum(axis=0), 1)
+    mean = (received_light + PRIOR_SAMPLES * mean_of_all) / (sample_counts + PRIOR_SAMPLES)
+    visits = sample_counts.sum(axis=1, keepdims=True)
     whole = np.bincount(lights, (mean * visits).sum(axis=0))[lights]
-    wanted = sampled * mean / np.where(whole > 0, whole, 1)
-    total = wanted.sum(axis=1, keepdims=True)
-    wanted = np.where(total > 0, wanted / np.where(total > 0, total, 1), even)
-    return np.asarray((1 - EVEN_SHARE) * wanted + EVEN_SHARE * even)
+    probability = can_sample * mean / np.where(whole > 0, whole, 1)
+    total = probability.sum(axis=1, keepdims=True)
+    probability = np.where(total > 0, probability / np.where(total > 0, total, 1), even)
+    return np.asarray((1 - EVEN_SHARE) * probability + EVEN_SHARE * even)

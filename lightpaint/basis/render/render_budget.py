@@ -15,7 +15,7 @@ KEEP_EVERY_S = 30.0
 
 #: Passes of a basis are shorter by this factor than those of a picture: they are the steps in which
 #: time is spent, and what Ctrl-C has to wait for.
-SHORTER = 4
+PASS_DIVISOR = 4
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def steps(pixels: int, budget: Budget, done: int, progress: Progress) -> Iterato
 
     done: samples per pixel of each half so far.
     """
-    largest = largest_pass(pixels, shorter=SHORTER)
+    largest = largest_pass(pixels, shorter=PASS_DIVISOR)
     if budget.time_s is None:
         left = half_of(budget.spp) - done
         count = -(-left // largest)
@@ -93,8 +93,8 @@ def next_pair(
 
     step: samples of a pixel come in multiples of this.
     """
-    spp = max(done) + pairs * largest_pass(pixels, shorter=SHORTER)
-    return plan_passes(pixels, 2 * spp, done=done, shorter=SHORTER, step=step)
+    spp = max(done) + pairs * largest_pass(pixels, shorter=PASS_DIVISOR)
+    return plan_passes(pixels, 2 * spp, done=done, shorter=PASS_DIVISOR, step=step)
 
 
 class Keeper:

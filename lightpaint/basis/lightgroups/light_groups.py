@@ -14,10 +14,15 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import LIGHT_GROUPS, Basis, Origin, free_name
-from lightpaint.basis.lightgroups.beauty import NOTHING, shares, spoken_share, spoken_sum
-from lightpaint.basis.lightgroups.layers import RenderLayer, read_layers
-from lightpaint.basis.lightgroups.naming import FILES
-from lightpaint.basis.lightgroups.roles import Roles, roles_of
+from lightpaint.basis.lightgroups.beauty_comparison import (
+    NEGLIGIBLE_SHARE,
+    describe_sum,
+    missing_and_exceeding,
+    share_text,
+)
+from lightpaint.basis.lightgroups.layer_choice import ONE_FILE_PER_LIGHT
+from lightpaint.basis.lightgroups.layer_roles import Roles, roles_of
+from lightpaint.basis.lightgroups.render_layers import RenderLayer, read_layers
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import as_planes
 from lightpaint.colour.color import LUMINANCE
@@ -29,10 +34,10 @@ from lightpaint.screen import short_repr, some_names
 AS_RENDERED = "× as rendered"
 
 #: Share of its light that a group may take away in places: filters with negative lobes do.
-NEGATIVE = 0.25
+MAX_NEGATIVE_SHARE = 0.25
 
 #: Name of what the groups lack of the beauty, with underscores added should a light have it.
-REST = "rest"
+REST_NAME = "rest"
 
 
 @keywords()
@@ -123,7 +128,7 @@ def _check_light(
     for name, layer in lights.items():
         light = np.where(holes, 0, layer.image.astype(np.float32) @ LUMINANCE)
         given, taken = float(light[light > 0].sum()), -float(light[light < 0].sum())
-        if taken > NEGATIVE * given:
+        if taken > MAX_NEGATIVE_SHARE * given:
             part = f"{taken / given:.2g} times what it gives" if given else "and gives none"
             raise BasisError(
                 f"{path}: the light group {name!r} takes light away, {part}, which no light does: "
@@ -144,12 +149,12 @@ def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
     if holes.all():
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
     _check_light(path, roles.lights, holes)
-    missing = _what_is_missing(roles, holes)
+    missing = _missing_light(roles, holes)
     listed = f"light groups as of {roles.renderer}: {some_names(names)}"
     if beauty is not None:
         listed += f"; the whole picture: {beauty.name or 'R, G, B'}"
     remarks = [*told, listed, *roles.remarks, missing.told]
-    remarks += _spoken_black(roles.lights, missing.share)
+    remarks += _remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
             "the file has other primaries than Rec.709: multipliers are of its channels in linear "
@@ -187,31 +192,31 @@ class _Missing:
     told: str
 
 
-def _what_is_missing(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
+def _missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
     lights, beauty = list(roles.lights.values()), roles.beauty
     if beauty is None:
         told = "no beauty among the layers, so that nothing tells whether the groups are all of it"
-        if roles.renderer == FILES:
+        if roles.renderer == ONE_FILE_PER_LIGHT:
             told += ", and each of them a light"
         return _Missing(None, None, None, told)
-    whole = _filled(beauty.image, holes).astype(np.float64)
-    rest = whole - sum(_filled(layer.image, holes).astype(np.float64) for layer in lights)
-    missing, exceeding = shares(rest, whole)
-    name = free_name(REST, roles.lights)
-    told, is_missing = spoken_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
+    whole = _without_holes(beauty.image, holes).astype(np.float64)
+    rest = whole - sum(_without_holes(layer.image, holes).astype(np.float64) for layer in lights)
+    missing, exceeding = missing_and_exceeding(rest, whole)
+    name = free_name(REST_NAME, roles.lights)
+    told, is_missing = describe_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
     return _Missing(rest if is_missing else None, missing, exceeding, told)
 
 
-def _spoken_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
+def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
     """Return a sentence for a light that is black in the file, with its likely layer."""
     black = [name for name, layer in lights.items() if not layer.image.any()]
     if not black:
         return []
     told = f"the file holds nothing of {some_names(black)}: black in every pixel, so kept as it is"
-    if missing is None or missing <= NOTHING:
+    if missing is None or missing <= NEGLIGIBLE_SHARE:
         return [f"{told}; is the light off, or the group renamed?"]
     return [
-        f"{told}; {spoken_share(missing)} of the light of the beauty is in no group: was the group "
+        f"{told}; {share_text(missing)} of the light of the beauty is in no group: was the group "
         "renamed after its lights were given it?"
     ]
 
@@ -224,10 +229,10 @@ def _basis(path: Path, roles: Roles, rest: Floats | None, holes: npt.NDArray[np.
     images = np.empty((len(lights) + (rest is not None), height, width, 3), np.float32)
     first = next(iter(lights.values()))
     for image, layer in zip(images, lights.values(), strict=False):
-        image[:] = layer.in_rec709(_filled(layer.image, holes))
+        image[:] = layer.in_rec709(_without_holes(layer.image, holes))
     if rest is not None:
         made.append(
-            _light(free_name(REST, lights), "beauty less the groups", "rest", is_fixed=True)
+            _light(free_name(REST_NAME, lights), "beauty less the groups", "rest", is_fixed=True)
         )
         images[-1] = first.in_rec709(rest)
     return Basis(
@@ -260,5 +265,5 @@ def _origin(path: Path, roles: Roles, images: Floats, names: Sequence[str]) -> O
     )
 
 
-def _filled(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
+def _without_holes(image: Floats, holes: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
     return np.where(holes[..., None], np.float32(0), image.astype(np.float32))

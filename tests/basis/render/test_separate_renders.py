@@ -13,10 +13,10 @@ from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, same_basis, write_roo
 
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file import read_basis, write_basis
-from lightpaint.basis.render.obtain import obtain_basis
-from lightpaint.basis.render.render import ONE_PASS, SEPARATE, render_basis
-from lightpaint.basis.render.separate import BLACK, WHITE
+from lightpaint.basis.basis_file import read_basis, write_basis
+from lightpaint.basis.render.basis_render import ONE_PASS, SEPARATE, render_basis
+from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene, load_scene
@@ -123,10 +123,14 @@ def test_a_part_of_separate_renders_does_not_replace_a_whole_basis(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As when a basis of one pass is kept and a variant is asked for that has no such thing."""
-    monkeypatch.setattr("lightpaint.basis.render.render.why_not_one_pass", lambda _scene: None)
+    monkeypatch.setattr(
+        "lightpaint.basis.render.basis_render.why_not_one_pass", lambda _scene: None
+    )
     start = obtain_basis(scene, spp=8)
     assert start.origin.method == ONE_PASS
-    monkeypatch.setattr("lightpaint.basis.render.render.why_not_one_pass", lambda _scene: "because")
+    monkeypatch.setattr(
+        "lightpaint.basis.render.basis_render.why_not_one_pass", lambda _scene: "because"
+    )
     with pytest.raises(KeyboardInterrupt) as interrupt:
         obtain_basis(scene, spp=16, progress=lambda *_: os.kill(os.getpid(), signal.SIGINT) or None)
     assert not isinstance(interrupt.value, Interrupted)
@@ -139,7 +143,7 @@ def test_a_time_is_kept_and_adds_samples(
 ) -> None:
     # Quarters of a second of this process, which get as much done on a busy machine.
     clock = SimpleNamespace(monotonic=lambda: 4 * time.process_time())
-    monkeypatch.setattr("lightpaint.basis.render.budget.time", clock)
+    monkeypatch.setattr("lightpaint.basis.render.render_budget.time", clock)
     scene = load_scene(write_room(tmp_path, lights=THREE, integrator=integrator))
     reports: list[tuple[int, int, str]] = []
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.basis import clean
-from lightpaint.basis.clean import (
-    CleanPlanes,
+from lightpaint.basis import denoised_planes
+from lightpaint.basis.denoised_planes import (
+    DenoisedPlanes,
     RoughPlanes,
     as_halves,
-    clean_planes,
-    kept_planes,
+    obtain_denoised_planes,
+    read_denoised_planes,
     scale_of,
 )
 from lightpaint.images.denoiser import denoised, oidn_is_installed
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Deno
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
-    monkeypatch.setattr(clean, "FEWEST", 1)
+    monkeypatch.setattr(denoised_planes, "MIN_PIXELS", 1)
     return tmp_path
 
 
@@ -32,7 +32,7 @@ def test_their_sum_is_a_clean_picture_of_any_lighting(make_basis: Any):
     """Half floats hold 11 bits of each plane, and the sum no less."""
     basis = make_basis(3, (40, 72))
     weights = np.array([[1.0, 2.0, 0.0], [0.5, 0.0, 3.0], [4.0, 1.0, 0.1]])
-    planes = clean_planes(basis)
+    planes = obtain_denoised_planes(basis)
     assert planes is not None
     each = [denoised(image, basis.features) for image in basis.images]
     expected = sum(w * x.astype(np.float64) for w, x in zip(weights, each, strict=True))
@@ -44,35 +44,35 @@ def test_their_sum_is_a_clean_picture_of_any_lighting(make_basis: Any):
 
 def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
     basis, made = make_basis(2, (24, 32)), []
-    real = clean.clean_plane
+    real = denoised_planes.denoise_plane
 
     def counted(*given: Any) -> Any:
         made.append(given)
         return real(*given)
 
-    monkeypatch.setattr(clean, "clean_plane", counted)
-    first, again = clean_planes(basis), clean_planes(replace(basis))
+    monkeypatch.setattr(denoised_planes, "denoise_plane", counted)
+    first, again = obtain_denoised_planes(basis), obtain_denoised_planes(replace(basis))
     assert len(made) == 2
     assert first is not None
     assert again is not None
     np.testing.assert_array_equal(first.halves, again.halves)
     # Other pixels, features or present emissions have others.
     other = replace(basis, planes=basis.images * np.float32(1.5))
-    assert kept_planes(other) is None
+    assert read_denoised_planes(other) is None
     brighter = tuple(replace(x, emission=(2.0, 2.0, 2.0)) for x in basis.lights)
-    assert kept_planes(replace(basis, lights=brighter)) is None
-    assert kept_planes(basis) is not None
+    assert read_denoised_planes(replace(basis, lights=brighter)) is None
+    assert read_denoised_planes(basis) is not None
 
 
 def test_few_pixels_and_many_are_not_worth_it(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
     basis = make_basis(2, (24, 32))
-    monkeypatch.setattr(clean, "FEWEST", basis.images[..., 0].size + 1)
-    assert clean_planes(basis) is None
-    monkeypatch.setattr(clean, "FEWEST", 1)
-    assert clean_planes(basis, most=basis.images[..., 0].size - 1) is None
-    assert clean_planes(basis, most=basis.images[..., 0].size) is not None
+    monkeypatch.setattr(denoised_planes, "MIN_PIXELS", basis.images[..., 0].size + 1)
+    assert obtain_denoised_planes(basis) is None
+    monkeypatch.setattr(denoised_planes, "MIN_PIXELS", 1)
+    assert obtain_denoised_planes(basis, most=basis.images[..., 0].size - 1) is None
+    assert obtain_denoised_planes(basis, most=basis.images[..., 0].size) is not None
     # What is kept is taken however much it is.
-    assert clean_planes(basis, most=1) is not None
+    assert obtain_denoised_planes(basis, most=1) is not None
 
 
 def test_a_folder_that_takes_nothing_is_no_obstacle(make_basis: Any, cache: Path):
@@ -80,8 +80,8 @@ def test_a_folder_that_takes_nothing_is_no_obstacle(make_basis: Any, cache: Path
     basis = make_basis(2, (24, 32))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LIGHTPAINT_CACHE", str(cache / "no folder"))
-        planes = clean_planes(basis)
-    assert isinstance(planes, CleanPlanes)
+        planes = obtain_denoised_planes(basis)
+    assert isinstance(planes, DenoisedPlanes)
 
 
 @pytest.mark.parametrize("brightest", [0.0, 1e-30, 1.0, 1024.0, 1025.0, 3e9])
@@ -94,7 +94,7 @@ def test_scales_keep_all_but_the_last_bits(brightest: float):
 
 def test_the_same_light_by_the_scales_of_brighter_planes(make_basis: Any):
     basis = make_basis(2, (24, 32))
-    planes = clean_planes(basis)
+    planes = obtain_denoised_planes(basis)
     assert planes is not None
     brighter = replace(basis, planes=basis.images * np.float32(2**12))
     its = planes.scaled_as(brighter)

@@ -6,11 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.basis.lightgroups.naming import Choice, choose_files, choose_layers, short_names
+from lightpaint.basis.lightgroups.layer_choice import (
+    LayerChoice,
+    choose_files,
+    choose_layers,
+    short_names,
+)
 from lightpaint.errors import BasisError
 
 
-def _choose(*names: str, pattern: str | None = None) -> Choice:
+def _choose(*names: str, pattern: str | None = None) -> LayerChoice:
     return choose_layers(dict.fromkeys(names, ()), pattern=pattern, where="a.exr")
 
 

@@ -1,12 +1,12 @@
-"""How many emitters a vertex should ask: variance and processor time against one question each.
+"""How many emitters a vertex should sample: variance and processor time against one each.
 
-    python benchmarks/questions.py [--scene gallery | cornell | stage | hall64 | …]
-        [--questions 1,1 8,2 8,4] [--resolution 320x180] [--spp N] [--repeats K]
+    python benchmarks/emitter_samples.py [--scene gallery | cornell | stage | hall64 | …]
+        [--emitter-samples 1,1 8,2 8,4] [--resolution 320x180] [--spp N] [--repeats K]
 
-Each pair is what the first vertex and later ones ask. All run in turns in one process, with one
-kernel, and choose by lessons of their own. Variance is that of a plane, averaged over pixels and
+Each pair is what the first vertex and later ones sample. All run in turns in one process, with one
+kernel, and are trained apart. Variance is that of a plane, averaged over pixels and
 channels, from the difference of two halves: the geometric mean over lights. Time is of the
-processor, without loading and lessons, which have a column of their own.
+processor, without loading and training, which have a column of their own.
 """
 
 import argparse
@@ -20,7 +20,7 @@ import numpy as np
 from hall import write_hall
 
 from lightpaint import load_scene, use_variant
-from lightpaint.basis.render.lessons import teach
+from lightpaint.basis.render.guide_training import train
 from lightpaint.scene.scene import Scene
 
 SCENES = Path(__file__).parent.parent / "scenes"
@@ -30,14 +30,14 @@ def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scene", default="gallery")
-    parser.add_argument("--questions", nargs="+", default=["1,1", "8,2", "8,4", "8,8"])
+    parser.add_argument("--emitter-samples", nargs="+", default=["1,1", "8,2", "8,4", "8,8"])
     parser.add_argument("--resolution", default="320x180")
     parser.add_argument("--spp", type=int, default=8)
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         scene = _scene(options.scene, options.resolution, Path(folder))
-        pairs = [tuple(map(int, pair.split(","))) for pair in options.questions]
+        pairs = [tuple(map(int, pair.split(","))) for pair in options.emitter_samples]
         print(f"{options.scene}: {len(scene.lights)} lights, {options.resolution}")
         measure(scene, pairs, options.spp, options.repeats)
 
@@ -47,14 +47,14 @@ def measure(scene: Scene, pairs: list[tuple[int, ...]], spp: int, repeats: int) 
     use_variant()
     from lightpaint.basis.render.one_pass import Tracer
 
-    seconds, lessons, variances = defaultdict(list), defaultdict(list), defaultdict(list)
+    seconds, training, variances = defaultdict(list), defaultdict(list), defaultdict(list)
     rows, half_spp = range(scene.size[0]), spp // 2
     for repeat in range(repeats + 1):
         for pair in pairs:
-            tracer = Tracer(scene, repeat, questions=(pair[0], pair[1]))
+            tracer = Tracer(scene, repeat, emitter_samples=(pair[0], pair[1]))
             begun_s = time.process_time()
-            teach(tracer, lambda: None)
-            taught_s = time.process_time()
+            train(tracer, lambda: None)
+            trained_s = time.process_time()
             halves = [tracer.planes(rows) for _ in range(2)]
             for half, planes in enumerate(halves):
                 tracer.add(planes, half, rows, 0, half_spp)
@@ -63,17 +63,19 @@ def measure(scene: Scene, pairs: list[tuple[int, ...]], spp: int, repeats: int) 
             tracer.close()
             if repeat == 0:  # the kernel is compiled
                 continue
-            lessons[pair].append(taught_s - begun_s)
-            seconds[pair].append((done_s - taught_s) / spp)
+            training[pair].append(trained_s - begun_s)
+            seconds[pair].append((done_s - trained_s) / spp)
             variances[pair].append(np.square(difference, dtype=np.float64).mean(axis=(1, 2, 3)))
-    print(f"{'asked':>8s} {'lesson s':>9s} {'s per spp':>10s} {'variance':>9s} {'times time':>11s}")
+    print(
+        f"{'samples':>8s} {'training':>9s} {'s per spp':>10s} {'variance':>9s} {'times time':>11s}"
+    )
     first = pairs[0]
     for pair in pairs:
         ratios = np.mean(variances[pair], axis=0) / np.mean(variances[first], axis=0)
         variance = float(np.exp(np.mean(np.log(ratios[ratios > 0]))))
         its, reference = statistics.median(seconds[pair]), statistics.median(seconds[first])
         print(
-            f"{pair[0]:5d}, {pair[1]} {statistics.median(lessons[pair]):9.2f} {its:10.4f} "
+            f"{pair[0]:5d}, {pair[1]} {statistics.median(training[pair]):9.2f} {its:10.4f} "
             f"{variance:9.3f} {variance * its / reference:11.3f}"
         )
 

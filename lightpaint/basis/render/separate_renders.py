@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.budget import SHORTER, Budget, Clock, Keeper, next_pair
+from lightpaint.basis.render.render_budget import PASS_DIVISOR, Budget, Clock, Keeper, next_pair
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.progress import Interrupted, Progress
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
@@ -100,7 +100,7 @@ def render_separately(
     try:
         with tracing() as let_others_through:
             for light, plan, after_pass in _turns(scene, budget, sums, progress):
-                loaded = _alone(scene, light)
+                loaded = _load_one_light(scene, light)
                 for half, pass_spp in plan:
                     _add_pass(loaded, scene, sums, light, half, pass_spp, seed)
                     after_pass()
@@ -126,7 +126,7 @@ def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> 
     """
     height, width = scene.size
     step = scene.film.block_pixels
-    return plan_passes(height * width, spp, done=done, shorter=SHORTER, step=step)
+    return plan_passes(height * width, spp, done=done, shorter=PASS_DIVISOR, step=step)
 
 
 def _turns(
@@ -140,7 +140,11 @@ def _turns(
         for light in range(lights):
             plan = plan_of_light(scene, budget.spp, done=sums.done(light))
             if plan:
-                yield light, plan, _count(f"basis: {scene.lights[light].name}", plan, progress)
+                yield (
+                    light,
+                    plan,
+                    _progress_counter(f"basis: {scene.lights[light].name}", plan, progress),
+                )
         return
 
     # Rounds in which every light comes to the same number: one pair of passes to see what
@@ -159,7 +163,7 @@ def _turns(
         pairs = max(0, int(clock.left_s / pair_of_all_s))
 
 
-def _count(label: str, plan: Plan, progress: Progress) -> Callable[[], None]:
+def _progress_counter(label: str, plan: Plan, progress: Progress) -> Callable[[], None]:
     done = 0
     progress(label, done, len(plan))
 
@@ -171,7 +175,7 @@ def _count(label: str, plan: Plan, progress: Progress) -> Callable[[], None]:
     return one_more
 
 
-def _alone(scene: Scene, light: int) -> Any:
+def _load_one_light(scene: Scene, light: int) -> Any:
     name = scene.lights[light].name
     return scene.load({x.name: WHITE if x.name == name else BLACK for x in scene.lights})
 

@@ -20,8 +20,8 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache_folder import CLEAN, is_own
-from lightpaint.basis.clean_mix import clean_plane
+from lightpaint.basis.cache_folder import DENOISED_SUFFIX, is_own
+from lightpaint.basis.denoised_mixes import denoise_plane
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
@@ -29,24 +29,24 @@ from lightpaint.images.denoiser import denoiser_text, oidn_is_installed
 from lightpaint.images.resampling import resampled
 from lightpaint.threads import parallel_map
 
-FORMAT, PARTS = "lightpaint-clean 2", ("halves", "scales", "present")
+FORMAT, ARRAY_NAMES = "lightpaint-clean 2", ("halves", "scales", "present")
 
 #: Pixels of all planes below which a sum is denoised as soon as planes are read, up to which they
 #: are made where they are wanted, and up to which a render is followed by them.
-FEWEST, MOST_WANTED, MOST = 2**18, 2**22, 2**24
+MIN_PIXELS, ON_DEMAND_MAX_PIXELS, MAX_PIXELS = 2**18, 2**22, 2**24
 
 #: The brightest value of a plane as half floats, which leaves 24 stops below it to their full
 #: precision.
-BRIGHTEST = 1024.0
+BRIGHTEST_HALF = 1024.0
 
 #: Pixels on a side over which the share of a light is taken in rough planes.
-ROUGH = 8
+ROUGH_BLOCK = 8
 
 #: Rows of planes that are brought to single precision at a time.
-STRIP = 64
+STRIP_ROWS = 64
 
 #: What comes of reading a file that is cut off, or another one.
-_DAMAGES = (
+_READ_ERRORS = (
     *(OSError, EOFError, LookupError, MemoryError, NotImplementedError, RuntimeError, ValueError),
     zipfile.BadZipFile,
 )
@@ -55,7 +55,7 @@ Halves = npt.NDArray[np.float16]
 
 
 @dataclass(frozen=True)
-class CleanPlanes:
+class DenoisedPlanes:
     """Denoised planes, for display.
 
     halves: (n, h, w, 3) float16, linear, at unit emission over `scales`. scales: (n,), powers of 2.
@@ -68,7 +68,7 @@ class CleanPlanes:
     present: Floats
 
     @classmethod
-    def of(cls, basis: Basis, halves: Halves, scales: Doubles) -> "CleanPlanes":
+    def of(cls, basis: Basis, halves: Halves, scales: Doubles) -> "DenoisedPlanes":
         """Return the planes with their sum for the present scene."""
         return cls(halves, scales, _mixed(halves, scales, basis.present_weights))
 
@@ -76,11 +76,11 @@ class CleanPlanes:
         """Return Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
         return _mixed(self.halves, self.scales, weights)
 
-    def scaled_as(self, basis: Basis) -> "CleanPlanes":
+    def scaled_as(self, basis: Basis) -> "DenoisedPlanes":
         """Return the same light, in the scales of another basis of the same lights."""
         scales = np.array([scale_of(plane) for plane in basis.planes])
         halves = np.stack([as_halves(self.plane(k), x) for k, x in enumerate(scales)])
-        return CleanPlanes(halves, scales, self.present)
+        return DenoisedPlanes(halves, scales, self.present)
 
     def plane(self, k: int) -> Floats:
         """Return the plane of light k at unit emission, (h, w, 3) float32."""
@@ -113,13 +113,13 @@ class RoughPlanes:
 
     def _mean(self, picture: Floats) -> Floats:
         height, width = self.basis.size
-        return resampled(picture, (-(-height // ROUGH), -(-width // ROUGH)))
+        return resampled(picture, (-(-height // ROUGH_BLOCK), -(-width // ROUGH_BLOCK)))
 
 
 def scale_of(plane: Floats) -> float:
     """Return the power of two that a plane is divided by to become half floats."""
     brightest = float(plane.max(initial=0))
-    return float(2.0 ** np.ceil(np.log2(brightest / BRIGHTEST))) if brightest > 0 else 1.0
+    return float(2.0 ** np.ceil(np.log2(brightest / BRIGHTEST_HALF))) if brightest > 0 else 1.0
 
 
 def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
@@ -127,46 +127,49 @@ def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
     return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
 
 
-def clean_planes(
-    basis: Basis, *, most: int = MOST_WANTED, progress: Callable[[int, int], None] | None = None
-) -> CleanPlanes | None:
+def obtain_denoised_planes(
+    basis: Basis,
+    *,
+    most: int = ON_DEMAND_MAX_PIXELS,
+    progress: Callable[[int, int], None] | None = None,
+) -> DenoisedPlanes | None:
     """Return the denoised planes, from the cache or computed and cached now.
 
     most: pixels of all planes up to which they are made. progress: hears how many are, of how many.
     None where there are none, and sums of so few pixels are denoised sooner.
     """
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
-    if pixels < FEWEST or not oidn_is_installed():
+    if pixels < MIN_PIXELS or not oidn_is_installed():
         return None
-    found = kept_planes(basis)
+    found = read_denoised_planes(basis)
     if found is None and pixels <= most:
         halves, scales = np.empty(_shape(basis), np.float16), np.ones(len(basis.lights))
         for k in range(len(basis.lights)):
-            halves[k], scales[k] = clean_halves(basis, k)
+            halves[k], scales[k] = denoise_to_halves(basis, k)
             if progress is not None:
                 progress(k + 1, len(basis.lights))
-        found = CleanPlanes.of(basis, halves, scales)
-        keep_planes(basis, found)
+        found = DenoisedPlanes.of(basis, halves, scales)
+        write_denoised_planes(basis, found)
     return found
 
 
-def clean_halves(basis: Basis, k: int) -> tuple[Halves, float]:
-    """Return the denoised plane of light k as `CleanPlanes` holds it, and its scale."""
+def denoise_to_halves(basis: Basis, k: int) -> tuple[Halves, float]:
+    """Return the denoised plane of light k as `DenoisedPlanes` holds it, and its scale."""
     scale = scale_of(basis.planes.plane(k))
-    return as_halves(clean_plane(basis, k), scale), scale
+    return as_halves(denoise_plane(basis, k), scale), scale
 
 
-def kept_planes(basis: Basis) -> CleanPlanes | None:
+def read_denoised_planes(basis: Basis) -> DenoisedPlanes | None:
     """Return the cached denoised planes of just these pixels; None if missing or damaged."""
-    with suppress(*_DAMAGES, LightpaintError):
-        path = cache.place_beside(basis, CLEAN)
+    with suppress(*_READ_ERRORS, LightpaintError):
+        path = cache.companion_path(basis, DENOISED_SUFFIX)
         if not is_own(path):
             return None
         with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
-            if str(kept["made_of"]) != _made_of(basis):
+            if str(kept["made_of"]) != _content_key(basis):
                 return None
-            found = CleanPlanes(*(kept[name] for name in PARTS))
-        its = [getattr(found, name) for name in PARTS]
+            found = DenoisedPlanes(*(kept[name] for name in ARRAY_NAMES))
+        its = [getattr(found, name) for name in ARRAY_NAMES]
         shapes = [_shape(basis), (len(basis.lights),), _shape(basis)[1:]]
         types = ["float16", "float64", "float32"]
         if [x.shape for x in its] == shapes and [x.dtype.name for x in its] == types:
@@ -175,13 +178,13 @@ def kept_planes(basis: Basis) -> CleanPlanes | None:
     return None
 
 
-def keep_planes(basis: Basis, planes: CleanPlanes) -> bool:
+def write_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
     """Keep what was made of `basis`. Returns whether that worked: nothing is lost if not."""
     try:
-        path = cache.place_beside(basis, CLEAN)
+        path = cache.companion_path(basis, DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:
-            made_of = np.array(_made_of(basis))
-            parts: dict[str, Any] = {name: getattr(planes, name) for name in PARTS}
+            made_of = np.array(_content_key(basis))
+            parts: dict[str, Any] = {name: getattr(planes, name) for name in ARRAY_NAMES}
             np.savez(file, made_of=made_of, **parts)
     except (OSError, LightpaintError):
         return False
@@ -192,16 +195,16 @@ def _mixed(halves: Halves, scales: Doubles, weights: Doubles) -> Floats:
     own = weights * scales[:, None]
 
     def strip(top: int) -> Floats:
-        return mix(halves[:, top : top + STRIP].astype(np.float32), own)
+        return mix(halves[:, top : top + STRIP_ROWS].astype(np.float32), own)
 
-    return np.concatenate(parallel_map(strip, range(0, halves.shape[1], STRIP)))
+    return np.concatenate(parallel_map(strip, range(0, halves.shape[1], STRIP_ROWS)))
 
 
 def _shape(basis: Basis) -> tuple[int, int, int, int]:
     return (len(basis.lights), *basis.size, 3)
 
 
-def _made_of(basis: Basis) -> str:
+def _content_key(basis: Basis) -> str:
     """Return everything that the denoised planes depend on."""
     others: list[Floats] = [basis.present_weights]
     if basis.features is not None:

@@ -6,27 +6,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.lightgroups.layers import RenderLayer
+from lightpaint.basis.lightgroups.render_layers import RenderLayer
 from lightpaint.colour.color import LUMINANCE
 
 #: Share of the beauty that the groups may lack beyond rounding before it counts as missing.
-NOTHING = 1e-5
+NEGLIGIBLE_SHARE = 1e-5
 
 #: Share of the beauty by which they may exceed it before that is a warning.
-EXCEEDING = 1e-3
+WARNING_EXCESS = 1e-3
 
 #: Largest relative error of one rounding to float16, absolute error below its normal range, and
 #: of a sum in float32 over the samples of a renderer, whose order differs from layer to layer.
 HALF, SUBNORMAL, SUMMED = 2.0**-11, 2.0**-25, 2.0**-20
 
 #: Most pictures of which the sum of all but two is sought: each is tried with each.
-MOST_TRIED = 40
+MAX_CANDIDATES = 40
 
 #: Every how many rows and columns a pixel is looked at first, where most pictures are others.
-COARSE = 8
+COARSE_STEP = 8
 
 
-def spoken_sum(
+def describe_sum(
     rest: Floats,
     whole: Floats,
     layers: Sequence[RenderLayer],
@@ -40,25 +40,29 @@ def spoken_sum(
     others, light of a wide gamut is negative.
     """
     beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
-    truly_missing, truly_exceeding = shares(beyond, whole)
-    if truly_missing + truly_exceeding <= NOTHING:
+    truly_missing, truly_exceeding = missing_and_exceeding(beyond, whole)
+    if truly_missing + truly_exceeding <= NEGLIGIBLE_SHARE:
         off = missing + exceeding
         return f"the groups add up to the beauty (to {off:.1g} of its light)", False
     told = (
-        f"the groups lack {spoken_share(missing)} of the light of the beauty: "
+        f"the groups lack {share_text(missing)} of the light of the beauty: "
         f"that is kept as it is, as the light {name}"
     )
-    if truly_exceeding > EXCEEDING:
+    if truly_exceeding > WARNING_EXCESS:
         warning = (
-            f"WARNING: in places the groups exceed the beauty, by {spoken_share(exceeding)} of its "
+            f"WARNING: in places the groups exceed the beauty, by {share_text(exceeding)} of its "
             f"light in all, which the light {name} takes away: is the beauty denoised or clamped, "
             "a light in two groups, or one of them no light?"
         )
-        told = f"{warning} {told[0].upper()}{told[1:]}" if truly_missing > NOTHING else warning
+        told = (
+            f"{warning} {told[0].upper()}{told[1:]}"
+            if truly_missing > NEGLIGIBLE_SHARE
+            else warning
+        )
     return told, True
 
 
-def shares(rest: Floats, whole: Floats) -> tuple[float, float]:
+def missing_and_exceeding(rest: Floats, whole: Floats) -> tuple[float, float]:
     """Return the luminance that is missing, and that is too much, relative to the beauty."""
     total = float((np.abs(whole) @ LUMINANCE).sum())
     if total == 0:
@@ -113,7 +117,7 @@ class LayerSum:
 
     def lacks(self, beauty: RenderLayer) -> float:
         """Return Σ |beauty − total|, where both are finite."""
-        return float(_off(beauty.image, self.total).sum())
+        return float(_deviation(beauty.image, self.total).sum())
 
     def is_of(self, beauty: RenderLayer, *, less_itself: bool = False) -> bool:
         """Return True if the sum is just that picture, and the picture is not black.
@@ -121,9 +125,9 @@ class LayerSum:
         less_itself: whether the picture is among what was added up, and is to be taken out again.
         """
         size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
-        most = NOTHING * size
+        most = NEGLIGIBLE_SHARE * size
         # Excesses only add up, so that a few pixels are enough to tell that it is another picture.
-        few = (slice(None, None, COARSE), slice(None, None, COARSE))
+        few = (slice(None, None, COARSE_STEP), slice(None, None, COARSE_STEP))
         return bool(
             size > 0
             and self._excess(beauty, few, less_itself=less_itself) <= most
@@ -135,20 +139,20 @@ class LayerSum:
         image, bound = beauty.image[where], self.bound[where]
         if less_itself:
             # x − (total − x); the bound is that of the same layers.
-            off = _off(2 * image.astype(np.float64), self.total[where])
+            off = _deviation(2 * image.astype(np.float64), self.total[where])
         else:
-            off = _off(image, self.total[where])
+            off = _deviation(image, self.total[where])
             bound = bound + _rounded(image, is_half=beauty.is_half)
         return float(np.maximum(off - bound, 0).sum())
 
 
-def _off(picture: Floats, total: Floats) -> Floats:
+def _deviation(picture: Floats, total: Floats) -> Floats:
     """Return |picture − total|, (h, w, 3) float64, 0 if either is not finite."""
     with np.errstate(invalid="ignore"):
         return np.asarray(np.nan_to_num(np.abs(picture - total), nan=0, posinf=0, neginf=0))
 
 
-def beauty_by_sum(
+def find_beauty_of_lights(
     others: Sequence[RenderLayer], lights: Sequence[RenderLayer]
 ) -> RenderLayer | None:
     """Return the layer of unknown name that is the sum of the lights."""
@@ -158,13 +162,13 @@ def beauty_by_sum(
     return next((layer for layer in others if added.is_of(layer)), None)
 
 
-def beauty_among(layers: Sequence[RenderLayer]) -> RenderLayer | None:
+def find_beauty(layers: Sequence[RenderLayer]) -> RenderLayer | None:
     """Return the layer that is the sum of the others."""
     added = LayerSum.of(layers)
     return next((layer for layer in layers if added.is_of(layer, less_itself=True)), None)
 
 
-def stranger_among(
+def unrelated_layer(
     layers: Sequence[RenderLayer], beauty: RenderLayer | None
 ) -> tuple[RenderLayer, RenderLayer] | None:
     """Return the layer without which the others add up to the picture, and that picture.
@@ -172,22 +176,22 @@ def stranger_among(
     beauty: the picture; without one it is sought among the layers. None where all of them are
     needed, where no single one is in the way, and where they are too many to try.
     """
-    if len(layers) < (2 if beauty else 4) or (beauty is None and len(layers) > MOST_TRIED):
+    if len(layers) < (2 if beauty else 4) or (beauty is None and len(layers) > MAX_CANDIDATES):
         return None
     if beauty is not None and LayerSum.of(layers).is_of(beauty):
         return None
     # A few pixels tell that most pairs are none.
-    few, whole = list(map(_coarse, layers)), beauty and _coarse(beauty)
-    for k in _strangers(few, whole):
+    few, whole = list(map(_coarsened, layers)), beauty and _coarsened(beauty)
+    for k in _unrelated_candidates(few, whole):
         others = [*layers[:k], *layers[k + 1 :]]
-        if beauty is None and (found := beauty_among(others)) is not None:
+        if beauty is None and (found := find_beauty(others)) is not None:
             return layers[k], found
         if beauty is not None and LayerSum.of(others).is_of(beauty):
             return layers[k], beauty
     return None
 
 
-def _strangers(layers: Sequence[RenderLayer], beauty: RenderLayer | None) -> list[int]:
+def _unrelated_candidates(layers: Sequence[RenderLayer], beauty: RenderLayer | None) -> list[int]:
     """Return indices of layers without which the others may add up to the picture."""
     added = LayerSum.of(layers)
     found = []
@@ -202,10 +206,10 @@ def _strangers(layers: Sequence[RenderLayer], beauty: RenderLayer | None) -> lis
     return found
 
 
-def _coarse(layer: RenderLayer) -> RenderLayer:
-    return replace(layer, image=layer.image[::COARSE, ::COARSE])
+def _coarsened(layer: RenderLayer) -> RenderLayer:
+    return replace(layer, image=layer.image[::COARSE_STEP, ::COARSE_STEP])
 
 
-def spoken_share(share: float) -> str:
+def share_text(share: float) -> str:
     """Return a share in words: `0.4 %`, `25 %`."""
     return f"{100 * share:.2g} %" if share < 0.0995 else f"{100 * share:.0f} %"

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lightpaint.basis import cache, cache_folder, known
+from lightpaint.basis import cache, cache_folder, scene_facts
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.known import Known, key_of, recall, remember
-from lightpaint.basis.render.render import basis_lights
+from lightpaint.basis.render.basis_render import basis_lights
+from lightpaint.basis.scene_facts import SceneFacts, facts_key, recall_facts, remember_facts
 from lightpaint.scene.scene import Scene, load_scene
 
 SCENE = """<scene version="3.0.0">
@@ -34,7 +34,7 @@ LATER_S = 60.0  # after which files count as old
 def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty cache, and a process that has loaded no renderer."""
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(known, "sys", SimpleNamespace(modules={}, version=sys.version))
+    monkeypatch.setattr(scene_facts, "sys", SimpleNamespace(modules={}, version=sys.version))
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def asking(folder: Path, **more: Any) -> str:
-    return key_of({"path": str(folder / "hall.xml"), **more})
+    return facts_key({"path": str(folder / "hall.xml"), **more})
 
 
 def kept(scene: Scene, make_basis: Any) -> Basis:
@@ -67,10 +67,10 @@ def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> 
     scene = load_scene(folder / "hall.xml")
     basis = kept(scene, make_basis)
     key, later_s = asking(folder), time.time() + LATER_S
-    assert recall(key) is None
-    assert remember(key, scene, basis, remarks=["one"], began_s=later_s)
-    found = recall(key)
-    assert found == Known(
+    assert recall_facts(key) is None
+    assert remember_facts(key, scene, basis, remarks=["one"], began_s=later_s)
+    found = recall_facts(key)
+    assert found == SceneFacts(
         scene.identity,
         "sensor_0",
         (3, 4),
@@ -81,8 +81,8 @@ def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> 
     )
     [entry] = cache.entries()
     assert entry.size > entry.path.stat().st_size
-    cache.drop([entry])
-    assert recall(key) is None
+    cache.delete_entries([entry])
+    assert recall_facts(key) is None
     assert [x.name for x in cache_folder.folder().iterdir()] == [cache_folder.TAG]
 
 
@@ -117,10 +117,10 @@ def test_nothing_is_known_once_a_file_is_another(
 ) -> None:
     scene = load_scene(folder / "hall.xml")
     key, later_s = asking(folder), time.time() + LATER_S
-    assert remember(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
-    assert recall(key) is not None
+    assert remember_facts(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    assert recall_facts(key) is not None
     change(folder)
-    assert recall(key) is None
+    assert recall_facts(key) is None
 
 
 def test_nor_where_it_is_asked_for_otherwise(
@@ -128,19 +128,19 @@ def test_nor_where_it_is_asked_for_otherwise(
 ) -> None:
     scene = load_scene(folder / "hall.xml")
     key, later_s = asking(folder), time.time() + LATER_S
-    assert remember(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    assert remember_facts(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
     for more in ({"sensor": 1}, {"parameters": {"a": "1"}}, {"resolution": "1/2"}, {"lights": []}):
-        assert recall(asking(folder, **more)) is None
-    monkeypatch.setattr(known, "_code", lambda: "another version")
-    assert recall(asking(folder)) is None
+        assert recall_facts(asking(folder, **more)) is None
+    monkeypatch.setattr(scene_facts, "_code_version", lambda: "another version")
+    assert recall_facts(asking(folder)) is None
     monkeypatch.undo()
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(folder)  # where relative names are looked for, too
     assert asking(folder) != key
     # A process that has loaded scenes may look for files elsewhere.
-    assert recall(key) is None
-    monkeypatch.setattr(known, "sys", SimpleNamespace(modules={}, version=sys.version))
-    assert recall(key) is not None
+    assert recall_facts(key) is None
+    monkeypatch.setattr(scene_facts, "sys", SimpleNamespace(modules={}, version=sys.version))
+    assert recall_facts(key) is not None
 
 
 def test_what_is_in_doubt_is_not_kept(folder: Path, make_basis: Any) -> None:
@@ -148,31 +148,31 @@ def test_what_is_in_doubt_is_not_kept(folder: Path, make_basis: Any) -> None:
     basis, key = kept(scene, make_basis), asking(folder)
     later_s = time.time() + LATER_S
     # Its files were written just before they were read.
-    assert not remember(key, scene, basis, remarks=(), began_s=time.time())
+    assert not remember_facts(key, scene, basis, remarks=(), began_s=time.time())
     # The basis is not there, or not with just these samples.
     other = replace(basis, origin=replace(basis.origin, halves=(8, 8)))
-    assert not remember(key, scene, other, remarks=(), began_s=later_s)
+    assert not remember_facts(key, scene, other, remarks=(), began_s=later_s)
     # The parser reads a file that is no part of the scene later, or looks into another folder.
     (folder / "blue.spd").write_text("400 1\n700 2\n")
     spectrum = '<spectrum name="reflectance" filename="blue.spd"/>'
     for more in (f'<bsdf type="diffuse" id="b">{spectrum}</bsdf>', '<path value="textures"/>'):
         (folder / "hall.xml").write_text(SCENE.format(more=more))
         scene = load_scene(folder / "hall.xml")
-        assert not remember(
+        assert not remember_facts(
             key, scene, kept(scene, make_basis), remarks=(), began_s=time.time() + LATER_S
         )
-    assert recall(key) is None
+    assert recall_facts(key) is None
 
 
 def test_what_is_damaged_is_not_believed(folder: Path, make_basis: Any) -> None:
     scene = load_scene(folder / "hall.xml")
     key, later_s = asking(folder), time.time() + LATER_S
-    assert remember(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
+    assert remember_facts(key, scene, kept(scene, make_basis), remarks=(), began_s=later_s)
     [path] = cache_folder.folder().glob("*.known.json")
     text = path.read_text("utf-8")
     for damage in ("", "[]", text[:-9], text.replace('"spp"', '"ssp"'), text.replace("lamp", "[")):
         path.write_text(damage, "utf-8")
-        assert recall(key) is None
+        assert recall_facts(key) is None
 
 
 def test_what_lies_beside_no_basis_goes_when_it_was_not_used(tmp_path: Path) -> None:
@@ -184,7 +184,7 @@ def test_what_lies_beside_no_basis_goes_when_it_was_not_used(tmp_path: Path) -> 
     for path in (alone, mine):
         np.savez(path, made_of=np.array("0"))
     size = alone.stat().st_size
-    assert cache.sweep(3600) == 0
-    assert cache.sweep() == size
+    assert cache.delete_orphans(3600) == 0
+    assert cache.delete_orphans() == size
     assert not alone.exists()
     assert mine.exists()

@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 from light_groups import pictures
 
-from lightpaint.basis.lightgroups.beauty import LayerSum, beauty_among, beauty_by_sum, rounding
-from lightpaint.basis.lightgroups.layers import RenderLayer
+from lightpaint.basis.lightgroups.beauty_comparison import (
+    LayerSum,
+    find_beauty,
+    find_beauty_of_lights,
+    rounding,
+)
+from lightpaint.basis.lightgroups.render_layers import RenderLayer
 
 
 def _layers(images: Any, kind: Any = np.float32) -> list[RenderLayer]:
@@ -43,8 +48,8 @@ def test_sums_are_found_as_the_definition_says(kind: Any, off: float, where: str
     rounds_away = kind == np.float16 and where == "everywhere" and off < 1e-4
     assert expected is (off < 1e-5 or rounds_away)
     assert LayerSum.of(lights).is_of(picture) is expected
-    assert (beauty_by_sum([lights[0], picture], lights) is picture) is expected
-    assert (beauty_among(layers) is picture) is expected
+    assert (find_beauty_of_lights([lights[0], picture], lights) is picture) is expected
+    assert (find_beauty(layers) is picture) is expected
     for light in lights:
         assert not _adds_up(light, [x for x in layers if x is not light])
         assert not LayerSum.of(layers).is_of(light, less_itself=True)
@@ -52,8 +57,8 @@ def test_sums_are_found_as_the_definition_says(kind: Any, off: float, where: str
 
 def test_black_is_no_sum():
     black = _layers(np.zeros((3, 9, 9, 3)))
-    assert beauty_among(black) is None
-    assert beauty_by_sum(black, black) is None
+    assert find_beauty(black) is None
+    assert find_beauty_of_lights(black, black) is None
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -62,8 +67,8 @@ def test_pixels_without_a_number_have_no_say(bad: float):
     whole = images.sum(axis=0)
     images[1, 3, 3] = bad
     layers = _layers([*images, whole])
-    assert beauty_among(layers) is layers[-1]
-    assert beauty_by_sum(layers[-1:], layers[:-1]) is layers[-1]
+    assert find_beauty(layers) is layers[-1]
+    assert find_beauty_of_lights(layers[-1:], layers[:-1]) is layers[-1]
 
 
 def test_one_more_layer():
@@ -94,7 +99,7 @@ def test_every_layer_is_gone_through_a_few_times_however_many_there_are():
     for layer in layers:
         object.__setattr__(layer, "image", layer.image.view(_Counted))
     _Counted.read = 0
-    assert beauty_among(layers) is None
+    assert find_beauty(layers) is None
     # Sum, bound, size and the coarse look. With a sum for each candidate it would be 24 times
     # as many.
     assert 0 < _Counted.read < 12 * images.size

@@ -2,7 +2,7 @@
 
 It follows Mitsuba's path.cpp step for step. Two things may be put in the place of chance:
 `numbers`, evenly spread ones instead of the sampler's, and `guide`, which chooses emitters by
-what a lesson has learned. Either both are given or none. With them one thread of the loop follows
+what training has learned. Either both are given or none. With them one thread of the loop follows
 all paths of a pixel, one after the other, so that their light is added in the order of the samples.
 
 Import it once a variant is set and not a scalar one: its arrays do not exist before.
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from lightpaint.basis.render.guide import BELOW_1
+from lightpaint.basis.render.emitter_guide import BELOW_1
 from lightpaint.basis.render.sobol import APERTURE, FILM, TIME
 
 #: Steps of this, taken modulo 1, are spread evenly in whatever number.
@@ -36,16 +36,18 @@ class Rules(NamedTuple):
     max_depth: Any
     rr_depth: Any
 
-    first_questions: Any = 1
-    later_questions: Any = 1
+    first_emitter_samples: Any = 1
+    later_emitter_samples: Any = 1
 
-    def questions_at(self, depth):
-        """Return how many emitters are asked at the vertex with so many before it.
+    def emitter_samples_at(self, depth):
+        """Return how many emitters are sampled at the vertex with so many before it.
 
-        depth: UInt32; what is before the camera counts as its first, where nothing is asked.
+        depth: UInt32; what is before the camera counts as its first, where none is sampled.
         """
         return dr.select(
-            mi.Int32(depth) <= 0, mi.UInt32(self.first_questions), mi.UInt32(self.later_questions)
+            mi.Int32(depth) <= 0,
+            mi.UInt32(self.first_emitter_samples),
+            mi.UInt32(self.later_emitter_samples),
         )
 
 
@@ -144,14 +146,14 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         else:
             pdf = emitter.pdf_direction(previous, ds, by_choice)
             pdf *= guide.probability(previous_cell, emitter, by_choice)
-            pdf *= rules.questions_at(depth - 1)
+            pdf *= rules.emitter_samples_at(depth - 1)
         emission = emitter.eval(si, hit & (previous_pdf > 0))
         carried = weight * throughput
         found = carried * emission * _mis(previous_pdf, pdf)
         planes.add(place, emitter, found, depth > 1, hit)
         planes.note_seen(place, hit & (depth == 0))
 
-        # Next-event estimation: emitters are asked for their light.
+        # Next-event estimation: emitters are sampled.
         active_next = active & (depth + 1 < rules.max_depth) & si.is_valid()
         bsdf = si.bsdf(ray)
         smooth = active_next & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
@@ -165,8 +167,8 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         else:
             cell = guide.cell(si)
             number = numbers.at_vertex(term, depth, 0)
-            count = rules.questions_at(depth)
-            _ask_emitters(
+            count = rules.emitter_samples_at(depth)
+            _sample_emitters(
                 scene, guide, planes, place, si, bsdf, carried, cell, number, count, depth, smooth
             )
 
@@ -224,25 +226,25 @@ def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
 
 
 @dr.syntax
-def _ask_emitters(
+def _sample_emitters(
     scene, guide, planes, place, si, bsdf, carried, cell, number, count, depth, active
 ):
-    """Ask `count` emitters for their light, and add what is not in shadow to `planes`.
+    """Sample `count` emitters, and add the light that is not in shadow to `planes`.
 
     One number, split systematically, chooses all of them: each share of the guide gets as many
-    questions as it is worth, but for one. number: for choice and place of the first. carried: what
+    samples as it is worth, but for one. number: for choice and place of the first. carried: what
     the camera sees of the light that the surface scatters.
     """
     context = mi.BSDFContext()
-    k = mi.UInt32(0)  # Questions that were asked
-    asking = mi.Bool(active)  # Who has not asked all
-    while asking:
+    k = mi.UInt32(0)  # Emitters sampled so far
+    active = mi.Bool(active)  # Paths that have not sampled all
+    while active:
         x = dr.minimum((number.x + mi.Float(k)) / mi.Float(count), BELOW_1)
         y = number.y + mi.Float(k) * GOLDEN_RATIO
-        chosen, chance, rest = guide.choose(cell, x, asking)
-        emitter = dr.gather(mi.EmitterPtr, guide.emitters, chosen, asking)
-        ds, radiance = emitter.sample_direction(si, mi.Point2f(rest, y - dr.floor(y)), asking)
-        lit = asking & (ds.pdf != 0)
+        chosen, chance, rest = guide.choose(cell, x, active)
+        emitter = dr.gather(mi.EmitterPtr, guide.emitters, chosen, active)
+        ds, radiance = emitter.sample_direction(si, mi.Point2f(rest, y - dr.floor(y)), active)
+        lit = active & (ds.pdf != 0)
         expected = chance * mi.Float(count)
         bsdf_value, bsdf_pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
         mis = dr.select(ds.delta, 1, _mis(ds.pdf * expected, bsdf_pdf))
@@ -250,10 +252,10 @@ def _ask_emitters(
         # Where a spot does not point no shadow ray is needed, nor below a surface.
         lit &= dr.any(contribution != 0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
-        guide.learn(cell, chosen, contribution, asked=asking, lit=lit)
+        guide.learn(cell, chosen, contribution, is_sampled=active, lit=lit)
         planes.add(place, emitter, contribution * dr.rcp(expected), depth > 0, lit)
         k += 1
-        asking &= k < count
+        active &= k < count
 
 
 def _numbers_of_surface(sampler, numbers, term, depth):

@@ -8,7 +8,7 @@ without a word.
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from lightpaint.basis.file import FORMAT_KEY
+from lightpaint.basis.basis_file import FORMAT_KEY
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import OWN, read_channels, read_headers
@@ -44,7 +44,9 @@ def is_own_basis(path: Path) -> bool:
     return any(FORMAT_KEY in header for header in read_headers(path)[0])
 
 
-def files_in(folder: Path, leave_out: Iterable[str | Path] = ()) -> tuple[list[Path], list[str]]:
+def candidate_files(
+    folder: Path, leave_out: Iterable[str | Path] = ()
+) -> tuple[list[Path], list[str]]:
     """Return files of a folder that may hold light groups, by name, and a sentence on the others.
 
     leave_out: files that are none, like the painting. Raises BasisError if none is left, if there
@@ -58,10 +60,10 @@ def files_in(folder: Path, leave_out: Iterable[str | Path] = ()) -> tuple[list[P
             "frames? give a folder with the light groups of one"
         )
     others = [Path(file) for file in leave_out]
-    why = {file: _why_no_light(file, others) for file in files}
+    why = {file: _reason_against(file, others) for file in files}
     left = [file for file in files if not why[file]]
     why |= {file: "not named .exr" for file in visible if file not in why and _is_readable(file)}
-    told = _spoken({file: reason for file, reason in why.items() if reason})
+    told = _list_with_reasons({file: reason for file, reason in why.items() if reason})
     if not left:
         none = f"{folder} holds no .exr file" if not told else f"{folder} holds no light: {told}"
         raise BasisError(f"{none}; give the EXR with the light groups, or a folder of them")
@@ -88,7 +90,7 @@ def _is_readable(file: Path) -> bool:
         return False
 
 
-def _why_no_light(file: Path, others: Sequence[Path]) -> str:
+def _reason_against(file: Path, others: Sequence[Path]) -> str:
     """Return why a file is not the render of a light, in few words; "" if it may be one."""
     if any(_is_same(file, other) for other in others):
         return "painting or mask"
@@ -113,7 +115,7 @@ def _is_same(file: Path, other: Path) -> bool:
         return False
 
 
-def _spoken(why: dict[Path, str]) -> str:
+def _list_with_reasons(why: dict[Path, str]) -> str:
     """Return files with reasons: `a.exr, b.exr (made by lightpaint); c.exr (painting or mask)`."""
     told = []
     for reason in dict.fromkeys(why.values()):

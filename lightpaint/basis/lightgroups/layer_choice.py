@@ -8,23 +8,23 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from lightpaint.basis.lightgroups.conventions import (
-    BESIDE,
+from lightpaint.basis.lightgroups.naming_conventions import (
     CONVENTIONS,
-    JOINTS,
-    NAME,
+    NAME_FIELD,
+    OTHER_VERSION,
+    SEPARATORS,
     Convention,
-    beauty_among,
+    beauty_name,
 )
 from lightpaint.errors import BasisError
 from lightpaint.screen import some_names
 
 #: Who has named files that no convention knows.
-FILES = "one file per light"
+ONE_FILE_PER_LIGHT = "one file per light"
 
 
 @dataclass(frozen=True)
-class Choice:
+class LayerChoice:
     """The roles of layers.
 
     lights: name of the light → name of its layer. beside: the same, of layers that may or may
@@ -43,7 +43,7 @@ class Choice:
 
 def choose_layers(
     layers: Mapping[str, Sequence[str]], *, pattern: str | None = None, where: str
-) -> Choice:
+) -> LayerChoice:
     """Tell lights, beauty and everything else apart.
 
     layers: name of each layer → other names that a pattern may meet it by.
@@ -55,7 +55,7 @@ def choose_layers(
     fitting = []
     for convention in CONVENTIONS:
         found = [m for name in layers if (m := convention.layer.fullmatch(name))]
-        if any(not BESIDE.fullmatch(m[0]) for m in found):
+        if any(not OTHER_VERSION.fullmatch(m[0]) for m in found):
             fitting.append((convention, found))
     if len(fitting) == 1:
         return _by_convention(layers, *fitting[0], where)
@@ -63,19 +63,19 @@ def choose_layers(
         told = [f"{len(found)} as of {convention.renderer}" for convention, found in fitting]
         raise BasisError(
             f"{where} names its layers in several ways ({some_names(told)}): say which are the "
-            f"lights, like pattern={_example(layers)!r}; {_listed(layers)}"
+            f"lights, like pattern={_example_pattern(layers)!r}; {_layer_list(layers)}"
         )
     raise BasisError(
         f"{where} has no layers named like the light groups of a known renderer: say which they "
-        f"are, like pattern={_example(layers)!r}; {_listed(layers)}"
+        f"are, like pattern={_example_pattern(layers)!r}; {_layer_list(layers)}"
     )
 
 
-def choose_files(layers: Iterable[str]) -> Choice:
+def choose_files(layers: Iterable[str]) -> LayerChoice:
     """Choose among files with a single layer each: all but the beauty are lights."""
     names = list(layers)
-    beauty = beauty_among(names)
-    return Choice(FILES, {n: n for n in names if n != beauty}, beauty=beauty)
+    beauty = beauty_name(names)
+    return LayerChoice(ONE_FILE_PER_LIGHT, {n: n for n in names if n != beauty}, beauty=beauty)
 
 
 def short_names(stems: Sequence[str]) -> dict[str, str]:
@@ -83,10 +83,10 @@ def short_names(stems: Sequence[str]) -> dict[str, str]:
     if len(stems) < 2:
         return {stem: stem for stem in stems}
     head = _shared_head(stems)
-    head = head[: max((head.rfind(joint) + 1 for joint in JOINTS), default=0)]
+    head = head[: max((head.rfind(joint) + 1 for joint in SEPARATORS), default=0)]
     cut = [stem[len(head) :] for stem in stems]
     tail = _shared_head([name[::-1] for name in cut])[::-1]
-    starts = [k for joint in JOINTS if (k := tail.find(joint)) >= 0]
+    starts = [k for joint in SEPARATORS if (k := tail.find(joint)) >= 0]
     tail = tail[min(starts) :] if starts else ""
     cut = [name.removesuffix(tail) for name in cut]
     return dict(zip(stems, cut if all(cut) else stems, strict=True))
@@ -104,9 +104,9 @@ def _by_convention(
     convention: Convention,
     found: list[re.Match[str]],
     where: str,
-) -> Choice:
+) -> LayerChoice:
     remarks = []
-    left = [m[0] for m in found if BESIDE.fullmatch(m[0])]
+    left = [m[0] for m in found if OTHER_VERSION.fullmatch(m[0])]
     found = [m for m in found if m[0] not in left]
     if left:
         remarks.append(f"{some_names(left)}: taken for another version of a layer, and left out")
@@ -115,23 +115,23 @@ def _by_convention(
     if len(views) > 1:
         remarks.append(
             f"of the view layers {some_names(views)} the first is taken: "
-            f"pattern='{views[1]}.Combined_{NAME}' takes {views[1]}"
+            f"pattern='{views[1]}.Combined_{NAME_FIELD}' takes {views[1]}"
         )
     found = [m for m in found if (m.groupdict().get("view") or "") == view]
-    _check_one_eye([m[0] for m in found], where)
-    lights = _named(_light_names(convention, found), where)
+    _check_not_stereo([m[0] for m in found], where)
+    lights = _unique_lights(_light_names(convention, found), where)
     # By its name alone: no other group can be left out of a single one.
     whole = {n: x for n, x in lights.items() if n == convention.whole and len(lights) > 1}
     lights = {name: layer for name, layer in lights.items() if name not in whole}
     rest = [name for name in layers if name not in [*lights.values(), *whole.values()]]
     beside = [name for name in rest if name.casefold() in convention.beside]
     first = convention.beauty.replace("{view}", f"{view}." if view else "")
-    return Choice(
+    return LayerChoice(
         convention.renderer,
         lights,
         {name: name for name in beside if name not in lights},
         whole,
-        beauty_among((name for name in rest if name not in beside), first=first),
+        beauty_name((name for name in rest if name not in beside), first=first),
         view,
         tuple(remarks),
     )
@@ -143,20 +143,21 @@ def _light_names(convention: Convention, found: list[re.Match[str]]) -> list[tup
     several = len(set(prefixes)) > 1
     return [
         (
-            f"{prefix}_" * bool(several and prefix) + convention.light.replace(NAME, m["name"]),
+            f"{prefix}_" * bool(several and prefix)
+            + convention.light.replace(NAME_FIELD, m["name"]),
             m[0],
         )
         for prefix, m in zip(prefixes, found, strict=True)
     ]
 
 
-def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -> Choice:
-    if pattern.count(NAME) != 1:
+def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -> LayerChoice:
+    if pattern.count(NAME_FIELD) != 1:
         raise BasisError(
-            f"pattern={pattern!r} must have {NAME} once, where the name of the light stands, "
+            f"pattern={pattern!r} must have {NAME_FIELD} once, where the name of the light stands, "
             "like 'Light_{name}'"
         )
-    before, after = pattern.split(NAME)
+    before, after = pattern.split(NAME_FIELD)
     fits = re.compile(f"{re.escape(before)}(.+){re.escape(after)}", re.DOTALL)
     found = []
     for layer, others in layers.items():
@@ -164,21 +165,23 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -
         if match:
             found.append((match[1], layer))
     if not found:
-        raise BasisError(f"pattern={pattern!r} fits no layer of {where}: {_listed(layers)}")
+        raise BasisError(f"pattern={pattern!r} fits no layer of {where}: {_layer_list(layers)}")
     # A pattern as wide as {name} also meets the beauty.
     names = [layer for layer in layers if layer not in [taken for _, taken in found]]
     first = {
-        (before.rstrip(JOINTS) + after).casefold(),  # View.Combined.left of View.Combined_key.left
-        (before + after).strip(JOINTS).casefold(),
+        (
+            before.rstrip(SEPARATORS) + after
+        ).casefold(),  # View.Combined.left of View.Combined_key.left
+        (before + after).strip(SEPARATORS).casefold(),
     } - {""}
-    beauty = next((name for name in names if name.casefold() in first), beauty_among(names))
+    beauty = next((name for name in names if name.casefold() in first), beauty_name(names))
     if beauty is None:
-        beauty = beauty_among(layer for _, layer in found)
+        beauty = beauty_name(layer for _, layer in found)
     found = [(name, layer) for name, layer in found if layer != beauty]
-    return Choice(f"pattern {pattern}", _named(found, where), beauty=beauty)
+    return LayerChoice(f"pattern {pattern}", _unique_lights(found, where), beauty=beauty)
 
 
-def _check_one_eye(names: Sequence[str], where: str) -> None:
+def _check_not_stereo(names: Sequence[str], where: str) -> None:
     """Raise BasisError for stereo: the same names once with `.left` and once with `.right`."""
     left, right = (
         {name.removesuffix(eye) for name in names if name.endswith(eye)}
@@ -188,11 +191,11 @@ def _check_one_eye(names: Sequence[str], where: str) -> None:
         head = both[0].rpartition("_")[0]
         raise BasisError(
             f"{where} holds the views left and right, and a solve is of one: say which, like "
-            f"pattern='{head}_{NAME}.left'"
+            f"pattern='{head}_{NAME_FIELD}.left'"
         )
 
 
-def _named(found: Sequence[tuple[str, str]], where: str) -> dict[str, str]:
+def _unique_lights(found: Sequence[tuple[str, str]], where: str) -> dict[str, str]:
     lights: dict[str, str] = {}
     for name, layer in found:
         if name in lights:
@@ -204,17 +207,17 @@ def _named(found: Sequence[tuple[str, str]], where: str) -> dict[str, str]:
     return lights
 
 
-def _example(layers: Iterable[str]) -> str:
+def _example_pattern(layers: Iterable[str]) -> str:
     """Return a pattern that fits several of the layers, if there is one."""
-    names = [name for name in layers if beauty_among([name]) is None]
+    names = [name for name in layers if beauty_name([name]) is None]
     heads: dict[str, int] = {}
     for name in names:
-        for k in (name.find(joint) for joint in JOINTS):
+        for k in (name.find(joint) for joint in SEPARATORS):
             if 0 < k < len(name) - 1:
                 heads[name[: k + 1]] = heads.get(name[: k + 1], 0) + 1
     best = max(heads, key=lambda head: heads[head], default=None)
-    return f"{best}{NAME}" if best and heads[best] > 1 else f"Light_{NAME}"
+    return f"{best}{NAME_FIELD}" if best and heads[best] > 1 else f"Light_{NAME_FIELD}"
 
 
-def _listed(layers: Iterable[str]) -> str:
+def _layer_list(layers: Iterable[str]) -> str:
     return f"its RGB layers are {some_names(name or 'R, G, B' for name in layers) or 'none'}"

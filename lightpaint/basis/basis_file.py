@@ -14,21 +14,21 @@ import numpy as np
 from lightpaint.basis.basis import Basis, IndirectLight, Origin
 from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.basis.file_parts import (
-    INDIRECT_NAMES,
+    INDIRECT_CHANNELS,
+    LIGHT_CHANNELS,
     LIGHT_KEY,
-    NAMES,
-    PLANES,
+    PLANE_CHANNELS,
     checked_text,
     encodings_of_planes,
     features_of,
-    learned_of,
+    guide_table_of,
     light_channels,
     light_texts,
     objects_of,
     other_parts,
     planes_of,
     scales_of,
-    stacked,
+    stack_channels,
 )
 from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.lights import BasisLight, Lights
@@ -48,7 +48,7 @@ from lightpaint.keywords import keywords
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 
 #: What is written, and what else is read: in which all planes are float32.
-FORMAT, BEFORE = "lightpaint-basis 2", "lightpaint-basis 1"
+FORMAT, OLD_FORMAT = "lightpaint-basis 2", "lightpaint-basis 1"
 FORMAT_KEY = "lightpaint.format"
 ORIGIN_KEY = "lightpaint.origin"
 
@@ -56,10 +56,10 @@ ORIGIN_KEY = "lightpaint.origin"
 MAX_BYTES = 2**36
 
 #: Bytes of planes in float32 up to which they are brought into memory.
-IN_MEMORY = 2**31
+IN_MEMORY_MAX_BYTES = 2**31
 
 #: What comes of a header that says something else than it should.
-_DAMAGES = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
+_HEADER_ERRORS = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 
 @keywords()
@@ -86,13 +86,13 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         sums[light.name] = checksum(checked_text(texts), channels)
     others = list(other_parts(basis))
     heads += [PartHead.of(x.name, x.channels, x.attributes, display=x.display) for x in others]
-    seen, learned = others[0].channels, ""
-    if basis.learned is not None:
-        learned = checksum("", others[1].channels)
+    seen, guide_checksum = others[0].channels, ""
+    if basis.guide_table is not None:
+        guide_checksum = checksum("", others[1].channels)
     # Without what says no more than by default, as in files from before there was any.
     later = ("each_light", "integrator", "is_composed")
     of_origin = json.dumps(fields_of(basis.origin, *later), ensure_ascii=False)
-    checksums = Checksums(sums, checksum(of_origin, {}), checksum("", seen), learned)
+    checksums = Checksums(sums, checksum(of_origin, {}), checksum("", seen), guide_checksum)
     head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
     heads[0] = replace(heads[0], texts={**head, **heads[0].texts})
 
@@ -135,14 +135,14 @@ def read_basis(path: str | Path) -> Basis:
     path = Path(path)
     file_length(path, "image file", ImageError, limit=MAX_BYTES)
     try:
-        if (large := _large(path)) is not None:
+        if (large := _read_large(path)) is not None:
             return replace(large, source=str(path))
         parts = read_parts(path)
         head = _head(p.attributes for p in parts)
-        return replace(_of_parts(parts, head), source=str(path))
+        return replace(_basis_of_parts(parts, head), source=str(path))
     except BasisError as error:
         raise BasisError(f"{path} {error}") from error
-    except _DAMAGES as error:
+    except _HEADER_ERRORS as error:
         raise BasisError(f"{path} is damaged as a basis: {one_line(str(error))}") from error
     except MemoryError:
         raise ImageError(f"{path} takes more memory than there is") from None
@@ -150,10 +150,10 @@ def read_basis(path: str | Path) -> Basis:
 
 def is_large(lights: int, size: tuple[int, int]) -> bool:
     """Return whether planes of so many lights stay in their file when it is read."""
-    return 4 * len(NAMES) * lights * size[0] * size[1] > IN_MEMORY
+    return 4 * len(LIGHT_CHANNELS) * lights * size[0] * size[1] > IN_MEMORY_MAX_BYTES
 
 
-def _large(path: Path) -> Basis | None:
+def _read_large(path: Path) -> Basis | None:
     """Return a basis whose rows are read when they are asked for.
 
     None of one that memory has room for, and where the file is not read so.
@@ -165,13 +165,13 @@ def _large(path: Path) -> Basis | None:
     lit = [p for p in file.parts if LIGHT_KEY in p.texts]
     if not lit or not is_large(len(lit), lit[0].size):
         return None
-    return _of_rows(file, _head(p.texts for p in file.parts))
+    return _basis_of_rows(file, _head(p.texts for p in file.parts))
 
 
 def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
     """Return the attributes of the first part. Raises BasisError for another format."""
     head: Mapping[str, str] = next((its for its in texts if FORMAT_KEY in its), {})
-    if head.get(FORMAT_KEY) not in (FORMAT, BEFORE):
+    if head.get(FORMAT_KEY) not in (FORMAT, OLD_FORMAT):
         found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
         raise BasisError(
             f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
@@ -180,7 +180,7 @@ def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
     return head
 
 
-def _of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
+def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     """Return the basis of EXR parts. Raises BasisError or one of _DAMAGES."""
     lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
     others = [p for p in parts if LIGHT_KEY not in p.attributes]
@@ -188,21 +188,24 @@ def _of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
 
     def planes(order: Sequence[int], number: int) -> Planes:
         its = [(lit[k], scales[k][number]) for k in order]
-        return as_planes(stacked(its, PLANES[number]))
+        return as_planes(stack_channels(its, PLANE_CHANNELS[number]))
 
     stored = [partial(getattr, part, "channels") for part in lit]
-    has_indirect = all(p.channels.keys() >= INDIRECT_NAMES for p in lit)
+    has_indirect = all(p.channels.keys() >= INDIRECT_CHANNELS for p in lit)
     texts = [p.attributes for p in lit]
-    return _assembled(texts, stored, others, head, planes, has_indirect=has_indirect)
+    return _checked_basis(texts, stored, others, head, planes, has_indirect=has_indirect)
 
 
-def _of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
+def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
     """Return the basis whose planes stay in the file; None where its parts are not alike.
 
-    Raises as `_of_parts` does.
+    Raises as `_basis_of_parts` does.
     """
     lit = [p for p in file.parts if LIGHT_KEY in p.texts]
-    if any(p.size != p.display or p.size != lit[0].size or not {*p.channels} >= NAMES for p in lit):
+    if any(
+        p.size != p.display or p.size != lit[0].size or not {*p.channels} >= LIGHT_CHANNELS
+        for p in lit
+    ):
         return None
     scales = [scales_of(p.texts) for p in lit]
 
@@ -211,16 +214,16 @@ def _of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
 
     def planes(order: Sequence[int], number: int) -> Planes:
         its = [scales[k][number] for k in order]
-        return FilePlanes(file, [lit[k] for k in order], PLANES[number], its)
+        return FilePlanes(file, [lit[k] for k in order], PLANE_CHANNELS[number], its)
 
     stored = [partial(file.channels, p) for p in lit]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
-    has_indirect = all({*p.channels} >= INDIRECT_NAMES for p in lit)
+    has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in lit)
     texts = [p.texts for p in lit]
-    return _assembled(texts, stored, others, head, planes, has_indirect=has_indirect)
+    return _checked_basis(texts, stored, others, head, planes, has_indirect=has_indirect)
 
 
-def _assembled(
+def _checked_basis(
     texts: Sequence[Mapping[str, str]],
     stored: Sequence[Callable[[], Channels]],
     others: Sequence[ExrPart],
@@ -232,8 +235,8 @@ def _assembled(
     """Return the basis of a file, checked.
 
     texts, stored: of the part of each light its attributes, and what reads its channels. planes:
-    makes planes of the parts in an order, those of a number among `PLANES`. has_indirect: whether
-    the parts have planes of indirect light.
+    makes planes of the parts in an order, those of a number among `PLANE_CHANNELS`. has_indirect:
+    whether the parts have planes of indirect light.
     """
     seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
     if not texts or not seen:
@@ -258,7 +261,7 @@ def _assembled(
             noise=noise,
             emitters_seen=seen[0] > 0,
             origin=origin,
-            learned=learned_of(others, checksums),
+            guide_table=guide_table_of(others, checksums),
             features=features_of(others, images.size),
             objects=objects_of(others, images.size),
             indirect=IndirectLight(planes(order, 2), planes(order, 3)) if has_indirect else None,
@@ -267,7 +270,7 @@ def _assembled(
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
     for light, its, read in zip(lights, texts, stored, strict=True):
         channels = read()  # one light at a time: they may be larger than memory
-        names = NAMES | INDIRECT_NAMES if has_indirect else NAMES
+        names = LIGHT_CHANNELS | INDIRECT_CHANNELS if has_indirect else LIGHT_CHANNELS
         if not all(np.isfinite(channels[name]).all() for name in names):
             raise BasisError("holds values that are not finite: make it again")
         if checksums is not None:
@@ -288,7 +291,7 @@ def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
         identities = tuple(str(light.get("identity", "")) for light in lit)
         text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
         return read_record(Origin, strict_json(text)), size, identities
-    except (*_DAMAGES, BasisError, StopIteration) as error:
+    except (*_HEADER_ERRORS, BasisError, StopIteration) as error:
         said = one_line(str(error)) or "it does not say where it comes from"
         raise BasisError(f"{path} is no basis this version can read: {said}") from error
 
