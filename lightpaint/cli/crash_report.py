@@ -31,7 +31,7 @@ def report_fault(command: str, error: BaseException, given: Sequence[str]) -> in
     what = f"{type(error).__name__}: {said}" if said else type(error).__name__
     written = _write_details(_details(error, given))
     where = f"the details are in {written}" if written else "the details could not be written"
-    lines.err(f"{command}: a fault of lightpaint's own: {what}; {where}")
+    lines.err(f"{command}: a bug in lightpaint: {what}; {where}")
     return FAULT
 
 

@@ -11,11 +11,15 @@ from lightpaint.report.phrases import (
     spoken_changed,
     spoken_lights,
     spoken_percent,
+    spoken_percents,
     spoken_place,
 )
 
 #: The sentence for an answer without error.
 NO_ERROR = "The lights can make what is painted."
+
+#: The argument that lets lights have any colour, as Python has it.
+ANY_COLOR = 'colors="free"'
 
 #: Share of the error, or of a light, that is too small to mention.
 MIN_SHARE = 0.05
@@ -46,7 +50,8 @@ def error_sentences(
         "noise": "is noise of the basis",
         "painting_noise": painting_noise_clause(d),
     }
-    shares = [f"{spoken_percent(share)} {words[part]}" for part, share in parts.items()]
+    percents = spoken_percents(parts.values())
+    shares = [f"{share} {words[part]}" for part, share in zip(parts, percents, strict=True)]
     sentences = [f"Of the difference (in energy), {', '.join(shares)}."]
     is_told = seen is not None and seen.place is not None  # by the headline
     if d.place is not None and not is_told and d.share(d.unreachable) >= MIN_SHARE:
@@ -60,14 +65,16 @@ def hold_clause(seen: Seen | None) -> str:
     return " while the rest is held" if is_held else ""
 
 
-def bound_sentences(diagnosis: Diagnosis, seen: Seen | None = None) -> list[str]:
+def bound_sentences(
+    diagnosis: Diagnosis, seen: Seen | None = None, *, any_color: str = ANY_COLOR
+) -> list[str]:
     """Return at most two sentences on what holds the lights, the most important first.
 
     seen: the result of `what_is_seen`; its reasons come with their shares, and single bounds only
-    if there are none.
+    if there are none. any_color: how to let lights have any colour.
     """
     if seen is not None and seen.reasons:
-        told = [spoken_cause(reason) for reason in seen.reasons]
+        told = [spoken_cause(reason, any_color=any_color) for reason in seen.reasons]
         return [sentence for sentence in told if sentence][:2]
     d = diagnosis
     most = [bound for bound in d.bounds[:1] if d.gain_share(bound) >= MIN_SHARE]
@@ -94,16 +101,16 @@ RELEASE_CLAUSES = {
 
 #: The same for all lights together.
 JOINT_RELEASE_CLAUSES = {
-    "colors": 'Lights keep their colours; colors="free"',
+    "colors": "Lights keep their colours; {any_color}",
     "sparse": "The number of lights is limited; allowing more",
     "prefer_current": "Lights are pulled towards their present setting; leaving them free",
 }
 
 
-def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
+def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR) -> str:
     """Say what keeps the lights from the paint, and the gain of releasing it; "" for views.
 
-    weaker: the words before the strength of a weaker hold.
+    weaker: the words before the strength of a weaker hold. any_color: as in `bound_sentences`.
     """
     gained = f"would remove {spoken_percent(reason.share)} of the difference"
     if reason.is_joint:
@@ -113,7 +120,8 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of") -> str:
         lights = spoken_lights(reason.names, start=True) + (" is" if is_one else " are")
         return f"{lights} {RELEASE_CLAUSES[reason.kind][not is_one]} {gained}."
     if reason.kind in JOINT_RELEASE_CLAUSES:
-        return f"{JOINT_RELEASE_CLAUSES[reason.kind]} {gained}."
+        clause = JOINT_RELEASE_CLAUSES[reason.kind].format(any_color=any_color)
+        return f"{clause} {gained}."
     if reason.kind == "views":
         return ""
     held = "Unpainted parts are held near their present look;"

@@ -1,7 +1,7 @@
 """Phrases of sentences: lights, colours, shares and parts of the picture in words."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -116,3 +116,18 @@ def spoken_difference(
 def spoken_percent(share: float) -> str:
     """Return `0.4 %`, `7 %`, `62 %`."""
     return f"{100 * share:.1f} %" if 0 < share < 0.0095 else f"{100 * share:.0f} %"
+
+
+def spoken_percents(shares: Iterable[float]) -> list[str]:
+    """Return whole percentages of parts of one thing, which add up to what the parts are together.
+
+    Each is at least 1 %. Those that rounding changes most give way.
+    """
+    exact = [100 * share for share in shares]
+    percents = [max(1, round(x)) for x in exact]
+    excess = sum(percents) - round(sum(exact))
+    step = 1 if excess > 0 else -1
+    for _ in range(abs(excess)):
+        by_error = sorted(range(len(exact)), key=lambda k: step * (exact[k] - percents[k]))
+        percents[next(k for k in by_error if percents[k] - step >= 1)] -= step
+    return [f"{percent} %" for percent in percents]

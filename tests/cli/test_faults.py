@@ -56,7 +56,7 @@ def test_what_nobody_foresaw_has_a_code_a_line_and_a_private_file(
     assert done.returncode == FAULT == 70
     assert done.stdout == ""
     [line] = done.stderr.splitlines()
-    assert line.startswith("lightpaint doctor: a fault of lightpaint's own: KeyError: ")
+    assert line.startswith("lightpaint doctor: a bug in lightpaint: KeyError: ")
     assert "\x1b" not in line
     found = re.search(r"the details are in (.*\.txt)$", line)
     assert found is not None
@@ -86,7 +86,7 @@ def test_where_nothing_can_be_written_it_is_one_line_still(
     done = run(tmp_path, "doctor")
     assert done.returncode == FAULT
     [line] = done.stderr.splitlines()
-    assert line.endswith("own: ZeroDivisionError; the details could not be written")
+    assert line.endswith("bug in lightpaint: ZeroDivisionError; the details could not be written")
 
 
 def test_a_fault_before_there_is_a_command_is_told_too(
@@ -98,5 +98,5 @@ def test_a_fault_before_there_is_a_command_is_told_too(
     monkeypatch.setattr(dispatcher, "command_parser", broken)
     done = run(tmp_path, "doctor", XDG_STATE_HOME=str(tmp_path), HOME=str(tmp_path))
     assert done.returncode == FAULT
-    assert "lightpaint: a fault of lightpaint's own: ImportError: half an inst" in done.stderr
+    assert "lightpaint: a bug in lightpaint: ImportError: half an inst" in done.stderr
     assert len(done.stderr.splitlines()) == 1

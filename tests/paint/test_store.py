@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -489,6 +490,54 @@ def test_bytes_and_pages_that_are_others_never_end_in_more_than_a_line(tmp_path:
     assert not any("\n" in line for line in lines)
     assert refused < 20
     assert recover > 15
+
+
+@pytest.mark.parametrize(
+    ("tables", "left", "lost"),
+    [
+        (("step", "pixels"), (0, 2), "an unknown number of steps could not be read"),
+        (("look", "look_array"), (4, 0), "an unknown number of looks could not be read"),
+    ],
+)
+def test_what_nobody_can_count_is_not_called_nothing(
+    tmp_path: Path, tables: tuple[str, str], left: tuple[int, int], lost: str
+) -> None:
+    """The first pages of two tables lie side by side: one bad block of a disk takes both."""
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        for number in range(4):
+            store.append(step(number))
+        for number in (1, 2):
+            store.put_look(look(number, number))
+    with closing(sqlite3.connect(path)) as other:
+        roots = dict(other.execute("SELECT name, rootpage FROM sqlite_schema"))
+    page, data = 16384, bytearray(path.read_bytes())
+    for table in tables:
+        data[(roots[table] - 1) * page : roots[table] * page] = bytes(page)
+    path.write_bytes(data)
+    with Store.open(path, IDENTITY) as store:
+        _, steps, looks = content(store)
+        assert (len(steps), len(looks)) == left
+        [said] = store.remarks
+        assert lost in said
+
+
+def test_of_a_file_that_was_cut_off_its_beginning_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        for number in range(4):
+            store.append(step(number))
+        _, steps, _ = content(store)
+        store.put_look(look(1, 1))
+    with closing(sqlite3.connect(path)) as other:
+        roots = dict(other.execute("SELECT name, rootpage FROM sqlite_schema"))
+    assert roots["look"] == max(roots["step"], roots["pixels"]) + 1
+    os.truncate(path, (roots["look"] - 1) * 16384)
+    with Store.open(path, IDENTITY) as store:
+        _, left, looks = content(store)
+        assert (left, looks) == (steps, [])
+        [said] = store.remarks
+        assert "an unknown number of looks could not be read" in said
 
 
 def test_a_painting_is_reached_though_a_look_is_damaged(tmp_path: Path, make_basis: Any) -> None:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.analysis.appearance.appearance import Seen
@@ -17,7 +19,13 @@ from lightpaint.lighting.solve import solve
 from lightpaint.report.diagnosis_sentences import error_sentences, spoken_bound, spoken_hold
 from lightpaint.report.measures import halving_spp
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
-from lightpaint.report.phrases import spoken_difference, spoken_lights, spoken_percent, spoken_place
+from lightpaint.report.phrases import (
+    spoken_difference,
+    spoken_lights,
+    spoken_percent,
+    spoken_percents,
+    spoken_place,
+)
 from lightpaint.report.uncertainty_sentences import uncertainty_sentence
 from lightpaint.target.target import Target
 
@@ -106,6 +114,27 @@ def test_the_light_that_matters_is_named(make_basis: Any):
     ends = (found.weights, found.weights)
     quiet = replace(found, scatter=0 * found.scatter, bias=0 * found.bias, interval=ends)
     assert "change no light" in uncertainty_sentence(basis, solution, quiet)
+
+
+@given(st.lists(st.floats(0.005, 1), min_size=1, max_size=5))
+def test_percentages_of_parts_add_up(parts: list[float]):
+    whole = sum(parts)
+    shares = [x / whole for x in parts if x / whole >= 0.005]
+    percents = [int(x.removesuffix(" %")) for x in spoken_percents(shares)]
+    assert sum(percents) == round(100 * sum(shares))
+    # One percent for what is less is the most that any is off, beside the rounding.
+    assert all(abs(p - 100 * s) <= 1.5 and p >= 1 for p, s in zip(percents, shares, strict=True))
+
+
+def test_the_parts_of_what_is_missed_add_up(make_basis: Any):
+    *_, found = _solved(make_basis)
+    parts = {"unreachable": 0.965, "noise": 0.031, "painting_noise": 0.004, "forbidden": 0.0}
+    split = replace(found, **{name: x * found.total for name, x in parts.items()})
+    shares = [int(x) for x in re.findall(r"(\d+) %", error_sentences(split)[0])]
+    assert shares == [97, 3]
+    less = {**parts, "unreachable": 0.962, "painting_noise": 0.007}
+    split = replace(found, **{name: x * found.total for name, x in less.items()})
+    assert re.findall(r"([\d.]+) %", error_sentences(split)[0]) == ["96", "3", "1"]
 
 
 def test_the_most_useful_comes_first(make_basis: Any):

@@ -22,6 +22,7 @@ from lightpaint.report.phrases import (
     spoken_changed,
     spoken_part,
     spoken_percent,
+    spoken_percents,
     spoken_place,
 )
 from lightpaint.report.uncertainty_sentences import spoken_errors
@@ -52,6 +53,9 @@ ADVICE_TEXTS: dict[str, str] = {
     "hold": "Paint more or loosen the hold.",
     "colors": "The settings allow any colour.",
 }
+
+#: What lets lights have any colour: the painter has a setting for that, and no argument.
+ANY_COLOR_TEXT = "any colour"
 
 #: Reasons for a miss, for the painter; and where lights have constraints.
 MISS_TEXTS = {
@@ -238,11 +242,12 @@ def why_not_closer(analysis: Analysis) -> list[str]:
         CONSTRAINED_MISS_TEXTS if problem.is_constrained or problem.fit.colors != "free" else {}
     )
     words |= {"unreachable": MISS_TEXTS["unreachable"] + hold_clause(seen)}
-    shares = ", ".join(f"{spoken_percent(share)} {words[part]}" for part, share in parts.items())
-    sentences = [f"Of the difference (large errors count most), {shares}."]
+    percents = spoken_percents(parts.values())
+    shares = [f"{share} {words[part]}" for part, share in zip(parts, percents, strict=True)]
+    sentences = [f"Of the difference (large errors count most), {', '.join(shares)}."]
     if seen.place is None and diagnosis.place is not None:
         sentences.append(spoken_place(diagnosis.place))
-    return sentences + bound_sentences(diagnosis, seen)
+    return sentences + bound_sentences(diagnosis, seen, any_color=ANY_COLOR_TEXT)
 
 
 def removable_reason(seen: Seen) -> Reason | None:
@@ -274,7 +279,9 @@ def _closeness(analysis: Analysis) -> Closeness:
         help=advice(seen),
         delta_e=seen.delta_e,
         delta_e_asked=seen.asked,
-        sentences=() if seen.is_close else tuple(bound_sentences(analysis.diagnosis, seen)),
+        sentences=()
+        if seen.is_close
+        else tuple(bound_sentences(analysis.diagnosis, seen, any_color=ANY_COLOR_TEXT)),
     )
 
 

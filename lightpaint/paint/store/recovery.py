@@ -10,15 +10,15 @@ import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import closing, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.files import flush
 from lightpaint.paint.store.compression import unpack, unpack_patch
+from lightpaint.paint.store.damaged_rows import Losses, Row, read_row, readable_rows, row_numbers
 from lightpaint.paint.store.database import (
     APPLICATION,
     VERSION,
@@ -39,10 +39,8 @@ DAMAGE_ERRORS = (
     *(LightpaintError, TypeError, ValueError),
 )
 
-#: Rows of a damaged table that are tried one by one, at most.
-MAX_ROWS = 1_000_000
-
-Row = Sequence[Any]
+#: Bytes of a database's header, and of the longest file that is given its length again.
+HEADER_BYTES, MAX_RESTORED_BYTES = 100, 2**36
 
 
 def recover(path: Path, identity: Identity | None) -> str:
@@ -57,6 +55,7 @@ def recover(path: Path, identity: Identity | None) -> str:
         for ending in ("", "-wal"):
             with suppress(FileNotFoundError):
                 shutil.copy(f"{path}{ending}", f"{copy}{ending}")
+        _restore_length(copy)
         lost = _copy_readable(copy, new, path, identity)
         flush(new)
         aside = free_name(path)
@@ -68,6 +67,18 @@ def recover(path: Path, identity: Identity | None) -> str:
     return (
         f"{path} was damaged: {losses}; all else is there, and the damaged file is kept as {aside}"
     )
+
+
+def _restore_length(file: Path) -> None:
+    """Give a database that was cut off its length again, of empty pages: SQLite reads none of a
+    shorter one.
+    """
+    with file.open("r+b") as opened:
+        header = opened.read(HEADER_BYTES)
+        page_bytes = int.from_bytes(header[16:18], "big")
+        length = page_bytes * int.from_bytes(header[28:32], "big")
+        if file.stat().st_size < length <= MAX_RESTORED_BYTES:
+            opened.truncate(length)
 
 
 def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None) -> list[str]:
@@ -100,9 +111,15 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
             database.executemany("INSERT INTO look_array VALUES (?, ?, ?, ?, ?)", rows)
         values = [("position", position), ("identity", json.dumps(asdict(stored_identity)))]
         database.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", values)
-    lost = [f"{len(lost_steps)} step{'s' * (len(lost_steps) > 1)}"] * bool(lost_steps)
+    lost = []
+    if lost_steps:
+        count = len(lost_steps.names)
+        lost.append(lost_steps.text(f"{count} step{'s' * (count > 1)}", "steps"))
     if lost_looks:
-        lost.append(f"the look{'s' * (len(lost_looks) > 1)} {some_names(lost_looks)}")
+        names = lost_looks.names
+        lost.append(
+            lost_looks.text(f"the look{'s' * (len(names) > 1)} {some_names(names)}", "looks")
+        )
     return lost
 
 
@@ -117,7 +134,7 @@ def _read_position(old: sqlite3.Connection, ids: Sequence[int]) -> int:
     """Return how many of the readable steps are done."""
     with suppress(*DAMAGE_ERRORS):
         [(position,)] = old.execute("SELECT value FROM about WHERE name = 'position'")
-        numbers = [number for (number,) in _readable_rows(old, "SELECT id FROM step ORDER BY id")]
+        numbers = [number for (number,) in readable_rows(old, "SELECT id FROM step ORDER BY id")]
         if 0 <= int(position) <= len(numbers):
             done_numbers = set(numbers[: int(position)])
             return sum(number in done_numbers for number in ids)
@@ -126,19 +143,17 @@ def _read_position(old: sqlite3.Connection, ids: Sequence[int]) -> int:
 
 def _read_steps(
     old: sqlite3.Connection, identity: Identity | None
-) -> tuple[list[tuple[Row, Row | None]], list[int]]:
+) -> tuple[list[tuple[Row, Row | None]], Losses]:
     """Return rows of steps and their pixels, and numbers of those that cannot be read."""
     steps: list[tuple[Row, Row | None]] = []
-    lost = []
-    for number in _row_numbers(old, "step", "id") | _row_numbers(old, "pixels", "step"):
-        row = _read_row(
-            old, "SELECT id, kind, label, fields, places FROM step WHERE id = ?", number
-        )
-        pixels = _read_row(old, "SELECT before, change FROM pixels WHERE step = ?", number)
+    numbers, lost = row_numbers(old, ("step", "id"), ("pixels", "step"))
+    for number in numbers:
+        row = read_row(old, "SELECT id, kind, label, fields, places FROM step WHERE id = ?", number)
+        pixels = read_row(old, "SELECT before, change FROM pixels WHERE step = ?", number)
         try:
             _check_step(row, pixels, identity)
         except DAMAGE_ERRORS:
-            lost.append(number)
+            lost.names.append(str(number))
         else:
             assert row is not None
             steps.append((row, pixels))
@@ -171,12 +186,12 @@ def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) 
         unpack_patch(regions, k, *pixels)
 
 
-def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], list[str]]:
+def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], Losses]:
     """Return rows of looks and of their arrays, and names of those that cannot be read."""
     looks: list[tuple[Row, list[Row]]] = []
-    lost = []
-    for number in _row_numbers(old, "look", "id") | _row_numbers(old, "look_array", "look"):
-        row = _read_row(old, "SELECT id, fields FROM look WHERE id = ?", number)
+    numbers, lost = row_numbers(old, ("look", "id"), ("look_array", "look"))
+    for number in numbers:
+        row = read_row(old, "SELECT id, fields FROM look WHERE id = ?", number)
         name = f"of number {number}"
         arrays, unreadable = _read_arrays(old, number)
         try:
@@ -188,17 +203,17 @@ def _read_looks(old: sqlite3.Connection) -> tuple[list[tuple[Row, list[Row]]], l
                 raise ValueError("no picture")
             looks.append((row, arrays))
         except (AssertionError, *DAMAGE_ERRORS):
-            lost.append(name)
+            lost.names.append(name)
     return sorted(looks, key=lambda look: int(look[0][0])), lost
 
 
 def _read_arrays(old: sqlite3.Connection, look: int) -> tuple[list[Row], set[str]]:
     """Return arrays of a look that can be read, and names of those that cannot."""
     arrays, unreadable = [], set()
-    rows = _readable_rows(old, "SELECT rowid, name FROM look_array WHERE look = ?", look)
+    rows = readable_rows(old, "SELECT rowid, name FROM look_array WHERE look = ?", look)
     for rowid, name in rows:
         query = "SELECT name, dtype, shape, data FROM look_array WHERE rowid = ?"
-        array = _read_row(old, query, rowid)
+        array = read_row(old, query, rowid)
         try:
             assert array is not None
             _, dtype, shape, data = array
@@ -209,44 +224,3 @@ def _read_arrays(old: sqlite3.Connection, look: int) -> tuple[list[Row], set[str
         except (AssertionError, *DAMAGE_ERRORS):
             unreadable.add(str(name))
     return arrays, unreadable
-
-
-def _row_numbers(old: sqlite3.Connection, table: str, column: str) -> set[int]:
-    """Return the numbers of rows, read from both ends of a table that may be damaged in between."""
-    query = f"SELECT {column} FROM {table} ORDER BY {column}"
-    numbers = {
-        x
-        for order in ("", " DESC")
-        for (x,) in _readable_rows(old, query + order)
-        if type(x) is int
-    }
-    with suppress(sqlite3.Error):
-        if len(numbers) > 1 and old.execute(f"PRAGMA integrity_check({table})").fetchone() != (
-            "ok",
-        ):
-            numbers |= set(range(min(numbers), min(max(numbers), min(numbers) + MAX_ROWS)))
-    return {x for x in numbers if _row_exists(old, table, column, x)}
-
-
-def _row_exists(old: sqlite3.Connection, table: str, column: str, number: int) -> bool:
-    """Return whether there is such a row, or nobody can tell."""
-    try:
-        query = f"SELECT count(*) FROM {table} WHERE {column} = ?"
-        [(count,)] = old.execute(query, (number,))
-    except sqlite3.Error:
-        return True
-    return bool(count)
-
-
-def _readable_rows(old: sqlite3.Connection, query: str, *values: object) -> Iterator[Row]:
-    """Yield rows until one cannot be read."""
-    with suppress(sqlite3.Error):
-        yield from old.execute(query, values)
-
-
-def _read_row(old: sqlite3.Connection, query: str, *values: object) -> Row | None:
-    """Return one row; None where there is none, or it cannot be read."""
-    with suppress(sqlite3.Error):
-        row: Row | None = old.execute(query, values).fetchone()
-        return row
-    return None

@@ -48,7 +48,9 @@ function isInTip(one, text) {
  * @param {Element} one */
 function widthOf(text, one) {
   const context = document.createElement('canvas').getContext('2d');
-  context.font = getComputedStyle(one).font;
+  // The shorthand is empty where figures are asked to be of one width.
+  const { fontStyle, fontWeight, fontSize, fontFamily } = getComputedStyle(one);
+  context.font = `${fontStyle} ${fontWeight} ${fontSize} ${fontFamily}`;
   return context.measureText(text).width;
 }
 
@@ -83,6 +85,12 @@ export function cutOff(root) {
     const box = one.getBoundingClientRect();
     const by = box.width && cutBy(box, one);
     if (by) found.add(`the control ${name} is cut by ${by.className ?? by}`);
+    const group = one.closest('.choice')?.getBoundingClientRect();
+    if (group && box.width && (box.left < group.left - 1 || box.right > group.right + 1))
+      found.add(`the control ${name} sticks out of its group`);
+    const { scrollWidth, clientWidth } = one;
+    if (one.tagName === 'BUTTON' && scrollWidth > clientWidth + 1 && !isInTip(one, one.textContent))
+      found.add(`the text of ${name} sticks out of it`);
     const isField = one.tagName === 'SELECT' || (one.tagName === 'INPUT' && one.type === 'text');
     const text = isField ? cutInField(one) : null;
     if (text) found.add(`“${text}” is cut in its field ${name}`);

@@ -124,6 +124,14 @@ def test_one_finger_paints_and_two_move_and_zoom(opened: Any) -> None:
     assert len(painter.calls("end")) == 1
 
 
+#: Widths of the lines of a text.
+LINE_WIDTHS = """(one) => {
+  const range = document.createRange();
+  range.selectNodeContents(one);
+  return [...range.getClientRects()].map(({ width }) => width);
+}"""
+
+
 def test_hints_are_of_the_tool_and_of_fingers(opened: Any) -> None:
     painter = opened("first")
     hint, status = painter.page.locator(".hint"), painter.page.locator("#lp-status")
@@ -138,6 +146,8 @@ def test_hints_are_of_the_tool_and_of_fingers(opened: Any) -> None:
         painter.page.keyboard.press(key)
         painter.still()
         assert first in hint.inner_text()
+        *lines, last = hint.locator("span").evaluate(LINE_WIDTHS)
+        assert last > 0.4 * max([*lines, last])
     assert "Click" in status.text_content()
     tablet = opened(
         "first", viewport={"width": 1024, "height": 768}, has_touch=True, is_mobile=True

@@ -116,6 +116,23 @@ def files(painter: Painter) -> None:
     painter.page.get_by_text("The same from the command line").wait_for()
 
 
+def exporting(painter: Painter) -> None:
+    """Into a folder of a long name, far from its end."""
+    painter.button("Export").click()
+    painter.page.evaluate(
+        """() => {
+          const writing = { what: 'export', done: 205, total: 1024, unit: 'samples per pixel' };
+          window.painter.store.set({ isWriting: true, writing });
+        }"""
+    )
+    folder = painter.page.locator(".export .folder").first
+    assert folder.bounding_box()["width"] > 250
+
+
+def wide_colour(painter: Painter) -> None:
+    painter.type("Hex", "#a4d0d4")
+
+
 def keys(painter: Painter) -> None:
     painter.page.keyboard.press("?")
 
@@ -148,6 +165,8 @@ PANELS: tuple[Callable[[Painter], None], ...] = (
     some_only,
     settings,
     files,
+    exporting,
+    wide_colour,
     keys,
     messages,
     agx,
@@ -187,6 +206,25 @@ def test_all_that_is_said_of_an_answer_comes_into_sight(painter: Painter) -> Non
     side, panel = (painter.page.locator(x).bounding_box() for x in (".side", ".fold.is-truth"))
     assert panel["y"] >= side["y"] - 1
     assert panel["y"] + panel["height"] <= side["y"] + side["height"] + 1
+
+
+def test_a_sentence_with_its_button_is_whole(painter: Painter) -> None:
+    """The reason stands at its end."""
+    painter.page.evaluate(
+        """async () => {
+          const { HELP } = await import('/fake/crowd.js');
+          window.painter.store.set({
+            headline: 'Farther from the paint than the present lighting, which undo brings back, '
+              + 'and changes the back wall by ΔE 6.2. Brighter light on the annex is missing: '
+              + 'annex_window is switched off.',
+            help: HELP, deltaE: 23, deltaAsked: 6.9, isJudged: true,
+          });
+        }"""
+    )
+    painter.still()
+    assert painter.page.locator(".answer .help").is_visible()
+    said = painter.page.locator(".answer .said")
+    assert said.evaluate("(one) => one.scrollHeight - one.clientHeight") <= 1
 
 
 def test_axe_finds_nothing_in_a_crowd(painter: Painter, axe: str) -> None:

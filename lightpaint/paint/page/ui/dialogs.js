@@ -66,16 +66,16 @@ function ExportDialog({ ui, app, close }) {
     )}
     <div class="row"><span class="faint folder">to ${folder}</span>
       <${CopyButton} text=${folder} tip="Copy the folder's path" app=${app} />
-      ${
-        isBusy &&
-        html`<${ProgressBar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Exporting" />
-        <span class="faint">${ui.writing && progressText(ui.writing)}</span>
-        <${Button} label="Stop" icon="close" act=${() => app.session.write([])}
-          tip="Files that are written already stay" />`
-      }
       <${Button} label=${isBusy ? 'Exporting …' : 'Export'} primary disabled=${isBusy || !what.length}
         act=${() => app.session.write(what)} /></div>
-    ${isBusy && html`<p class="faint">Export continues if you close this window.</p>`}
+    ${
+      isBusy &&
+      html`<div class="row"><span class="faint folder">Export continues if you close this window.</span>
+        <${ProgressBar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Exporting" />
+        <span class="faint">${ui.writing && progressText(ui.writing)}</span>
+        <${Button} label="Stop" icon="close" act=${() => app.session.write([])}
+          tip="Files that are written already stay" /></div>`
+    }
     ${
       exported &&
       html`<div class="exported" role="status">
