@@ -18,6 +18,7 @@ from lightpaint.errors import BasisError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.object_map import Objects
+from lightpaint.images.surface_filter import SurfaceFilter
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.screen import Shown, some_names, some_of
@@ -100,7 +101,7 @@ class Basis(Shown):
         origin: Where it comes from: scene, sensor, seed, samples.
         guide_table: (2, cells, emitters) float32, what the renderer has learned about which emitter
             matters where, or None. Only rendering more samples needs it.
-        features: Albedo and normals of what is seen, to denoise pictures by, or None.
+        features: Albedo, normals and positions of what is seen, to denoise pictures by, or None.
         objects: Whose surfaces are seen, or None.
         indirect: The indirect part of `planes` and `noise`, to denoise pictures by; None where it
             was not kept apart.
@@ -279,6 +280,13 @@ class Basis(Shown):
     def present_look(self) -> npt.NDArray[np.float32]:
         """The scene as it is, (h, w, 3)."""
         return read_only(self.mix(self.present_weights))
+
+    @cached_property
+    def surface_filter(self) -> SurfaceFilter | None:
+        """The filter of light along the surfaces that are seen; None where these are not known."""
+        if self.features is None or self.features.position is None:
+            return None
+        return SurfaceFilter(self.features)
 
     @property
     def is_fixed(self) -> Bools:

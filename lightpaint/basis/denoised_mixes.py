@@ -2,14 +2,15 @@
 
 Direct light is nearly clean after few samples, and has the edges of shadows and highlights that a
 denoiser blurs; indirect light is noisy and smooth. So indirect light is denoised, and direct light
-only as far as its own noise asks for it.
+only as far as its own noise asks for it. Where Open Image Denoise is not installed, both are
+averaged along surfaces instead.
 """
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.images.denoiser import Quality, denoised
+from lightpaint.images.denoiser import Quality, denoised, oidn_is_installed
 from lightpaint.images.estimate import box_mean
 
 #: Pixels on either side over which noise and what a denoiser changed are averaged.
@@ -66,15 +67,28 @@ def _denoise_parts(
     quality: Quality,
 ) -> Floats:
     """Return direct and indirect light, each denoised, as one picture; all (h, w, 3)."""
-    features = basis.features
-    smooth = denoised(indirect, features, quality=quality)
+    smooth = _without_grain(basis, indirect, quality)
     direct = np.maximum(total - indirect, 0)
-    clean = denoised(direct, features, quality=quality)
+    clean = _without_grain(basis, direct, quality)
     return smooth + blend_by_noise(direct, noise - indirect_noise, clean)
+
+
+def _without_grain(basis: Basis, part: Floats, quality: Quality) -> Floats:
+    if basis.surface_filter is not None and not oidn_is_installed():
+        return basis.surface_filter(part)
+    return denoised(part, basis.features, quality=quality)
 
 
 def blend_by_noise(raw: Floats, half_difference: Floats, clean: Floats) -> Floats:
     """Return the mean of a picture and its denoised form that has the least expected error.
+
+    All are (h, w, 3), as of `share_of_clean`.
+    """
+    return np.asarray(raw + share_of_clean(raw, half_difference, clean) * (clean - raw), np.float32)
+
+
+def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Floats:
+    """Return the share of the denoised form in the mean of least expected error, (h, w, 1) float32.
 
     raw: (h, w, 3), whose `half_difference` tells its variance V. clean: the same, denoised, which
     has lost E[(clean − raw)²] − V =: B of it. All are averaged over a window of pixels and the
@@ -88,4 +102,4 @@ def blend_by_noise(raw: Floats, half_difference: Floats, clean: Floats) -> Float
     lost = np.maximum(change - variance, 0)
     total = variance + lost
     share = np.divide(variance, total, out=np.zeros_like(total), where=total > 0)
-    return np.asarray(raw + share[..., None].astype(np.float32) * (clean - raw), np.float32)
+    return share[..., None].astype(np.float32)

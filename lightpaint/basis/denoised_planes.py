@@ -21,7 +21,7 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache_folder import DENOISED_SUFFIX, is_own
-from lightpaint.basis.denoised_mixes import denoise_plane
+from lightpaint.basis.denoised_mixes import denoise_plane, share_of_clean
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
@@ -39,7 +39,7 @@ MIN_PIXELS, ON_DEMAND_MAX_PIXELS, MAX_PIXELS = 2**18, 2**22, 2**24
 #: precision.
 BRIGHTEST_HALF = 1024.0
 
-#: Pixels on a side over which the share of a light is taken in rough planes.
+#: Pixels on a side over which the share of a light is taken where surfaces are not known.
 ROUGH_BLOCK = 8
 
 #: Rows of planes that are brought to single precision at a time.
@@ -90,8 +90,10 @@ class DenoisedPlanes:
 class RoughPlanes:
     """Planes without most of the noise, available at once where denoising takes seconds.
 
-    It is the clean picture of the scene as it is, times the share that the light has in it, which
-    is taken of means over some pixels. So they add up to that picture, and shadows are soft.
+    It is the clean picture of the scene as it is, times the share that the light has in it, so that
+    they add up to that picture. Shares are those of light that is averaged along surfaces, direct
+    light as far as its noise in that picture asks for it; where surfaces are not known, of means
+    over squares of pixels, and then shadows are soft.
 
     present: (h, w, 3) float32, that picture.
     """
@@ -103,17 +105,37 @@ class RoughPlanes:
         """Return the plane of light k at unit emission, (h, w, 3) float32; 0 where the scene is
         black.
         """
-        lit, total = self._mean(self.basis.planes.plane(k)), self._total
+        parts = self.basis.indirect
+        indirect = None if parts is None else parts.planes.plane(k)
+        lit, total = self._averaged(self.basis.planes.plane(k), indirect), self._total
         share = np.divide(lit, total, out=np.zeros_like(lit), where=total > 0)
         return self.present * resampled(share, self.basis.size)
 
     @cached_property
     def _total(self) -> Floats:
-        return self._mean(self.basis.present_look)
+        parts, weights = self.basis.indirect, self.basis.present_weights
+        indirect = None if parts is None else parts.planes.mix(weights)
+        return self._averaged(self.basis.present_look, indirect)
 
-    def _mean(self, picture: Floats) -> Floats:
-        height, width = self.basis.size
-        return resampled(picture, (-(-height // ROUGH_BLOCK), -(-width // ROUGH_BLOCK)))
+    def _averaged(self, picture: Floats, indirect: Floats | None) -> Floats:
+        """Return a picture that is smooth; a sum of pictures becomes the sum of smooth ones."""
+        along_surfaces = self.basis.surface_filter
+        if indirect is None or along_surfaces is None:
+            height, width = self.basis.size
+            return resampled(picture, (-(-height // ROUGH_BLOCK), -(-width // ROUGH_BLOCK)))
+        direct = picture - indirect
+        change = along_surfaces(direct) - direct
+        return along_surfaces(indirect) + direct + self._share_of_smooth * change
+
+    @cached_property
+    def _share_of_smooth(self) -> Floats:
+        """Share of the average in direct light, (h, w, 1)."""
+        basis, weights = self.basis, self.basis.present_weights
+        assert basis.indirect is not None
+        assert basis.surface_filter is not None
+        direct = basis.present_look - basis.indirect.planes.mix(weights)
+        noise = basis.noise.mix(weights) - basis.indirect.noise.mix(weights)
+        return share_of_clean(direct, noise, basis.surface_filter(direct))
 
 
 def scale_of(plane: Floats) -> float:

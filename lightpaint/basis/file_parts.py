@@ -143,20 +143,32 @@ def guide_table_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Fl
 
 
 def _feature_channels(features: Features) -> Channels:
-    """Return the features as half floats, to which they were rounded when rendered."""
+    """Return the features, rounded to half floats but for positions."""
     albedo = rgb_channels(features.albedo, "albedo")
-    normal = {f"normal.{c}": features.normal[..., k] for k, c in enumerate("XYZ")}
-    return {name: plane.astype(np.float16) for name, plane in (albedo | normal).items()}
+    made = {x: y.astype(np.float16) for x, y in (albedo | _xyz(features.normal, "normal")).items()}
+    return made if features.position is None else made | _xyz(features.position, "position")
+
+
+def _xyz(vectors: Floats, name: str) -> dict[str, Floats]:
+    return {f"{name}.{c}": vectors[..., k] for k, c in enumerate("XYZ")}
 
 
 def features_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Features | None:
-    """Return albedo and normals; None if missing or damaged, since nothing needs them."""
+    """Return albedo, normals and, unless an earlier version wrote them, positions.
+
+    None if missing or damaged, since nothing needs them.
+    """
     for part in (p.in_display_window() for p in others if FEATURES_KEY in p.attributes):
         channels = part.channels
         if checksum("", channels) != part.attributes[FEATURES_KEY] or part.size != size:
             return None
-        normal = np.stack([channels[f"normal.{c}"] for c in "XYZ"], axis=-1)
-        return Features(part.rgb("albedo"), normal.astype(np.float32))
+        normal, position = (
+            np.stack([channels[f"{name}.{c}"] for c in "XYZ"], axis=-1).astype(np.float32)
+            if f"{name}.X" in channels
+            else None
+            for name in ("normal", "position")
+        )
+        return None if normal is None else Features(part.rgb("albedo"), normal, position)
     return None
 
 

@@ -47,17 +47,19 @@ RADIUS, RATIO, NEAR, SHARPNESS, DARKEST = 3, 0.3, 2.0, 32, 0.02
 class Features:
     """Nearly noise-free features of each pixel, which show a denoiser the edges.
 
-    albedo: (h, w, 3) float32 in [0, 1]; normal: (h, w, 3) float32, of unit length or 0.
+    albedo: (h, w, 3) float32 in [0, 1]; normal: (h, w, 3) float32, of unit length or 0 where no
+    surface is seen; position: (h, w, 3) float32 of that surface in the scene, None if unknown.
     """
 
     albedo: Floats
     normal: Floats
+    position: Floats | None = None
 
     def __post_init__(self) -> None:
-        if self.albedo.shape != self.normal.shape or self.albedo.shape[2:] != (3,):
-            raise SizeError(
-                f"albedo {self.albedo.shape} and normals {self.normal.shape} are not of one picture"
-            )
+        known = [self.albedo, self.normal, *([] if self.position is None else [self.position])]
+        if any(x.shape != self.albedo.shape or x.shape[2:] != (3,) for x in known):
+            shapes = ", ".join(str(x.shape) for x in known)
+            raise SizeError(f"albedo, normals and positions {shapes} are not of one picture")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -66,7 +68,8 @@ class Features:
 
     def reduced(self, factor: int) -> "Features":
         """Return the features of the picture with a pixel for each block of factor x factor."""
-        return Features(block_mean(self.albedo, factor), block_mean(self.normal, factor))
+        position = None if self.position is None else block_mean(self.position, factor)
+        return Features(block_mean(self.albedo, factor), block_mean(self.normal, factor), position)
 
 
 def denoised(

@@ -50,7 +50,7 @@ def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent)
 
 
 def render_features(scene: Scene, *, seed: int = 0) -> Features:
-    """Return albedo and normals of `scene` for a denoiser, rounded to half floats."""
+    """Return albedo, normals and positions of `scene`; the first two rounded to half floats."""
     return scene.while_loaded(lambda loaded: _features(scene, loaded, seed))
 
 
@@ -67,18 +67,20 @@ def _features(scene: Scene, loaded: Any, seed: int) -> Features:
     import mitsuba as mi
 
     film = scene.film
-    integrator = mi.load_dict({"type": "aov", "aovs": "a:albedo,n:sh_normal"})
+    integrator = mi.load_dict({"type": "aov", "aovs": "a:albedo,n:sh_normal,p:position"})
     pixels = scene.size[0] * scene.size[1] * film.block_pixels
     spp = min(max(SAMPLES // film.block_pixels, 1), largest_pass(pixels))
     seed = pass_seed(seed, Stream.SURFACES, SAMPLES)
     camera = scene.camera(loaded)
     with tracing():
         image = mi.render(loaded, sensor=camera, integrator=integrator, spp=spp, seed=seed)
-    seen = np.nan_to_num(np.array(image)[..., -6:], nan=0, posinf=1, neginf=0)
+    seen = np.nan_to_num(np.array(image)[..., -9:], nan=0, posinf=1, neginf=0)
     seen = block_mean(seen, film.block)
-    length = np.linalg.norm(seen[..., 3:], axis=-1, keepdims=True)
-    normal = seen[..., 3:] / np.where(length > 0, length, 1)
-    return Features(*(_in_half(x) for x in (np.clip(seen[..., :3], 0, 1), normal)))
+    albedo, normal, position = (seen[..., k : k + 3] for k in (0, 3, 6))
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    normal = normal / np.where(length > 0, length, 1)
+    place = np.ascontiguousarray(position, np.float32)
+    return Features(_in_half(np.clip(albedo, 0, 1)), _in_half(normal), place)
 
 
 def _objects(scene: Scene, loaded: Any, seed: int) -> Objects:

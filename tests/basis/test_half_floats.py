@@ -160,6 +160,8 @@ def test_a_file_of_the_format_before_is_read() -> None:
     assert back.origin.halves == (32, 32)
     assert back.guide_table is not None
     assert back.features is not None
+    assert back.features.position is None
+    assert back.surface_filter is None
     assert back.objects is not None
     assert back.objects.names == ("vase", "")
 

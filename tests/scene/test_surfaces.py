@@ -101,6 +101,11 @@ def test_each_pixel_has_an_object_and_each_object_a_name(tmp_path: Path) -> None
         # Where all samples of a pixel see it, any do.
         whole = surfaces.coverage[name] == 1
         assert objects.mask(name)[whole].mean() > 0.95
+    assert features.position is not None
+    floor, wall = (features.position[surfaces.coverage[name] == 1] for name in ("floor", "wall"))
+    # The samples that were counted are others: an edge may run through one of these pixels.
+    assert (np.abs(floor[:, 1]) < 1e-5).mean() > 0.95
+    assert (np.abs(wall[:, 2] + 1) < 1e-5).mean() > 0.95
     nothing = sum(surfaces.coverage.values()) == 0
     assert (objects.index[nothing] == -1).mean() > 0.95
 
@@ -108,6 +113,7 @@ def test_each_pixel_has_an_object_and_each_object_a_name(tmp_path: Path) -> None
 def test_the_basis_has_them(tmp_path: Path) -> None:
     scene = load_scene(write_room(tmp_path, lights=LIGHTS["panel"]))
     few = render_basis(scene, spp=2)
+    assert few.surface_filter is not None
     assert few.objects is not None
     more = render_basis(scene, spp=4, start=few)
     assert more.objects is few.objects

@@ -1,0 +1,195 @@
+"""A linear filter of smooth light, whose weights follow from surfaces and never from light.
+
+Neighbours count by how near they are in the picture, how alike their normals are, and how close
+each lies to the other's tangent plane; what is averaged is light, the picture divided by albedo. As
+no weight depends on the light, one filter serves all lights and both halves of their samples, sums
+of filtered pictures are filtered sums, and filtered half differences are the noise of what was
+filtered.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Floats
+from lightpaint.images.denoiser import DARKEST, Features
+from lightpaint.threads import parallel_map
+
+#: Pixels on either side that pictures are averaged over; it is two standard deviations.
+RADIUS = 4
+
+#: Distance from a tangent plane at which a weight is 1/e, in widths of a pixel, and by how much it
+#: grows for each pixel in between: surfaces bend.
+NEAR_PLANE, BEND = 3.0, 0.25
+
+#: How often the cosine between two normals is squared.
+SQUARINGS = 5
+
+#: Rows of a band, whose weights and pictures a processor's cache holds.
+BAND_ROWS = 32
+
+#: Pixels of a picture up to which the weights are kept for the next one.
+KEPT_PIXELS = 2**20
+
+
+class SurfaceFilter:
+    """Means over the neighbours on a surface, of any number of pictures of the same surfaces.
+
+    features: with positions. radius: pixels on either side.
+    """
+
+    def __init__(self, features: Features, radius: int = RADIUS) -> None:
+        assert features.position is not None
+        self.size, self.radius = features.size, radius
+        self._albedo = _planar(np.maximum(features.albedo, DARKEST))
+        self._normal, position = _planar(features.normal), _planar(features.position)
+        self._position = position
+        self._per_width = _pixels_per_length(position, np.asarray(self._normal.any(axis=0)))
+
+    def __call__(self, image: Floats) -> Floats:
+        """Return a picture that is filtered, (h, w, 3) float32."""
+        made = np.empty((*self.size, 3), np.float32)
+
+        def fill(band: "_Band") -> None:
+            made[band.top : band.bottom] = self._filtered(band, image)
+
+        parallel_map(fill, self._kept if self._is_small else self._bands())
+        return made
+
+    @property
+    def _is_small(self) -> bool:
+        return self.size[0] * self.size[1] <= KEPT_PIXELS
+
+    @cached_property
+    def _kept(self) -> "list[_Band]":
+        return self._bands(weighed=True)
+
+    def _bands(self, *, weighed: bool = False) -> "list[_Band]":
+        tops = range(0, self.size[0], BAND_ROWS)
+        bands = [_Band(self, top, min(top + BAND_ROWS, self.size[0])) for top in tops]
+        if weighed:
+            parallel_map(lambda band: band.weights, bands)
+        return bands
+
+    def _filtered(self, band: "_Band", image: Floats) -> Floats:
+        """Return the rows of a band, (rows, w, 3)."""
+        albedo = self._albedo[:, band.top : band.bottom]
+        rows = slice(max(band.top - self.radius, 0), band.bottom + self.radius)
+        light = _planar(image[rows]) / self._albedo[:, rows]
+        mean = band.sums(self._framed(light, rows.start, band)) / band.total
+        return np.moveaxis(mean * albedo, 0, -1)
+
+    def _framed(self, planes: Floats, first: int, band: "_Band") -> Floats:
+        """Return rows `first` and on with zeros around them: what `radius` reaches of a band."""
+        r = self.radius
+        above = first - (band.top - r)
+        below = band.bottom - band.top + 2 * r - above - planes.shape[-2]
+        return np.pad(planes, ((0, 0), (above, below), (r, r)))
+
+
+@dataclass(frozen=True)
+class _Band:
+    """Weights of the pixels in some rows of a filter."""
+
+    of: SurfaceFilter
+    top: int
+    bottom: int
+
+    @property
+    def _offsets(self) -> list[tuple[int, int]]:
+        """Half of all neighbours: the others are these, seen from the other end."""
+        r = self.of.radius
+        return [(y, x) for y, x in product(range(r + 1), range(-r, r + 1)) if (y, x) > (0, 0)]
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Weights of the pairs that begin in these rows or `radius` above, (pairs, r + rows, ...).
+
+        Of pairs with an end outside of the picture they are 0.
+        """
+        of, r = self.of, self.of.radius
+        rows = slice(max(self.top - r, 0), self.bottom + r)
+        position, normal, per_width = (
+            of._framed(x[:, rows], rows.start, self)
+            for x in (of._position, of._normal, of._per_width[None])
+        )
+        height, width = r + self.bottom - self.top, of.size[1] + 2 * r
+        made = np.zeros((len(self._offsets), height, width), np.float32)
+        for weight, (dy, dx) in zip(made, self._offsets, strict=True):
+            left, right = max(-dx, 0), width - max(dx, 0)
+            one = np.s_[:, :height, left:right]
+            other = np.s_[:, dy : dy + height, left + dx : right + dx]
+            between = position[other] - position[one]
+            off = np.abs((between * normal[one]).sum(axis=0))
+            off += np.abs((between * normal[other]).sum(axis=0))
+            off *= (per_width[one][0] + per_width[other][0]) / 2
+            cosine = np.clip((normal[one] * normal[other]).sum(axis=0), 0, 1)
+            for _ in range(SQUARINGS):
+                cosine *= cosine
+            apart = float(np.hypot(dy, dx))
+            near = np.float32(1 / (NEAR_PLANE * (1 + BEND * apart)))
+            weight[:, left:right] = cosine * np.exp(-off * near)
+            weight *= np.float32(np.exp(-2 * (apart / r) ** 2))
+        return made
+
+    @cached_property
+    def total(self) -> Floats:
+        """Sum of the weights of each pixel, (rows, w), its own 1 among them."""
+        size = (
+            1,
+            self.bottom - self.top + 2 * self.of.radius,
+            self.of.size[1] + 2 * self.of.radius,
+        )
+        return np.asarray(self.sums(np.ones(size, np.float32))[0])
+
+    def sums(self, light: Floats) -> Floats:
+        """Return weighted sums over neighbours, (c, rows, w).
+
+        light: (c, r + rows + r, r + w + r), r being the radius.
+        """
+        r, rows, columns = self.of.radius, self.bottom - self.top, self.of.size[1]
+
+        def shifted(planes: Floats, dy: int, dx: int) -> Floats:
+            return planes[..., r + dy : r + dy + rows, r + dx : r + dx + columns]
+
+        made = shifted(light, 0, 0).copy()
+        weighed = np.empty_like(made)
+        for weight, (dy, dx) in zip(self.weights, self._offsets, strict=True):
+            # A pair adds to both of its ends.
+            for (y, x), (neighbour_y, neighbour_x) in (
+                ((0, 0), (dy, dx)),
+                ((-dy, -dx), (-dy, -dx)),
+            ):
+                np.multiply(
+                    shifted(weight, y, x), shifted(light, neighbour_y, neighbour_x), out=weighed
+                )
+                made += weighed
+        return made
+
+
+def _planar(image: Floats) -> Floats:
+    """Return (h, w, 3) as (3, h, w) float32, in which rows lie together."""
+    return np.ascontiguousarray(np.moveaxis(image, -1, 0), np.float32)
+
+
+def _pixels_per_length(position: Floats, is_seen: Bools) -> Floats:
+    """Return how many pixels make up a unit of length at each pixel, (h, w); 0 for the background.
+
+    position: (3, h, w); is_seen: (h, w). The length of a pixel is the least distance to one of four
+    neighbours, there and in the eight pixels around: where an object ends, the nearer one decides.
+    """
+    length = np.full(is_seen.shape, np.inf, np.float32)
+    for one, other in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
+        between = position[:, *one] - position[:, *other]
+        step = np.sqrt(np.square(between).sum(axis=0))
+        step[~(is_seen[one] & is_seen[other])] = np.inf
+        for end in (one, other):
+            np.minimum(length[end], step, out=length[end])
+    height, width = is_seen.shape[0], is_seen.shape[1]
+    framed = np.pad(length, 1, constant_values=np.inf)
+    for dy, dx in product(range(3), repeat=2):
+        np.minimum(length, framed[dy : dy + height, dx : dx + width], out=length)
+    is_long = is_seen & (length > 0)
+    return np.divide(1, length, out=np.zeros_like(length), where=is_long)
