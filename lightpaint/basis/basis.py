@@ -107,6 +107,9 @@ class Basis(Shown):
             was not kept apart.
         source: Path of the file that it was read from, or of the scene that it was rendered of, for
             people; of memory only.
+        sums: The undivided sums of both halves of the samples, (n or 2n, h, w, 3) float32 each, of
+            which `planes`, `noise` and `indirect` are made; only where more samples are to be
+            added, which so come to the bits of one render; of memory only.
         render_s: Seconds that all of it took to render in this process; None where that is not
             known, as of what was kept; of memory only.
 
@@ -127,6 +130,7 @@ class Basis(Shown):
     objects: Objects | None = None
     indirect: IndirectLight | None = None
     source: str = field(default="", compare=False)
+    sums: tuple[Floats, Floats] | None = field(default=None, compare=False)
     render_s: float | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -246,6 +250,7 @@ class Basis(Shown):
             features=None,
             objects=None,
             indirect=None,
+            sums=None,
         )
 
     def with_requests(self, requests: SceneRequests) -> "Basis":

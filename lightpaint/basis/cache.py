@@ -8,27 +8,36 @@ The folder (`cache_folder.py`) may be deleted at any time.
 import hashlib
 import shutil
 import time
+import zipfile
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+import numpy as np
+
+from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.basis_file import FORMAT, read_basis, read_origin, write_basis
 from lightpaint.basis.cache_folder import (
     BASIS_NAME,
-    COMPANION_NAME,
     LEFTOVER_NAME,
     SUFFIX,
+    SUMS_SUFFIX,
+    companions_of,
+    delete_orphans,
     folder,
     is_own,
     mark_folder,
 )
 from lightpaint.errors import BasisError, LightpaintError, OutputError
+from lightpaint.files import replacing
 
 #: Bytes above which the bases that were not used for longest are deleted.
 MAX_BYTES = 8 * 2**30
+#: What comes of a damaged file of arrays.
+_DAMAGES = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 #: Seconds after which an unfinished file belongs to nobody.
 LEFTOVER_S = 3600.0
 #: And after which what was made of a basis that is not kept here is made again if need be.
@@ -110,11 +119,49 @@ def keep(basis: Basis) -> bool:
     try:
         path = _path_of(basis)
         mark_folder()
+        _write_sums(basis)
         write_basis(path, basis)
+        for other in companions_of(path):
+            is_old = basis.sums is None or other != _sums_path(basis)
+            if other.name.endswith(SUMS_SUFFIX) and is_old:
+                other.unlink()
         _prune(path)
     except (OutputError, OSError):
         return False
     return True
+
+
+def sums_of(basis: Basis) -> tuple[Floats, Floats] | None:
+    """Return the exact sums of a cached basis (`Basis.sums`); None if they are not kept."""
+    path = _sums_path(basis)
+    try:
+        if not is_own(path):
+            return None
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            sums = arrays["sums_a"], arrays["sums_b"]
+    except (*_DAMAGES, OutputError):
+        return None
+    n = len(basis.lights) * (1 if basis.indirect is None else 2)
+    shape = (n, *basis.size, 3)
+    return sums if all((x.shape, x.dtype) == (shape, np.float32) for x in sums) else None
+
+
+def _write_sums(basis: Basis) -> None:
+    """Write the exact sums of `basis`, if it has them, before it is written itself.
+
+    Under a name of their own: until then, those of the basis that is replaced stay.
+    """
+    if basis.sums is None:
+        return
+    with suppress(OutputError, OSError), replacing(_sums_path(basis)) as path:
+        # Uncompressed: noise does not shrink, and they are soon needed again.
+        np.savez(path, sums_a=basis.sums[0], sums_b=basis.sums[1])
+
+
+def _sums_path(basis: Basis) -> Path:
+    """Return the place for the exact sums of `basis`, which no other samples have."""
+    samples = hashlib.sha256(repr(basis.origin).encode()).hexdigest()[:32]
+    return companion_path(basis, f".{samples}{SUMS_SUFFIX}")
 
 
 def file_of(basis: Basis) -> Path | None:
@@ -126,34 +173,9 @@ def file_of(basis: Basis) -> Path | None:
 def companion_path(basis: Basis, ending: str) -> Path:
     """Return the place for data derived from `basis`, whether that is cached or not.
 
-    ending: CLEAN or KNOWN, what stands before it included.
+    ending: DENOISED_SUFFIX, FACTS_SUFFIX or SUMS_SUFFIX, what stands before it included.
     """
     return folder() / f"{_path_of(basis).name.removesuffix(SUFFIX)}{ending}"
-
-
-def companions_of(path: Path) -> list[Path]:
-    """Return the data derived from the basis at `path`."""
-    name = path.name.removesuffix(SUFFIX)
-    return [other for other, its in _companions() if its == name]
-
-
-def delete_orphans(unused_s: float = 0.0) -> int:
-    """Delete what lies beside no kept basis and was not used for that long; how many bytes."""
-    freed = 0
-    for path, name in _companions():
-        with suppress(OSError):
-            its = path.stat()
-            is_alone = not path.with_name(name + SUFFIX).exists()
-            if is_alone and time.time() - its.st_mtime >= unused_s:
-                path.unlink()
-                freed += its.st_size
-    return freed
-
-
-def _companions() -> list[tuple[Path, str]]:
-    """Return data derived from bases, with the stem of each basis."""
-    found = ((path, COMPANION_NAME.fullmatch(path.name)) for path in folder().glob("*"))
-    return [(path, match[1]) for path, match in found if match is not None and is_own(path)]
 
 
 def is_cached(basis: Basis) -> bool:
@@ -164,7 +186,7 @@ def is_cached(basis: Basis) -> bool:
 
 
 def _prune(path: Path) -> None:
-    """Bring the folder back under LARGEST, and keep `path`."""
+    """Bring the folder back under MAX_BYTES, and keep `path`."""
     for leftover in folder().glob(".*"):
         # What a killed process was writing.
         if _is_leftover(leftover) and time.time() - leftover.stat().st_mtime > LEFTOVER_S:

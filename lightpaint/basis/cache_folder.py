@@ -7,6 +7,7 @@ loses nothing in it.
 
 import os
 import re
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -20,13 +21,17 @@ from lightpaint.screen import some_names
 #: Names the folder, where it is not that of the user's cache.
 VARIABLE = "LIGHTPAINT_CACHE"
 
-#: Suffix of a basis, and of the files beside it: its denoised planes, facts about its scene.
+#: Suffix of a basis, and of the files beside it: its denoised planes, facts about its scene, and
+#: the exact sums of one to which samples are still to be added.
 SUFFIX, DENOISED_SUFFIX, FACTS_SUFFIX = ".basis.exr", ".clean.npz", ".known.json"
+SUMS_SUFFIX = ".sums.npz"
 #: Folder of the parts of bases that are being rendered.
 PARTS = "parts"
 
 BASIS_NAME = re.compile(r"[0-9a-f]{32}\.basis\.exr")
-COMPANION_NAME = re.compile(r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json)")
+COMPANION_NAME = re.compile(
+    r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json|\.[0-9a-f]{32}\.sums\.npz)"
+)
 #: Of a file that is being written, as `files.replacing` calls its folder.
 LEFTOVER_NAME = re.compile(r"\.([0-9a-f]{32}\.(?:[0-9a-f.]+\.)?[a-z]+\.[a-z]+)\.[a-z0-9_]{8}")
 
@@ -43,8 +48,9 @@ MARKS = {
     SUFFIX: b"lightpaint-basis",
     DENOISED_SUFFIX: b"made_of.npy",
     FACTS_SUFFIX: b'"lightpaint-known',
+    SUMS_SUFFIX: b"sums_a.npy",
 }
-MARK_WITHIN = {SUFFIX: 2**20, DENOISED_SUFFIX: 2**8, FACTS_SUFFIX: 2**8}
+MARK_WITHIN = {SUFFIX: 2**20, DENOISED_SUFFIX: 2**8, FACTS_SUFFIX: 2**8, SUMS_SUFFIX: 2**8}
 
 #: Other files that are named of a folder that is none of ours, and looked at before it is one.
 NAMES_SHOWN, NAMES_READ = 3, 100_000
@@ -92,6 +98,31 @@ def is_own(path: Path) -> bool:
 def is_trusted_owner(its: os.stat_result) -> bool:
     """Return whether a file or folder belongs to who runs this, or to who runs the machine."""
     return not hasattr(os, "geteuid") or its.st_uid in (os.geteuid(), 0)
+
+
+def companions_of(path: Path) -> list[Path]:
+    """Return the data derived from the basis at `path`."""
+    name = path.name.removesuffix(SUFFIX)
+    return [other for other, its in _companions() if its == name]
+
+
+def delete_orphans(unused_s: float = 0.0) -> int:
+    """Delete what lies beside no kept basis and was not used for that long; how many bytes."""
+    freed = 0
+    for path, name in _companions():
+        with suppress(OSError):
+            its = path.stat()
+            is_alone = not path.with_name(name + SUFFIX).exists()
+            if is_alone and time.time() - its.st_mtime >= unused_s:
+                path.unlink()
+                freed += its.st_size
+    return freed
+
+
+def _companions() -> list[tuple[Path, str]]:
+    """Return data derived from bases, with the stem of each basis."""
+    found = ((path, COMPANION_NAME.fullmatch(path.name)) for path in folder().glob("*"))
+    return [(path, match[1]) for path, match in found if match is not None and is_own(path)]
 
 
 def _foreign_names(path: Path) -> list[str]:

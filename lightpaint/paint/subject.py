@@ -132,7 +132,9 @@ class Subject:
         from lightpaint.basis.render.cached_render import obtain_basis
 
         scene = self.loaded_scene
-        basis = obtain_basis(scene, spp=spp, seed=self.settings.seed, progress=progress)
+        basis = obtain_basis(
+            scene, spp=spp, seed=self.settings.seed, is_final=False, progress=progress
+        )
         return basis.with_requests(scene.requests)
 
 

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 from command import run
-from renderer import LIGHTS, same_basis, write_room
+from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
 from lightpaint.basis import basis_file, cache, cache_folder
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.basis_file import read_basis, write_basis
-from lightpaint.basis.cache_folder import SUFFIX, TAG
+from lightpaint.basis.cache_folder import SUFFIX, SUMS_SUFFIX, TAG
 from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
 from lightpaint.basis.render.cached_render import obtain_basis
@@ -157,14 +159,80 @@ def test_the_first_samples_of_what_is_asked_for_are_gone_on_with(
 
         with pytest.raises(Interrupted):
             obtain_basis(scene, spp=64, exact_spp=True, progress=press_ctrl_c)
-        assert is_on_the_way(scene, *_kept(), 64)
+        [unfinished] = _kept()
+        exact = replace(unfinished, sums=cache.sums_of(unfinished))
+        assert is_on_the_way(scene, exact, 64)
+        assert not is_on_the_way(scene, unfinished, 64)
         log: list[int] = []
         gone_on = obtain_basis(scene, spp=64, exact_spp=True, progress=passes(log))
-        same_basis(gone_on, fresh, of_file=True)
+        assert_equal_bits(gone_on, fresh)
+        assert not sums_files()
         assert 0 < sum(now > 0 for now in log) < max(whole)
         cache.delete_entries(cache.entries())
     # One that fewer samples ended has other passes.
     assert not is_on_the_way(scene, obtain_basis(scene, spp=6, use_cache=False), 64)
+
+
+def sums_files() -> list[Path]:
+    return list(cache_folder.folder().glob(f"*{SUMS_SUFFIX}"))
+
+
+def _killed(scene: Scene, spp: int, after: int) -> None:
+    """Render in a process that is killed once that many steps are done, all of them kept."""
+    code = f"""
+import os, signal, sys
+import lightpaint as lp, lightpaint.scene.scene_render
+from lightpaint.basis.render.cached_render import obtain_basis
+sys.modules["lightpaint.basis.render.render_budget"].KEEP_EVERY_S = 0
+lightpaint.scene.scene_render.SAMPLES_PER_PASS = {4 * 4 * 24 * 20}
+def kill(label, done, total):
+    if done == {after}:
+        os.kill(os.getpid(), signal.SIGKILL)
+obtain_basis(lp.load_scene({str(scene.path)!r}), spp={spp}, progress=kill)
+"""
+    process = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True)
+    assert process.returncode == -signal.SIGKILL, process.stderr.decode()
+
+
+def test_a_render_that_was_killed_goes_on_to_the_bits_of_one(scene: Scene) -> None:
+    whole = obtain_basis(scene, spp=64, use_cache=False)
+    _killed(scene, 64, 3)
+    [kept] = _kept()
+    assert 0 < kept.origin.spp < 64
+    log: list[int] = []
+    assert_equal_bits(obtain_basis(scene, spp=64, progress=passes(log)), whole)
+    assert log
+    assert not sums_files()
+
+
+@pytest.mark.parametrize("damage", ["cut", "missing", "of others"])
+def test_without_its_sums_what_is_unfinished_counts_and_is_not_exact(
+    scene: Scene, damage: str
+) -> None:
+    whole = obtain_basis(scene, spp=32, use_cache=False)
+    obtain_basis(scene, spp=8, is_final=False)
+    [file] = sums_files()
+    if damage == "cut":
+        file.write_bytes(file.read_bytes()[:1000])
+    elif damage == "missing":
+        file.unlink()
+    else:
+        np.savez(file, sums_a=np.zeros(3, np.float32), sums_b=np.zeros(3, np.float32))
+    [entry] = cache.entries()
+    before = entry.path.read_bytes()
+    same_basis(obtain_basis(scene, spp=32), whole, of_file=True)
+    entry.path.write_bytes(before)
+    # All of it is rendered again where the same samples are asked for.
+    assert_equal_bits(obtain_basis(scene, spp=32, exact_spp=True), whole)
+
+
+def test_sums_go_with_their_basis(scene: Scene) -> None:
+    obtain_basis(scene, spp=2, is_final=False)
+    obtain_basis(scene, spp=8, is_final=False)
+    [file], [entry] = sums_files(), cache.entries()
+    assert entry.size == entry.path.stat().st_size + file.stat().st_size
+    cache.delete_entries([entry])
+    assert not sums_files()
 
 
 def _kept() -> list[Basis]:

@@ -184,7 +184,7 @@ def test_what_lies_beside_no_basis_goes_when_it_was_not_used(tmp_path: Path) -> 
     for path in (alone, mine):
         np.savez(path, made_of=np.array("0"))
     size = alone.stat().st_size
-    assert cache.delete_orphans(3600) == 0
-    assert cache.delete_orphans() == size
+    assert cache_folder.delete_orphans(3600) == 0
+    assert cache_folder.delete_orphans() == size
     assert not alone.exists()
     assert mine.exists()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import spawn
-from renderer import write_room
+from renderer import assert_equal_bits, write_room
 
 import lightpaint as lp
 from lightpaint.basis import cache, scene_facts
@@ -25,8 +25,10 @@ from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subject
+from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile
+from lightpaint.progress import silent
 
 
 @pytest.fixture(autouse=True)
@@ -76,6 +78,15 @@ def kept(path: Path, make_basis: Any, meanwhile: Callable[[], object] = lambda: 
     meanwhile()
     opening.remember(basis)
     return basis
+
+
+def test_previews_of_more_and_more_samples_come_to_the_bits_of_one_render(path: Path) -> None:
+    solved = obtain(lp.load_scene(path), Settings(spp=48, use_cache=False), silent)
+    bases = list(opened(path, spp=48).bases())
+    assert [basis.origin.spp for basis in bases] == [2, 8, 32, 48]
+    assert_equal_bits(bases[-1], solved)
+    [found] = opened(path, spp=48).bases()
+    assert_equal_bits(found, solved)
 
 
 @pytest.mark.parametrize("set_by", [-3600.0, 3600.0])

@@ -46,6 +46,7 @@ def render_basis(
     seed: int = 0,
     start: Basis | None = None,
     keep: Callable[[Basis], bool] | None = None,
+    is_final: bool = True,
     progress: Progress = silent,
 ) -> Basis:
     """Render the image of each light of `scene` alone, at unit emission.
@@ -56,9 +57,11 @@ def render_basis(
         time_s: Instead, seconds to render for, besides what `start` took; whole steps.
         seed: Any number >= 0; other seeds give independent bases.
         start: An earlier basis of the same scene, sensor and seed: its samples count, and only what
-            is missing to `spp` is rendered, or as many more as `time_s` allows.
-        keep: Called with what there is, now and then and when Ctrl-C ends the work early; returns
-            whether it could be kept.
+            is missing to `spp` is rendered, or as many more as `time_s` allows. With its `sums` the
+            result has the bits of one render, else it differs by round-off.
+        keep: Called with what there is, now and then and when Ctrl-C ends the work early, its
+            `sums` included; returns whether it could be kept.
+        is_final: False for a basis that more samples are to be added to: it has its `sums`.
         progress: Hears how far the work has come.
 
     Raises:
@@ -94,7 +97,7 @@ def render_basis(
         )
     render_all = _render_together if method == ONE_PASS else _render_one_by_one
     with render_errors(scene.path):
-        made = render_all(scene, budget, seed, start, Keeper(keep), progress)
+        made = render_all(scene, budget, seed, start, Keeper(keep), progress, is_final=is_final)
     if start is not None:
         made = replace(made, features=start.features, objects=start.objects)
     return with_first_hits(made, scene, seed)
@@ -153,17 +156,17 @@ def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
 def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
     """Return True if a render from nothing to `spp` samples comes by just those of `basis`.
 
-    So does one that an interrupt ended, and not one that was made for fewer samples: it is rounded
-    where it is kept, or its passes end elsewhere. spp: the scene's own number if None.
+    With fewer samples it needs its exact sums: without, it was rounded. And those of separate
+    renders must not end elsewhere than passes do. spp: the scene's own number if None.
     """
     origin = basis.origin
-    if origin.is_composed:
+    if origin.is_composed or origin.method != method_of(scene):
         return False
-    if origin.method != method_of(scene):
+    wanted = samples_for(scene, spp)
+    if origin.spp < wanted and basis.sums is None:
         return False
     if origin.method == ONE_PASS:
-        wanted = samples_for(scene, spp)
-        return origin.spp == wanted or (origin.spp < wanted and origin.passes == UNFINISHED)
+        return origin.spp <= wanted
     plan = plan_of_light(scene, scene.spp if spp is None else spp)
     sizes = [[size for half, size in plan if half == h] for h in range(2)]
     return all(
@@ -242,9 +245,12 @@ def basis_of_sums(
 
     halves: undivided sums of two halves of the samples, (n or 2n, h, w, 3), as `LightPlanes.sums`
     returns them; they are overwritten. seen: (h, w). half_spp: samples per pixel of each half in
-    all. is_finished: whether there are as many as were asked for.
+    all. start: what these sums do not include. is_finished: whether there are as many as were asked
+    for; if not, the basis has a copy of its sums.
     """
     n, spp = len(scene.lights), (half_spp, half_spp)
+    keeps_sums = not is_finished and start is None
+    kept = (halves[0].copy(), halves[1].copy()) if keeps_sums else None
     totals, indirect = [half[:n] for half in halves], [half[n:] for half in halves]
     for total, part in zip(totals, indirect, strict=True):
         total[: len(part)] += part
@@ -272,6 +278,7 @@ def basis_of_sums(
         if is_split
         else None,
         source=str(scene.path),
+        sums=kept,
     )
 
 
@@ -283,6 +290,8 @@ def _render_together(
     start: Basis | None,
     keeper: Keeper,
     progress: Progress,
+    *,
+    is_final: bool = True,
 ) -> Basis:
     """Render all lights by one path tracer (see one_pass.py), step by step."""
     from lightpaint.basis.render.one_pass import Tracer
@@ -292,17 +301,22 @@ def _render_together(
     begun = done = 0 if start is None else start.origin.halves[0]
     guide_table = None if start is None else start.guide_table
     tracer = Tracer(scene, view_seed(seed, scene.sensor), guide_table)
-    halves = [tracer.planes(rows) for _ in range(2)]
+    before = None if start is None else start.sums
+    halves = [tracer.planes(rows, None if before is None else before[half]) for half in range(2)]
+    ahead = 0  # samples of a pixel that half A has before half B
 
     def basis(*, is_last: bool = False, is_finished: bool = False) -> Basis:
         seen = np.add(*(planes.seen() for planes in halves)) > 0
+        if start is not None:
+            seen |= start.emitters_seen
+        rest = start if before is None else None  # what the sums do not begin with
         sums = []
         for half, planes in enumerate(halves):
             sums.append(planes.sums())
             if is_last:  # saves as much memory again
                 halves[half] = tracer.planes(range(0))
         return basis_of_sums(
-            scene, seed, sums, seen, done, tracer.guide_table, start=start, is_finished=is_finished
+            scene, seed, sums, seen, done, tracer.guide_table, start=rest, is_finished=is_finished
         )
 
     try:
@@ -313,12 +327,17 @@ def _render_together(
                 for half, planes in enumerate(halves):
                     let_others_through()
                     tracer.add(planes, half, rows, done, spp)
+                    ahead = spp if half == 0 else 0
                 done += spp
                 keeper.now_and_then(basis)
-        return basis(is_last=True, is_finished=True)
+        return basis(is_last=True, is_finished=is_final)
     except KeyboardInterrupt:
         if keeper.keep is None:
             raise
+        if ahead:
+            with tracing():
+                tracer.add(halves[1], 1, rows, done, ahead)
+            done += ahead
         if done == begun == 0:
             raise Interrupted("too early for anything to be kept") from None
         if not keeper.keep(basis(is_last=True)):
@@ -340,23 +359,25 @@ def _render_one_by_one(
     start: Basis | None,
     keeper: Keeper,
     progress: Progress,
+    *,
+    is_final: bool = True,
 ) -> Basis:
     """Render one light after the other, by the scene's own integrator (see separate.py)."""
     sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
     seen = emitters_seen(scene) if start is None else start.emitters_seen
     nothing = origin_of(scene, seed, SEPARATE, (0, 0), (0, 0))
 
-    def basis() -> Basis:
+    def basis(*, is_finished: bool = False) -> Basis:
         images, half_differences = sums.mean_and_half_difference()
         origin = replace(nothing, **sums.counts())
         lights = basis_lights(scene)
         source = str(scene.path)
-        return Basis(
-            lights, as_planes(images), as_planes(half_differences), seen, origin, source=source
-        )
+        kept = None if is_finished else (sums.planes[0].copy(), sums.planes[1].copy())
+        planes = as_planes(images), as_planes(half_differences)
+        return Basis(lights, *planes, seen, origin, source=source, sums=kept)
 
     numbers = view_seed(seed, scene.sensor)
     render_separately(
         scene, budget, seed=numbers, sums=sums, basis=basis, keeper=keeper, progress=progress
     )
-    return basis()
+    return basis(is_finished=is_final)

@@ -42,6 +42,7 @@ def obtain_basis(
     seed: int = 0,
     use_cache: bool = True,
     exact_spp: bool = False,
+    is_final: bool = True,
     progress: Progress = silent,
     render: Render = render_basis,
     report_reuse: ReuseReport = lambda count, of: None,
@@ -58,6 +59,8 @@ def obtain_basis(
     use_cache: False neither looks for one nor keeps it.
     exact_spp: whether it has just as many samples as are asked for, and the same ones, whatever
     was kept: then nothing is taken of another state of the scene. One with more samples stays kept.
+    is_final: False for a basis to be gone on from: its exact sums are kept beside it, so that a
+    basis with more samples has the bits of one render, as it has after an interrupt.
     render: who renders what is missing.
     report_reuse: told how many of the lights are taken, and of how many, where others are rendered.
 
@@ -72,11 +75,13 @@ def obtain_basis(
         kept = None
     asked = scene.spp if spp is None else spp
     start = kept
+    if start is not None and (time_s is not None or start.origin.spp < asked):
+        start = replace(start, sums=cache.sums_of(start))
     if exact_spp:
         if start is not None and not is_on_the_way(scene, start, spp):
             start = None
     elif time_s is None and (kept is None or kept.origin.spp < asked):
-        start = gather_planes(scene, kept, spp=asked, seed=seed)
+        start = gather_planes(scene, start, spp=asked, seed=seed)
     elif kept is None:
         start = gather_planes(scene, None, spp=None, seed=seed)
 
@@ -93,12 +98,19 @@ def obtain_basis(
         enough = [sum(its[:2]) >= (1 if time_s is not None else asked) for its in counts_of(start)]
         if 0 < sum(enough) < len(enough):
             report_reuse(sum(enough), len(enough))
-    how = {"time_s": time_s, "seed": seed, "keep": keep, "progress": progress}
+    how = {
+        "time_s": time_s,
+        "seed": seed,
+        "keep": keep,
+        "is_final": is_final,
+        "progress": progress,
+    }
     basis = _completed(scene, start, spp=asked if time_s is None else None, render=render, how=how)
     if basis is start:
         return basis
     basis = _marked(basis, is_composed=is_composed)
-    if keep(basis) and is_large(len(basis.lights), basis.size):
+    is_kept, basis = keep(basis), replace(basis, sums=None)
+    if is_kept and is_large(len(basis.lights), basis.size):
         of_file = cache.find(scene.identity, basis.origin.sensor, seed, basis.size)
         if of_file is not None and of_file.origin == basis.origin:
             return replace(basis, planes=of_file.planes, noise=of_file.noise)

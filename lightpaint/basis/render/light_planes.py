@@ -21,7 +21,8 @@ class LightPlanes:
     light_of: as `lights_by_instance` returns it. lights: how many there are. size: rows and columns
     of the pixels, which `add` counts row by row. is_shared: whether several paths may add to one
     pixel at a time, whose order then decides the last bits; else each pixel has one path, which
-    adds in order. is_split: whether direct and indirect light have planes of their own.
+    adds in order. is_split: whether direct and indirect light have planes of their own. start: what
+    they begin with, as `sums` returns it; zeros if None.
 
     An object, and not arrays of the loop that traces: Dr.Jit refuses such an array once it finds
     that nothing can ever be added to it, as to `seen` where all lights are points.
@@ -35,6 +36,7 @@ class LightPlanes:
         *,
         is_shared: bool = False,
         is_split: bool = False,
+        start: Floats | None = None,
     ) -> None:
         self.count, self.size = lights * (2 if is_split else 1), size
         self._first_indirect = lights if is_split else 0
@@ -43,7 +45,10 @@ class LightPlanes:
         self._keeps = dr.opaque(mi.Bool, True)
         self._mode = dr.ReduceMode.Auto if is_shared else dr.ReduceMode.NoConflicts
         self._pixels = dr.opaque(mi.UInt32, pixels)
-        self._sums = dr.zeros(mi.Float, self.count * pixels * 3)
+        if start is None:
+            self._sums = dr.zeros(mi.Float, self.count * pixels * 3)
+        else:
+            self._sums = mi.Float(start.ravel())
         self._seen = dr.zeros(mi.Float, pixels)
 
     @classmethod

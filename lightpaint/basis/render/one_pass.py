@@ -92,11 +92,15 @@ class Tracer:
         """True once the guide is trained."""
         return self.guide_table is not None
 
-    def planes(self, rows: range) -> LightPlanes:
-        """Return planes of some rows, to which nothing is added yet."""
+    def planes(self, rows: range, start: Floats | None = None) -> LightPlanes:
+        """Return planes of some rows, to which nothing is added yet.
+
+        start: sums of samples that come before, (planes, rows, columns, 3), which they begin with.
+        """
         size = len(rows), self.scene.size[1]
         is_split = has_indirect_planes(self.scene)
-        return LightPlanes(self.light_of, len(self.scene.lights), size, is_split=is_split)
+        lights = len(self.scene.lights)
+        return LightPlanes(self.light_of, lights, size, is_split=is_split, start=start)
 
     def add(self, planes: LightPlanes, half: int, rows: range, first: int, spp: int) -> None:
         """Add the light of some samples of some rows, of one half, to `planes` of these rows.

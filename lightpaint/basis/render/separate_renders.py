@@ -40,8 +40,11 @@ class LightSums:
 
     @classmethod
     def of(cls, basis: Basis) -> "LightSums":
-        """Return the sums that made `basis`, up to round-off."""
+        """Return the sums that made `basis`, up to round-off where it does not have them."""
         sums = cls.counted(basis)
+        if basis.sums is not None:
+            sums.planes = np.stack(basis.sums)
+            return sums
         sums.planes = np.zeros((2, *basis.images.shape), np.float32)
         for k, (a, b) in enumerate(sums.spp.tolist()):
             image, half_difference = basis.images[k], basis.half_differences[k]

@@ -55,6 +55,10 @@ class PartwiseRender:
             return with_first_hits(start.with_requests(scene.requests), scene, seed)
         if start is not None and start.origin.method != method_of(scene):
             start = None
+        if start is not None and start.sums is not None and method_of(scene) == ONE_PASS:
+            # Parts are added to sums, but samples to the sum before them: only a finished basis,
+            # which was rounded anyway, is worth other last bits.
+            start = None
         check_memory(scene)
         parts = plan_parts(scene, spp, start=start)
         spool = Spool(scene, parts, seed=seed, start=start)

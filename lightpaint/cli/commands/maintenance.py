@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lightpaint.basis import cache as bases
-from lightpaint.basis.cache_folder import folder
+from lightpaint.basis.cache_folder import delete_orphans, folder
 from lightpaint.cli.doctor import examine
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
@@ -26,7 +26,7 @@ def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
     dropped = bases.entries() if action == "clear" else _kept_by_names(names)
     freed = bases.delete_entries(dropped)
     if action == "clear":
-        freed += bases.delete_orphans()
+        freed += delete_orphans()
     if action == "drop":
         tables.show_kept(dropped)
     terminal.write(f"{len(dropped)} deleted from {folder()}: {freed / 1e6:.1f} MB are free")

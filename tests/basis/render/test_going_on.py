@@ -2,10 +2,12 @@
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
-from renderer import same_basis, write_room
+from renderer import assert_equal_bits, same_basis, write_room
 
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
@@ -14,6 +16,7 @@ from lightpaint.basis.render import guide_training
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
+from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene, load_scene
 from lightpaint.scene.scene_render import plan_passes
 
@@ -62,7 +65,49 @@ def test_an_interrupt_keeps_what_is_done(small_room: Scene, after: int) -> None:
     with pytest.raises(Interrupted, match=f"{done} of 40"):
         render_basis(small_room, spp=40, keep=keep, progress=press_ctrl_c)
     assert kept[-1].origin.spp == done
-    same_basis(render_basis(small_room, spp=40, start=kept[-1]), render_basis(small_room, spp=40))
+    gone_on = render_basis(small_room, spp=40, start=kept[-1])
+    assert_equal_bits(gone_on, render_basis(small_room, spp=40))
+
+
+def test_an_interrupt_between_the_halves_of_a_step_waits_for_the_second(
+    small_room: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use_variant()
+    from lightpaint.basis.render.one_pass import Tracer
+
+    kept: list[Basis] = []
+    add, calls = Tracer.add, 0
+
+    def press_ctrl_c(*step: Any) -> None:
+        nonlocal calls
+        calls += 1
+        add(*step)
+        if calls == 3:  # the first half of the second step
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Tracer, "add", press_ctrl_c)
+        with pytest.raises(Interrupted, match="16 of 40"):
+            render_basis(small_room, spp=40, keep=lambda basis: not kept.append(basis))
+    as_asked = render_basis(small_room, spp=16)
+    assert_equal_bits(replace(kept[-1], origin=as_asked.origin), as_asked)
+    gone_on = render_basis(small_room, spp=40, start=kept[-1])
+    assert_equal_bits(gone_on, render_basis(small_room, spp=40))
+
+
+@pytest.mark.parametrize("integrator", ["path", "volpathmis"])
+def test_what_goes_on_has_the_bits_of_one_render(tmp_path: Path, integrator: str) -> None:
+    scene = load_scene(write_room(tmp_path, integrator=f'<integrator type="{integrator}"/>'))
+    whole = render_basis(scene, spp=40)
+    # Separate renders draw other numbers where their passes end elsewhere.
+    rungs = (2, 8, 24) if integrator == "path" else (16, 32)
+    basis = None
+    for spp in rungs:
+        basis = render_basis(scene, spp=spp, start=basis, is_final=False)
+        assert basis.origin.spp == spp
+    gone_on = render_basis(scene, spp=40, start=basis)
+    assert_equal_bits(gone_on, whole)
+    assert gone_on.sums is None
 
 
 def test_enough_is_enough(small_room: Scene) -> None:
