@@ -85,6 +85,7 @@ if TYPE_CHECKING:
     from lightpaint.relit.verification import Verification as Verification
     from lightpaint.relit.verification_render import verify as verify
     from lightpaint.report.verdict import verdict as verdict
+    from lightpaint.scene.pose import Pose as Pose
     from lightpaint.scene.runtime.variant import use_variant as use_variant
     from lightpaint.scene.scene import Scene as Scene
     from lightpaint.scene.scene import load_scene as load_scene
@@ -108,6 +109,7 @@ _HOMES = {
     "Look": "pipeline.results",
     "Objects": "images.object_map",
     "Painting": "pipeline.sources",
+    "Pose": "scene.pose",
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
     "SceneFile": "pipeline.sources",

@@ -140,7 +140,7 @@ def _finish_view(
         basis=basis,
         solution=solution,
         predicted=predicted,
-        relit=None if relit is None else relit.moved(answer.path, job.folder),
+        relit=None if relit is None else relit.relocated(answer.path, job.folder),
         verification=verification,
         analysis=analysis,
         suggestions=suggestions,

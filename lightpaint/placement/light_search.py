@@ -24,7 +24,7 @@ from lightpaint.placement.candidates import Candidates
 from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, free_space, pixels_of
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
-from lightpaint.relit.xml_edit import tag
+from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.film import reduction_to
 from lightpaint.scene.lights.light import free_names
 from lightpaint.scene.scene import Scene

@@ -7,7 +7,8 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
-from lightpaint.relit.xml_edit import Element, XmlFile, tag
+from lightpaint.relit.xml_edit import Element, XmlFile
+from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.emission import AS_AUTHORED, Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene
@@ -31,6 +32,15 @@ class Changes:
             self._missing.append(tag(kind, name=name, value=value))
         else:
             self.xml.replace(child, tag(kind, name=child.attributes["name"], value=value))
+
+    def set_element(self, name: str, text: str) -> None:
+        """Give the element the child `text`, called `name`, in the place of its namesake."""
+        child = self._child_named(name)
+        if child is None:
+            self._missing.append(text)
+        else:
+            spelt = child.attributes["name"]
+            self.xml.replace(child, text.replace(f'name="{name}"', f'name="{spelt}"', 1))
 
     def number(self, name: str, otherwise: float) -> float:
         """Return the present number of the child called `name`, or `otherwise`."""

@@ -19,7 +19,8 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.emission_xml import Changes, set_emission
-from lightpaint.relit.xml_edit import XmlFile, tag
+from lightpaint.relit.xml_edit import XmlFile
+from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene, load_scene
@@ -165,11 +166,13 @@ class _Edits:
     """The changes in one file: the settings of the emitters in it, by byte offset.
 
     integrators: the replacements of elements, by byte offset; at None, an addition.
+    moved: children to set of the elements of moved lights, by byte offset: XML by name.
     """
 
     original: Path
     settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
     integrators: dict[int | None, str] = field(default_factory=dict)
+    moved: dict[int, Mapping[str, str]] = field(default_factory=dict)
 
 
 def relit_files(
@@ -200,6 +203,8 @@ def relit_files(
             raise _included_twice(file, here[emitter.offset][0], emitter)
 
     _edit_integrators(scene, edits)
+    for file, offset, children in scene.moved_elements:
+        edits.setdefault(file.resolve(), _Edits(file)).moved[offset] = children
     written: dict[Path, bytes | Floats] = {}
     for edit in edits.values():
         is_root = edit.original == root
@@ -273,10 +278,14 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
         if at is not None:
             xml.replace(xml.element_at(at), text)
     images: dict[str, Floats] = {}
-    for offset, (emitter, rgb, weight) in edit.settings.items():
+    for offset in sorted({*edit.settings, *edit.moved}):
         changes = Changes(xml, xml.element_at(offset))
-        if weight is not None:
-            changes.set("float", "sampling_weight", f"{weight:g}")
-        images |= set_emission(changes, scene, emitter, rgb, stem=stem)
+        for name, text in edit.moved.get(offset, {}).items():
+            changes.set_element(name, text)
+        if offset in edit.settings:
+            emitter, rgb, weight = edit.settings[offset]
+            if weight is not None:
+                changes.set("float", "sampling_weight", f"{weight:g}")
+            images |= set_emission(changes, scene, emitter, rgb, stem=stem)
         changes.finish()
     return xml.edited(), images

@@ -113,24 +113,6 @@ class XmlFile:
         return text.decode("utf-8").encode(self._encoding, "xmlcharrefreplace")
 
 
-def tag(element: str, /, **attributes: str) -> str:
-    """Return an empty element, with its attributes escaped.
-
-    Raises SceneError if one holds a `$`, which cannot be escaped.
-    """
-    # It brings half of the network's protocols along.
-    from xml.sax.saxutils import quoteattr
-
-    for key, value in attributes.items():
-        if "$" in value:
-            raise SceneError(
-                f"cannot write <{element} {key}={value!r}>: Mitsuba reads $ as the start of a "
-                "parameter; rename the folder or file, or choose other parameters=..."
-            )
-    listed = "".join(f" {key}={quoteattr(value)}" for key, value in attributes.items())
-    return f"<{element}{listed}/>"
-
-
 def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
     """Return (root, all elements by offset). Text behind the root is ignored. What comes behind the
     root is not looked at.

@@ -9,7 +9,7 @@ from lightpaint.arrays import RGB
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relight import relit_files, scene_of, settings_of
-from lightpaint.relit.xml_edit import tag
+from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.scene import Scene

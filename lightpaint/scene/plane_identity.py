@@ -112,6 +112,8 @@ class SceneHasher:
             else:
                 value = self._value(kind, props[key])
             found.append((_MADE_UP.sub("", key), str(kind), value))
+        # Parameters may stand in any order, but for children without a name.
+        found.sort(key=lambda entry: entry[0])
         return _digest((str(its.type), props.plugin_name(), found))
 
     def _value(self, kind: Any, value: Any) -> Any:

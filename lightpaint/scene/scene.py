@@ -29,6 +29,7 @@ from lightpaint.scene.lights.light_choice import REST, choose_lights
 from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside, lights_file_for
 from lightpaint.scene.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.plane_identity import SceneHasher
+from lightpaint.scene.pose import Pose, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_tree import ParsedScene
@@ -234,6 +235,66 @@ class Scene(Shown):
             _parsed=self._parsed.darkened(dark),
         )
 
+    @MITSUBA.taken()
+    def moved(self, poses: Mapping[str, Pose]) -> "Scene":
+        """Return this scene with lights at other places, directions or cones.
+
+        Nothing is written: `relight` writes the new places with the new emissions. A basis of it
+        needs the planes of the moved lights alone, unless one has a shape, which blocks and
+        reflects the light of the others. poses: by the names of lights of one emitter, or of
+        emitters.
+
+        Raises:
+            SceneError: For lights that are not there, or cannot be moved so.
+
+        Examples:
+            >>> scene = lp.load_scene("room.xml")
+            >>> scene.moved({"bulb": lp.Pose(position=(0.5, 1, 0))}).light("bulb").form
+            'at (0.50, 1.00, 0.00)'
+        """
+        motions = {}
+        for name, pose in poses.items():
+            emitter = self._emitter(name)
+            motions[emitter.node] = motion_of(emitter.name, emitter.plugin, emitter.site, pose)
+        parsed = self._parsed.with_motions(motions)
+        with mitsuba_errors(self.path):
+            seen = _look_at(parsed, self.sensor)
+        members = {light.name: light.member_names for light in self.lights}
+        lights = lights_of(
+            seen["emitters"], members, [light.name for light in self.lights if light.is_fixed]
+        )
+        found = {light.name for light in self.lights if light.is_found}
+        return replace(
+            self,
+            **seen | {"film": self.film},
+            lights=tuple(replace(x, is_found=x.name in found) for x in lights),
+            _parsed=parsed,
+        )
+
+    def _emitter(self, name: str) -> Emitter:
+        """Return the emitter, or the only one of the light, of that name."""
+        if emitter := next((x for x in self.emitters if x.name == name), None):
+            return emitter
+        light = self.light(name)
+        if len(light.members) > 1:
+            raise SceneError(
+                f"light {name!r} is {len(light.members)} emitters: move one of them, "
+                f"{some_names(light.member_names)}"
+            )
+        return light.members[0]
+
+    @property
+    def moved_elements(self) -> tuple[tuple[Path, int, Mapping[str, str]], ...]:
+        """Elements of the files that `moved` changed.
+
+        Each with its file, the byte offset of its `<`, and the children to set: XML by name.
+        """
+        nodes = self._parsed.state.nodes
+        return tuple(
+            (self.files[nodes[k].file_index], int(nodes[k].offset) - 1, children)
+            for k, children in self._parsed.moved.items()
+        )
+
     @property
     def originals(self) -> tuple[Path, ...]:
         """All files the scene consists of: XML, meshes, textures, tables."""
@@ -250,9 +311,9 @@ class Scene(Shown):
         beside = self.lights_file or lights_file_beside(self.path)
         return frozenset({*self._parsed.places(), beside})
 
-    def moved(self, old: Path, new: Path) -> "Scene":
+    def relocated(self, old: Path, new: Path) -> "Scene":
         """Return this scene after the folder `old`, which contains its XML, has moved to `new`."""
-        parsed = self._parsed.moved(old, new)
+        parsed = self._parsed.relocated(old, new)
         return replace(self, path=parsed.path, files=parsed.files, _parsed=parsed)
 
     @MITSUBA.taken()

@@ -28,6 +28,7 @@ from lightpaint.scene.integrator import (
 )
 from lightpaint.scene.mitsuba_errors import mitsuba_errors
 from lightpaint.scene.normals import settle_normals
+from lightpaint.scene.pose import Motion, moved_parameters
 from lightpaint.scene.runtime.plugins import check_plugins
 
 
@@ -85,6 +86,8 @@ class ParsedScene:
             for child in self.children_of(shape, kinds.Shape)
         }
         self.names = self._name_lights()
+        #: The parameters that `with_motions` changed, as XML: node → name → element.
+        self.moved: dict[int, dict[str, str]] = {}
 
     def _replace_integrator(
         self, instead: IntegratorChoice | None
@@ -160,6 +163,27 @@ class ParsedScene:
         settle_normals(scene)
         return scene
 
+    def shape_plugin(self, emitter: int) -> str:
+        """Return the plugin of the shape that an emitter belongs to; "" for one without a shape."""
+        shape = self.shape_of.get(emitter)
+        return "" if shape is None else str(self.state.nodes[shape].props.plugin_name())
+
+    def with_motions(self, motions: Mapping[int, Motion]) -> "ParsedScene":
+        """Return this scene with emitters moved. motions: by the nodes of emitters."""
+        import mitsuba as mi
+
+        other = copy(self)
+        other.state = mi.parser.ParserState(self.state)
+        other.moved = dict(self.moved)
+        for emitter, motion in motions.items():
+            node = self.shape_of.get(emitter, emitter)
+            props = other.state.nodes[node].props
+            parameters = moved_parameters(props, motion)
+            for parameter in parameters:
+                props[parameter.name] = parameter.value
+            other.moved[node] = {**self.moved.get(node, {}), **{p.name: p.xml for p in parameters}}
+        return other
+
     def darkened(self, dark: Mapping[int, EmitterSetting]) -> "ParsedScene":
         """Return this scene with the settings `dark` made, by the nodes of emitters."""
         import mitsuba as mi
@@ -195,17 +219,17 @@ class ParsedScene:
             other.names[k] = name
         return other
 
-    def moved(self, old: Path, new: Path) -> "ParsedScene":
+    def relocated(self, old: Path, new: Path) -> "ParsedScene":
         """Return this scene, whose files in the folder `old` are about to move to `new`."""
         import mitsuba as mi
 
         other = copy(self)
         other.path = new / self.path.relative_to(old)
-        other.files = tuple(moved(file, old, new) for file in self.files)
+        other.files = tuple(relocated_path(file, old, new) for file in self.files)
         other.resolver = mi.FileResolver(self.resolver)
         other.resolver.clear()
         for k in range(len(self.resolver)):
-            other.resolver.append(str(moved(Path(str(self.resolver[k])), old, new)))
+            other.resolver.append(str(relocated_path(Path(str(self.resolver[k])), old, new)))
         return other
 
     def image_file(self, node: int, parameter: str) -> tuple[Path, bool]:
@@ -283,7 +307,7 @@ class ParsedScene:
             mi.set_file_resolver(before)
 
 
-def moved(path: Path, old: Path, new: Path) -> Path:
+def relocated_path(path: Path, old: Path, new: Path) -> Path:
     """Return the path of `path` after the folder `old` has moved to `new`, by a lasting route."""
     if ".." not in path.parts and path.is_relative_to(old):
         return new / path.relative_to(old)

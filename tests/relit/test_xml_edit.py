@@ -15,7 +15,8 @@ from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.relight import relight
-from lightpaint.relit.xml_edit import Element, XmlFile, _parse, tag
+from lightpaint.relit.xml_edit import Element, XmlFile, _parse
+from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.scene import Scene, load_scene
 
 BULB = LIGHTS["bulb"]

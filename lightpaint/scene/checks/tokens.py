@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from lightpaint.errors import SceneError
 from lightpaint.files import one_line
 
 _MARKS = {
@@ -106,3 +107,21 @@ def place_of_node(state: Any, node: Any) -> str:
         return ""
     lead = f"{file.name}, " if node.file_index else ""
     return f"{lead}line {line}: "
+
+
+def tag(element: str, /, **attributes: str) -> str:
+    """Return an empty element, with its attributes escaped.
+
+    Raises SceneError if one holds a `$`, which cannot be escaped.
+    """
+    # It brings half of the network's protocols along.
+    from xml.sax.saxutils import quoteattr
+
+    for key, value in attributes.items():
+        if "$" in value:
+            raise SceneError(
+                f"cannot write <{element} {key}={value!r}>: Mitsuba reads $ as the start of a "
+                "parameter; rename the folder or file, or choose other parameters=..."
+            )
+    listed = "".join(f" {key}={quoteattr(value)}" for key, value in attributes.items())
+    return f"<{element}{listed}/>"

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from lightpaint.scene.emission import (
     why_not_adjusted,
 )
 from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
+from lightpaint.scene.pose import Site, site_of
 from lightpaint.scene.scene_tree import ParsedScene
 from lightpaint.validation import MAX_NAME
 
@@ -43,7 +44,7 @@ class Emitter:
     "" if it can. unit_flux: watts per channel at an emission of 1; None if there is no such number.
     has_name: True if its author named it; False if the name is generated. belongs_to: for one
     without a name, that of its material, file or parent; "" if there is none. digest: hashes of
-    what its light depends on, beside the scene; None for one in no file.
+    what its light depends on, beside the scene; None for one in no file. site: its place.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Emitter:
     has_name: bool = True
     belongs_to: str = ""
     digest: EmitterDigest | None = None
+    site: Site = field(default_factory=Site)
 
     def __repr__(self) -> str:
         return f"Emitter({self.name!r}, {self.plugin} {self.form})"
@@ -90,6 +92,7 @@ def point_emitter(name: str, node: int, position: tuple[float, float, float]) ->
         file=0,
         offset=-1,
         unit_flux=point_flux(),
+        site=Site(position),
     )
 
 
@@ -128,6 +131,7 @@ def find_emitters(parsed: ParsedScene, loaded: Any, hasher: SceneHasher) -> tupl
                 has_name=has_name(parsed, node_of[name]),
                 belongs_to=belongs_to(parsed, node_of[name]),
                 digest=hasher.emitter(node_of[name], kind),
+                site=site_of(emitter, plugin, parsed.shape_plugin(node_of[name])),
             )
         )
     return tuple(sorted(emitters, key=lambda emitter: emitter.node))

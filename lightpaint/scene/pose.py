@@ -1,0 +1,296 @@
+"""Place, direction and cone of a light, and how to change them.
+
+A move is rigid: the light goes to its new place, and turns by the smallest rotation that makes it
+point at its target, so that a texture in its beam keeps its roll.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats, Position
+from lightpaint.errors import SceneError
+from lightpaint.keywords import keywords
+from lightpaint.scene.checks.tokens import tag
+from lightpaint.scene.emission import ENVIRONMENTS
+
+#: Mitsuba's default cutoff angle of a spot, in degrees, and the share of it that its beam is wide.
+DEFAULT_CUTOFF, DEFAULT_BEAM_SHARE = 20.0, 0.75
+
+#: Most extreme coordinate of a place, in units of the scene.
+FARTHEST = 1e7
+
+
+@keywords()
+@dataclass(frozen=True)
+class Pose:
+    """A change of a light's place, direction and cone; None leaves one as it is.
+
+    Attributes:
+        position: Where it hangs, in units of the scene; of an area light the middle of its shape.
+        target: A point that it points at. A light at infinity shines along the way from the origin
+            to there.
+        cutoff: Degrees from the axis of a spot to where its cone ends.
+        beam: Degrees from the axis to where its light begins to fall off, at most `cutoff`.
+
+    Raises:
+        SceneError: For values that no light can have.
+
+    Examples:
+        >>> lp.Pose(position=(0, 2.5, 1), target=(0, 0, 0))
+        Pose(position=(0.0, 2.5, 1.0), target=(0.0, 0.0, 0.0))
+    """
+
+    position: Position | None = None
+    target: Position | None = None
+    cutoff: float | None = None
+    beam: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("position", "target"):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, _point(name, value))
+        for name in ("cutoff", "beam"):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, _angle(name, value))
+        if self.position is not None and self.position == self.target:
+            raise SceneError(f"position and target are both {self.position}: give it another")
+        if self.cutoff is not None and self.beam is not None and self.beam > self.cutoff:
+            raise SceneError(
+                f"beam is {self.beam:g} and cutoff {self.cutoff:g}: the beam is at most as wide"
+            )
+
+    def __repr__(self) -> str:
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        listed = (f"{name}={value!r}" for name, value in given.items() if value is not None)
+        return f"Pose({', '.join(listed)})"
+
+
+@dataclass(frozen=True)
+class Site:
+    """The place of an emitter in a loaded scene.
+
+    position: None for what is infinitely far away. direction: unit vector that it points along;
+    None for what has none. cutoff, beam: degrees from its axis; None for all but spots.
+    """
+
+    position: Position | None = None
+    direction: Position | None = None
+    cutoff: float | None = None
+    beam: float | None = None
+
+
+#: Plugins that point somewhere by themselves, and shapes that do if they shine.
+_AIMED, _AIMED_SHAPES = ("spot", "directional", "projector"), ("rectangle", "disk")
+
+
+def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
+    """Return the site of a loaded emitter. shape_plugin: of the shape that it belongs to, or ""."""
+    import mitsuba as mi
+
+    if plugin in ENVIRONMENTS:
+        return Site()
+    shape = emitter.get_shape()
+    if shape is not None:
+        middle = _three(shape.bbox().center())
+        if shape_plugin not in _AIMED_SHAPES:
+            return Site(middle)
+        # A normal is turned by the inverse transpose; what flips it is in the matrix.
+        return Site(middle, _unit(np.linalg.inv(_matrix(mi.traverse(shape)))[2, :3]))
+    parameters = mi.traverse(emitter)
+    if "position" in parameters:
+        return Site(_three(parameters["position"]))
+    if "to_world" not in parameters:
+        return Site()
+    matrix = _matrix(parameters)
+    direction = _unit(matrix[:3, 2]) if plugin in _AIMED else None
+    if plugin == "directional":
+        return Site(None, direction)
+    cutoff, beam = (
+        float(np.array(parameters[key]).ravel()[0]) if key in parameters else None
+        for key in ("cutoff_angle", "beam_width")
+    )
+    return Site(_three(matrix[:3, 3]), direction, cutoff, beam)
+
+
+def _matrix(parameters: Any) -> Doubles:
+    return np.array(parameters["to_world"].matrix, dtype=float).reshape(4, 4)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A pose that fits its light: the rigid motion that leads there, and the new cone.
+
+    matrix: (4, 4), maps points of the light as it is now to where they will be. site: the new one.
+    target: the point it points at, if one was asked for. changes_cone: whether the cone is another.
+    """
+
+    matrix: Doubles
+    site: Site
+    target: Position | None
+    changes_cone: bool
+
+
+def motion_of(name: str, plugin: str, site: Site, pose: Pose) -> Motion:
+    """Return the motion that gives the light `name` at `site` a pose.
+
+    Raises SceneError for what this light cannot do.
+    """
+    if site.position is None and site.direction is None:
+        raise SceneError(f"light {name!r} ({plugin}) has no place: it cannot be moved")
+    if pose.position is not None and site.position is None:
+        raise SceneError(
+            f"light {name!r} ({plugin}) is infinitely far away: turn it by a target, and leave out "
+            "the position"
+        )
+    changes_cone = pose.cutoff is not None or pose.beam is not None
+    if changes_cone and site.cutoff is None:
+        raise SceneError(f"light {name!r} ({plugin}) has no cone: leave out cutoff and beam")
+    if pose.target is not None and site.direction is None:
+        raise SceneError(f"light {name!r} ({plugin}) points nowhere: leave out the target")
+    position = site.position if pose.position is None else pose.position
+    direction, turn = site.direction, np.eye(3)
+    if pose.target is not None:
+        assert direction is not None
+        way = np.array(pose.target) - np.array(position or (0.0, 0.0, 0.0))
+        if not np.linalg.norm(way) > 0:
+            raise SceneError(f"light {name!r} cannot point at its own place, {pose.target}")
+        turn = rotation_between(direction, way)
+        direction = _unit(way)
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn
+    if site.position is not None and position is not None:
+        matrix[:3, 3] = np.array(position) - turn @ np.array(site.position)
+    cutoff, beam = _cone(name, site, pose)
+    return Motion(matrix, Site(position, direction, cutoff, beam), pose.target, changes_cone)
+
+
+def _cone(name: str, site: Site, pose: Pose) -> tuple[float | None, float | None]:
+    """Return cutoff and beam with this pose; a beam that is not given keeps its share."""
+    if site.cutoff is None or (pose.cutoff is None and pose.beam is None):
+        return site.cutoff, site.beam
+    share = site.cutoff * DEFAULT_BEAM_SHARE if site.beam is None else site.beam
+    cutoff = site.cutoff if pose.cutoff is None else pose.cutoff
+    beam = share * cutoff / site.cutoff if pose.beam is None else pose.beam
+    if beam > cutoff:
+        raise SceneError(
+            f"light {name!r} has a cutoff of {cutoff:g} degrees, and a beam of {beam:g} is wider: "
+            "give both"
+        )
+    return cutoff, beam
+
+
+@dataclass(frozen=True)
+class MovedParameter:
+    """A parameter of an element that a motion changes: its value for Mitsuba, and its XML."""
+
+    name: str
+    value: Any
+    xml: str
+
+
+def moved_parameters(props: Any, motion: Motion) -> list[MovedParameter]:
+    """Return what `motion` changes of an element, the same in memory and in a file.
+
+    props: Mitsuba's properties of the emitter, or of the shape it belongs to.
+    """
+    moved, site = [], motion.site
+    if "position" in props and "to_world" not in props:
+        moved.append(_vector("point", "position", site.position))
+    elif "direction" in props:
+        moved.append(_vector("vector", "direction", site.direction))
+    elif not np.array_equal(motion.matrix, np.eye(4)):
+        old = np.eye(4) if "to_world" not in props else _matrix(props)
+        is_spot = props.plugin_name() == "spot"
+        moved.append(_transform(motion.matrix @ old, is_spot=is_spot, target=motion.target))
+    if motion.changes_cone:
+        for name, angle in (("cutoff_angle", site.cutoff), ("beam_width", site.beam)):
+            assert angle is not None
+            text = f"{angle:.9g}"
+            moved.append(MovedParameter(name, float(text), tag("float", name=name, value=text)))
+    return moved
+
+
+def _vector(element: str, name: str, value: Position | None) -> MovedParameter:
+    import mitsuba as mi
+
+    x, y, z = _texts(np.array(value, dtype=float))
+    numbers = mi.ScalarVector3d(float(x), float(y), float(z))
+    return MovedParameter(name, numbers, tag(element, name=name, x=x, y=y, z=z))
+
+
+def _transform(matrix: Doubles, *, is_spot: bool, target: Position | None) -> MovedParameter:
+    """Return a transform as people write it, or its matrix if it does more than hang and turn."""
+    import mitsuba as mi
+
+    left, up, ahead, origin = matrix[:3].T
+    squares = matrix[:3, :3].T @ matrix[:3, :3]
+    is_rigid = np.allclose(squares, np.eye(3), atol=1e-6) and np.cross(up, ahead) @ left > 0
+    if is_spot and is_rigid:
+        seen = origin + ahead if target is None else np.array(target)
+        texts = {key: _texts(v) for key, v in (("origin", origin), ("target", seen), ("up", up))}
+        value = mi.ScalarAffineTransform4d().look_at(
+            **{key: [float(v) for v in listed] for key, listed in texts.items()}
+        )
+        text = tag("lookat", **{key: ", ".join(listed) for key, listed in texts.items()})
+    else:
+        listed = _texts(matrix.ravel())
+        value = mi.ScalarAffineTransform4d(np.array([float(v) for v in listed]).reshape(4, 4))
+        text = tag("matrix", value=" ".join(listed))
+    element = f'<transform name="to_world">{text}</transform>'
+    return MovedParameter("to_world", value, element)
+
+
+def _texts(values: Doubles) -> list[str]:
+    """Return numbers as text, without what is only rounding."""
+    least = 1e-9 * float(np.abs(values).max(initial=1e-300))
+    return [f"{v if abs(v) > least else 0.0:.9g}" for v in values]
+
+
+def rotation_between(old: Sequence[float], new: Sequence[float] | Doubles) -> Doubles:
+    """Return the smallest rotation, (3, 3), that turns the direction `old` into `new`."""
+    a, b = np.array(_unit(old)), np.array(_unit(new))
+    cosine = float(a @ b)
+    if cosine < -1 + 1e-12:
+        # Half a turn about any axis across it.
+        across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        across /= np.linalg.norm(across)
+        return np.asarray(2 * np.outer(across, across) - np.eye(3))
+    v = np.cross(a, b)
+    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + cosine))
+
+
+def _point(name: str, value: Any) -> Position:
+    try:
+        x, y, z = (float(v) for v in value)
+    except (TypeError, ValueError):
+        raise SceneError(f"{name} is {value!r}: expected three numbers, x, y and z") from None
+    if not max(abs(x), abs(y), abs(z)) <= FARTHEST:
+        raise SceneError(f"{name} is {(x, y, z)}: expected numbers of at most {FARTHEST:g}")
+    return x, y, z
+
+
+def _angle(name: str, value: Any) -> float:
+    try:
+        angle = float(value)
+    except (TypeError, ValueError):
+        angle = math.nan
+    if not 0 < angle < 90:
+        raise SceneError(f"{name} is {value!r}: expected degrees between 0 and 90")
+    return angle
+
+
+def _three(values: Any) -> Position:
+    """Return three numbers without the noise of single precision."""
+    x, y, z = (float(f"{v:.7g}") for v in np.array(values, dtype=float).ravel()[:3])
+    return x, y, z
+
+
+def _unit(vector: Sequence[float] | Floats) -> Position:
+    values = np.asarray(vector, dtype=float)
+    x, y, z = (values / np.linalg.norm(values)).tolist()
+    return x, y, z
