@@ -13,8 +13,14 @@ in 8 bits. Styles: `spot`, only the strongest part of the strongest region; `blo
 `all`, whatever changes clearly; `full`, the whole picture. Judged is the whole picture, painted or
 not: mean CIEDE2000 between the answer and what was meant, at the exposure of the painting.
 
-The last rows are of bases of few samples, as the painter has at first: painted over the denoised
-look of that basis, judged by the one of many.
+Harm is how much worse than a lighting with nothing painted a case is at most. `now` is the present
+lighting; `unpainted` is what the same settings give with nothing painted. Only whites differ in it:
+somebody who asks for white lamps, of lamps that are none, has to lose their colours whatever he
+paints, and the line `nothing, white` shows what that alone costs.
+
+The next rows are of bases of few samples, as the painter has at first: painted over the denoised
+look of that basis, judged by the one of many. The last of each table is of the same planes as a
+file of light groups, which says nothing of noise, emitters in view, or the lamps' emission.
 
 With --loosen only those cases count in which the hold keeps the lights from the paint, and what is
 judged is how far it should be loosened: until it brings so much of what no hold would.
@@ -28,12 +34,14 @@ Constants in lightpaint were chosen on cases 0 to 11; docs/benchmarks.md reports
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import OpenEXR
 from scipy.ndimage import gaussian_filter, label
 
 import lightpaint as lp
@@ -43,6 +51,8 @@ from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.analysis.appearance import limiting_reasons
+from lightpaint.lighting.live.live import LiveSolver
+from lightpaint.lighting.live.live_view import LiveView
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SIZES = {"gallery": "160x90", "stage": "160x90", "cornell": "64x64"}
@@ -61,8 +71,13 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "display, hold": {"colors": "free"},
     "linear, hold, gentle": {"space": "linear"},
     "white": {"colors": "white"},
+    "hold 1": {"hold": 1.0},
     "default": {},
 }
+
+
+#: ΔE of each case, by style.
+Errors = dict[str, list[float]]
 
 
 @dataclass(frozen=True)
@@ -118,8 +133,6 @@ def main() -> None:
         basis = obtain_basis(scene, spp=SPP)
         print(f"\n{name} {SIZES[name]}, {SPP} spp, cases {options.first} to ", end="")
         print(f"{options.first + options.cases - 1}: mean and worst ΔE")
-        shown = "".join(f"{style:>14s}" for style in options.styles)
-        print(f"{'':22s}{shown}{'mean':>8s}{'harm':>7s}{'s':>6s}")
         cases = {
             style: [
                 painted(
@@ -132,32 +145,43 @@ def main() -> None:
             ]
             for style in options.styles
         }
-        nothing = {style: [x.judged(x.current) for x in its] for style, its in cases.items()}
-        row("doing nothing", nothing, nothing)
+        head(cases)
+        nothing = judged_alike(cases, basis.mix(basis.present_weights))
+        row("doing nothing", nothing, nothing, nothing)
         for setting in options.settings:
+            own = judged_alike(cases, basis.mix(unpainted(basis, SETTINGS[setting])))
+            if own != nothing:
+                row(f"nothing, {setting}", own, nothing, own)
             start_s = time.perf_counter()
             found = {
                 style: [x.judged(answer(basis, x, SETTINGS[setting])) for x in its]
                 for style, its in cases.items()
             }
             taken_s = time.perf_counter() - start_s
-            row(setting, found, nothing, taken_s / (options.cases * len(cases)))
+            row(setting, found, nothing, own, taken_s / (options.cases * len(cases)))
         for spp in options.few:
             few = obtain_basis(scene, spp=spp, seed=1, use_cache=False)
             found = {
                 style: [x.judged(basis.mix(weights(few, x.over(few), {}))) for x in its]
                 for style, its in cases.items()
             }
-            row(f"default, {spp} spp", found, nothing)
-        lamps = [over_lamp(basis, np.random.default_rng([99, k])) for k in range(options.cases)]
-        lamps = [x for x in lamps if x is not None]
-        if lamps:
-            print(f"{'':22s}{'lamps':>14s}{'mean':>8s}{'harm':>7s}")
-            none = {"lamps": [x.judged(x.current) for x in lamps]}
-            row("doing nothing", none, none)
+            row(f"default, {spp} spp", found, nothing, nothing)
+        groups = as_light_groups(basis)
+        found = {
+            style: [x.judged(answer(groups, x, {})) for x in its] for style, its in cases.items()
+        }
+        row("default, light groups", found, nothing, nothing)
+        numbers = range(options.first, options.first + options.cases)
+        lamps = [over_lamp(basis, np.random.default_rng([99, k])) for k in numbers]
+        lamps = {"lamps": [x for x in lamps if x is not None]}
+        if lamps["lamps"]:
+            head(lamps)
+            none = judged_alike(lamps, basis.present_look)
+            row("doing nothing", none, none, none)
             for setting in options.settings:
-                found = {"lamps": [x.judged(answer(basis, x, SETTINGS[setting])) for x in lamps]}
-                row(setting, found, none)
+                own = judged_alike(lamps, basis.mix(unpainted(basis, SETTINGS[setting])))
+                its = [x.judged(answer(basis, x, SETTINGS[setting])) for x in lamps["lamps"]]
+                row(setting, {"lamps": its}, none, own)
 
 
 def loosened(name: str, options: argparse.Namespace) -> None:
@@ -175,8 +199,9 @@ def loosened(name: str, options: argparse.Namespace) -> None:
             holds = [solution.problem.fit.hold]
             for share in SHARES:
                 limiting_reasons.LOOSENED_SHARE = share
-                hold = next(x for x in limiting_reasons.reasons_of(solution) if x.kind == "hold")
-                holds.append(hold.loosening.hold if hold.loosening else holds[0])
+                reasons = limiting_reasons.reasons_of(solution)
+                weaker = [x.loosening.hold for x in reasons if x.loosening is not None]
+                holds.append(weaker[0] if weaker else holds[0])
             answers = [answer(basis, case, {"hold": hold}) for hold in [*holds, 0.0]]
             found.append([case.judged(x) for x in (case.current, *answers)])
     names = ("doing nothing", "held", *(f"{100 * share:.0f} %" for share in SHARES), "let go")
@@ -184,18 +209,52 @@ def loosened(name: str, options: argparse.Namespace) -> None:
     print(f"{name}, {len(found)} cases: " + ", ".join(f"{n} {x:.2f}" for n, x in told), flush=True)
 
 
-def row(
-    name: str, errors: dict[str, list[float]], nothing: dict[str, list[float]], taken_s: float = 0
-) -> None:
-    """One line: by style, their mean, and how much worse than doing nothing a case is at most."""
+def head(styles: Collection[str]) -> None:
+    """Print the heads of the columns of `row`."""
+    shown = "".join(f"{style:>14s}" for style in styles)
+    print(f"{'':22s}{shown}{'mean':>8s}   harm: now unpainted{'s':>6s}")
+
+
+def row(name: str, errors: Errors, now: Errors, own: Errors, taken_s: float = 0) -> None:
+    """Print a line: errors by style, their mean, and how much worse than either lighting with
+    nothing painted a case is at most.
+    """
     columns = "".join(f"{np.mean(x):8.2f} {max(x):5.1f}" for x in errors.values())
     mean = np.mean([np.mean(x) for x in errors.values()])
-    harm = max(
-        a - b
-        for x, y in zip(errors.values(), nothing.values(), strict=True)
-        for a, b in zip(x, y, strict=True)
-    )
-    print(f"{name:22s}{columns}{mean:8.2f}{harm:7.1f}{taken_s:6.2f}", flush=True)
+    harm = (max(np.max(np.subtract(errors[x], its[x])) for x in errors) for its in (now, own))
+    told = "".join(f"{x:10.2f}" for x in harm)
+    print(f"{name:22s}{columns}{mean:8.2f}  {told}{taken_s:6.2f}", flush=True)
+
+
+def judged_alike(cases: Mapping[str, Sequence[Case]], image: np.ndarray) -> Errors:
+    """Judge one picture (h, w, 3) in all cases."""
+    return {style: [x.judged(image) for x in its] for style, its in cases.items()}
+
+
+def unpainted(basis: lp.Basis, settings: dict[str, Any]) -> np.ndarray:
+    """Return the weights (n, 3) that the painter shows with these settings and nothing painted."""
+    view = LiveView(basis, np.zeros_like(basis.present_look), np.zeros(basis.size, np.float32))
+    solver = LiveSolver([view], fit=lp.Fit(**settings), constraints=lp.Constraints())
+    return solver.answer(basis.present_weights)
+
+
+def as_light_groups(basis: lp.Basis) -> lp.Basis:
+    """Return the lights' present pictures as another renderer's light groups would give them."""
+    channels = {
+        f"Light_{name}.{c}": np.ascontiguousarray(image[..., k])
+        for name, image in zip(basis.names, present_pictures(basis), strict=True)
+        for k, c in enumerate("RGB")
+    }
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "groups.exr"
+        OpenEXR.File(header, channels).write(str(path))
+        return lp.read_light_groups(path, pattern="Light_{name}").basis
+
+
+def present_pictures(basis: lp.Basis) -> np.ndarray:
+    """Return the picture of each light in the present lighting, (n, h, w, 3) float32."""
+    return (basis.images * basis.present_weights[:, None, None]).astype(np.float32)
 
 
 def answer(basis: lp.Basis, case: Case, settings: dict[str, Any]) -> np.ndarray:
@@ -206,7 +265,7 @@ def answer(basis: lp.Basis, case: Case, settings: dict[str, Any]) -> np.ndarray:
 def weights(basis: lp.Basis, case: Case, settings: dict[str, Any]) -> np.ndarray:
     """The same as weights of the lights, (n, 3)."""
     solution = lp.solve(basis, case.target, **settings)
-    if not settings.get("literal"):
+    if basis.knows_noise and not settings.get("literal"):
         solution = lp.correct_noise(solution)
     return solution.weights
 
@@ -252,13 +311,7 @@ def painted(
 def over_lamp(basis: lp.Basis, rng: np.random.Generator) -> Case | None:
     """A stroke over a lamp in view and what is around it; None where no lamp is in view."""
     current, seen = basis.present_look, basis.emitters_seen
-    lit = np.array(
-        [
-            luminance(x) * luminance(np.array(its))
-            for x, its in zip(basis.images, basis.present_weights, strict=True)
-        ]
-    )
-    whose = np.argmax(lit, axis=0)
+    whose = np.argmax(luminance(present_pictures(basis)), axis=0)
     lamps = [k for k in np.unique(whose[seen]) if not basis.is_fixed[k]]
     if not lamps:
         return None

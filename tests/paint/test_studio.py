@@ -551,7 +551,7 @@ def test_letting_go_gradually_is_judged_on_the_whole_picture(heard: IncomingMess
     share = round(100 * advised["closes"])
     told = re.match(r"Removes (\d+) % of the difference", found.fields["text"])
     assert told is not None
-    assert int(told[1]) == pytest.approx(share, abs=3)  # of enough pixels, not of all
+    assert int(told[1]) == share
     changed = []
     for hold in (advised["hold"], 0.0):
         heard.studio.handle(protocol.Set({"hold": hold}), {})

@@ -124,21 +124,18 @@ class SessionSnapshot:
             view_solution.problem.views.targets[0],
         )
         pictures = [self.bases[judged_view].mix(x) for x in (weights, after)]
-        lights = [look.pixels(picture) for picture in pictures]
-        cost_now, cost_then = (look.mean(look.fit_errors(light)) for light in lights)
-        closes = 1 - cost_then / cost_now if cost_now > 0 else 0.0
+        closes = look.share_removed(*pictures)
         elsewhere = unpainted_change(
             look, self.bases[judged_view], target.importance > 0, *pictures
         )
-        misses = look.mean(look.difference(lights[0])), look.mean(look.difference(lights[1]))
-        gained = misses[0] - misses[1]
+        now, then = (look.mean(look.difference(look.pixels(picture))) for picture in pictures)
         is_at_cost = (
-            elsewhere is not None and elsewhere.worst > NOTICED and elsewhere.delta_e > gained
+            elsewhere is not None and elsewhere.worst > NOTICED and elsewhere.delta_e > now - then
         )
         return ChangePreview(
             before,
             afterwards,
-            *preview_text(closes, elsewhere, delta_e=misses, is_at_cost=is_at_cost),
+            *preview_text(closes, elsewhere, delta_e=(now, then), is_at_cost=is_at_cost),
         )
 
 

@@ -87,6 +87,15 @@ class PaintComparison:
         missed = self.compare(self.goal(pixels)) - self.compare(pixels)
         return np.asarray(np.square(missed).sum(axis=-1))
 
+    def share_removed(self, before: Floats, after: Floats) -> float:
+        """Return the share of the error of a whole picture that another does not have.
+
+        before, after: (H, W, 3) linear. Errors are those of the fit, with importance. Negative if
+        the error grows; 0 without an error before.
+        """
+        now, then = (self.mean(self.fit_errors(self.pixels(x))) for x in (before, after))
+        return 1 - then / now if now > 0 else 0.0
+
     def compare(self, pixels: Doubles) -> Doubles:
         """Return V of light (p, 3): the values that the fit compares."""
         encoded = pixels if self.compared is None else self.compared.encode(pixels)

@@ -1,7 +1,8 @@
 """Reasons that keep the lights from what was painted, and what each of them costs.
 
 All shares are of the answer's error over the paint, Σ D ‖V(ψ) − V(x)‖², which the fit minimises
-there; each takes another solve, with a sample of the pixels.
+there; each takes another solve. A sample of the pixels finds reasons, and orders them. The share of
+the first reason, and of a weaker hold, is then measured with all pixels (released_answer.py).
 """
 
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
 )
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup, PixelSample
+from lightpaint.lighting.analysis.appearance.released_answer import released_weights
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
     UnpaintedChange,
     unpainted_change,
@@ -49,7 +51,7 @@ class Loosening:
 
     Attributes:
         hold: Its strength; 0 if no weaker one does.
-        share: The share of the error over the paint that it removes.
+        share: The share of the error over the paint that it removes, measured with all pixels.
         elsewhere: Its change of unpainted pixels, compared with the present answer.
     """
 
@@ -66,7 +68,8 @@ class Reason:
         kind: `hold`, `colors` or `views`; or the kind of a constraint.
         names: Of the lights under the constraint, or of the views; none otherwise.
         share: The share of the error over the paint that vanishes without this reason alone; for
-            joint reasons, without all of them.
+            joint reasons, without all of them. By a sample of the pixels, or of all pixels for the
+            first reason that is no hold.
         is_joint: Whether it is one of several whose release only helps together.
         loosening: For a hold, a weaker one that helps.
     """
@@ -113,12 +116,40 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     found = _sort_reasons([reason for reason in found if reason.share >= MIN_SHARE])
     if (not found or found[0].share < SINGLE_SHARE * everything) and len(sample.groups) > 1:
         return _joint_reasons(sample, everything)
-    return tuple(
-        replace(reason, loosening=_find_loosening(solution, sample, reason.share))
-        if reason.kind == "hold"
-        else reason
-        for reason in found
-    )
+    measured = [
+        x if k and x.kind != "hold" else _measure(solution, sample, x) for k, x in enumerate(found)
+    ]
+    return tuple(x for x in measured if x is not None)
+
+
+def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason | None:
+    """Measure the effect of removing a reason, of a hold that of a weaker one, with all pixels.
+
+    Return None if it is too small.
+    """
+    problem = sample.problem
+    if reason.kind == "views":
+        return reason
+    if reason.kind == "hold":
+        if problem.fit.unpainted or not problem.fit.hold:
+            return reason  # unpainted pixels have a weight of their own
+        loosening = _find_loosening(solution, sample, reason.share)
+        return None if loosening.share < MIN_SHARE else replace(reason, loosening=loosening)
+    if reason.kind == "colors":
+        weights = released_weights(solution, fit=replace(problem.fit, colors="free"))
+    else:
+        names = [light.name for light in sample.by_light.lights]
+        its = [names.index(name) for name in reason.names]
+        released = sample.by_light.without(reason.kind, its)
+        weights = released_weights(solution, constraints=released)
+    share = _share_removed(solution, weights)
+    return None if share < MIN_SHARE else replace(reason, share=share)
+
+
+def _share_removed(solution: Solution, weights: Doubles) -> float:
+    """Return the share of the error of `solution` that other weights (n, 3) remove."""
+    look = PaintComparison.of_problem(solution.problem)
+    return look.share_removed(*(solution.basis.mix(x) for x in (solution.weights, weights)))
 
 
 def _sort_reasons(reasons: Sequence[Reason]) -> list[Reason]:
@@ -179,40 +210,40 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
     return tuple(found)
 
 
-def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -> Loosening | None:
-    """Find the strongest hold with `LOOSENED_SHARE` of `full_gain`, the gain without a hold.
-
-    Return None if unpainted pixels have a weight of their own.
+def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -> Loosening:
+    """Find the strongest hold with `LOOSENED_SHARE` of `full_gain`, the gain without a hold, and
+    measure what it does.
     """
-    fit = sample.problem.fit
-    if fit.unpainted or not fit.hold:
-        return None
+    hold = _weaker_hold(sample, LOOSENED_SHARE * full_gain)
+    weights = released_weights(solution, fit=replace(sample.problem.fit, hold=hold))
+    [target] = solution.problem.views.targets
+    basis = solution.basis
+    before, after = basis.mix(solution.weights), basis.mix(weights)
+    look = PaintComparison.of_problem(solution.problem)
+    changed = unpainted_change(look, basis, target.importance > 0, before, after)
+    return Loosening(hold, look.share_removed(before, after), changed)
 
-    def brought(hold: float) -> tuple[float, Doubles]:
-        weights = sample.solve((), sample.others, hold=hold)
-        return sample.share_of(weights), weights
+
+def _weaker_hold(sample: PixelSample, gain: float) -> float:
+    """Return the strongest hold that removes a share `gain` of the error; 0 if no hold does."""
+    hold = float(sample.problem.fit.hold or 0.0)
+
+    def is_enough(hold: float) -> bool:
+        return sample.share_of(sample.solve((), sample.others, hold=hold)) >= gain
 
     # Bisection of logarithms between a hold with too little gain and one with enough.
-    little, enough = float(fit.hold), float(fit.hold) * NO_HOLD
-    share, weights = brought(enough)
-    if share < LOOSENED_SHARE * full_gain:
-        enough = 0.0
-        share, weights = brought(enough)
-    for _ in range(HOLD_STEPS if enough else 0):
+    little, enough = hold, hold * NO_HOLD
+    if not is_enough(enough):
+        return 0.0
+    for _ in range(HOLD_STEPS):
         between = round_down(float(np.sqrt(little * enough)))
         if not enough < between < little:
             break
-        its, found = brought(between)
-        if its >= LOOSENED_SHARE * full_gain:
-            enough, share, weights = between, its, found
+        if is_enough(between):
+            enough = between
         else:
             little = between
-    [target] = solution.problem.views.targets
-    basis = solution.basis
-    before, after = basis.predict(solution.weights).image, basis.mix(weights)
-    look = PaintComparison.of_problem(solution.problem)
-    changed = unpainted_change(look, basis, target.importance > 0, before, after)
-    return Loosening(enough, share, changed)
+    return enough
 
 
 def round_down(value: float) -> float:

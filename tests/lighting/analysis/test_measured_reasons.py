@@ -1,0 +1,76 @@
+"""What a person is told a reason costs is what he gains by removing it."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.lighting.analysis.appearance.appearance import what_is_seen
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solve
+from lightpaint.target.target import Target
+
+SIZE = (90, 150)
+
+
+@pytest.fixture
+def studio(make_basis: Any) -> tuple[Any, Target]:
+    """Three lamps on a rough wall with grain, and paint that no sample of pixels stands for."""
+    rng = np.random.default_rng(3)
+    x = np.linspace(0, 1, SIZE[1])[None, :, None]
+    texture = rng.lognormal(0, 0.5, (*SIZE, 1))
+    images = np.stack([texture * np.exp(-np.square((x - at) / 0.3)) for at in (0.2, 0.5, 0.8)])
+    images = images.repeat(3, axis=-1)
+    grain = rng.normal(0, 0.15, (2, *images.shape)) * images
+    names = ["left", "middle", "right"]
+    basis = make_basis(
+        images=images + grain[0],
+        half_differences=grain[1],
+        names=names,
+        emission=[[0.1] * 3] * 3,
+    )
+    image, importance = basis.present_look.copy(), np.zeros(SIZE, np.float32)
+    importance[:, :60] = 1
+    image[:, :60] *= rng.lognormal(0.9, 0.2, (SIZE[0], 60, 1)) * [0.6, 1, 0.6]
+    target = Target.of(image.astype(np.float32), importance, name="painting")
+    return basis, replace(target, over_look=True, through_view=True, transform=ViewTransform())
+
+
+def _error(solution: Solution, target: Target) -> float:
+    """Return Σ D ‖V(ψ) − V(x)‖² over the paint, in all its pixels."""
+    encode, mixed = ViewTransform().encode, solution.basis.mix(solution.weights)
+    missed = encode(target.image.astype(np.float64)) - encode(mixed.astype(np.float64))
+    return float((target.importance[..., None] * np.square(missed)).sum())
+
+
+def test_a_weaker_hold_removes_the_share_that_is_said(studio: Any):
+    basis, target = studio
+    now = correct_noise(solve(basis, target, hold=30.0))
+    reason = next(x for x in what_is_seen(now).reasons if x.kind == "hold")
+    assert reason.loosening is not None
+    then = correct_noise(solve(basis, target, hold=reason.loosening.hold))
+    gained = 1 - _error(then, target) / _error(now, target)
+    assert gained > 0.1
+    assert reason.loosening.share == pytest.approx(gained, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["limits", "colors"])
+def test_the_first_reason_removes_the_share_that_is_said(studio: Any, kind: str):
+    basis, target = studio
+    limits = Constraints.of({"left": {"limits": {"max": 0.12}}})
+    held, free = {
+        "limits": ({"constraints": limits, "colors": "free"}, {"colors": "free"}),
+        "colors": ({"colors": "white"}, {"colors": "free"}),
+    }[kind]
+    now = correct_noise(solve(basis, target, hold=0.01, **held))
+    reason = what_is_seen(now).reasons[0]
+    assert reason.kind == kind
+    gained = 1 - _error(correct_noise(solve(basis, target, hold=0.01, **free)), target) / _error(
+        now, target
+    )
+    assert gained > 0.1
+    assert reason.share == pytest.approx(gained, abs=1e-9)
