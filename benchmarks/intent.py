@@ -193,7 +193,7 @@ def loosened(name: str, options: argparse.Namespace) -> None:
         for k in range(options.first, options.first + options.cases):
             case = painted(basis, style, np.random.default_rng([STYLES.index(style), k]))
             solution = lp.solve(basis, case.target)
-            seen = lp.what_is_seen(solution)
+            seen = lp.compare_appearance(solution)
             if not any(reason.kind == "hold" for reason in seen.causes):
                 continue
             holds = [solution.problem.fit.hold]

@@ -12,7 +12,7 @@ The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg,
     read_target                 painting → Target                    what is wanted, and where?
     solve                       Basis, Target → Solution             which lighting is closest?
     analyse                     Solution → Analysis of each view     how sure, and why not closer?
-    what_is_seen                Solution → Seen                      how close does it look?
+    compare_appearance          Solution → Appearance                how close does it look?
     combine                     Basis, Lighting → Estimate           what will it look like?
     relight                     Scene, Lighting → relit Scene        write it into the scene
     verify                      Estimate, relit Scene → Verification does it look like that?
@@ -47,8 +47,10 @@ if TYPE_CHECKING:
     from lightpaint.images.object_map import Objects as Objects
     from lightpaint.lighting.analysis.analysis import Analysis as Analysis
     from lightpaint.lighting.analysis.analysis import analyse as analyse
-    from lightpaint.lighting.analysis.appearance.appearance import Seen as Seen
-    from lightpaint.lighting.analysis.appearance.appearance import what_is_seen as what_is_seen
+    from lightpaint.lighting.analysis.appearance.appearance import Appearance as Appearance
+    from lightpaint.lighting.analysis.appearance.appearance import (
+        compare_appearance as compare_appearance,
+    )
     from lightpaint.lighting.analysis.diagnosis import Diagnosis as Diagnosis
     from lightpaint.lighting.analysis.diagnosis import diagnose as diagnose
     from lightpaint.lighting.analysis.noise.noise_correction import correct_noise as correct_noise
@@ -113,7 +115,7 @@ _HOMES = {
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
     "SceneFile": "pipeline.sources",
-    "Seen": "lighting.analysis.appearance.appearance",
+    "Appearance": "lighting.analysis.appearance.appearance",
     "Settings": "pipeline.settings",
     "Solution": "lighting.solution",
     "Suggestion": "placement.suggestion",
@@ -146,7 +148,7 @@ _HOMES = {
     "use_variant": "scene.runtime.variant",
     "verdict": "report.verdict",
     "verify": "relit.verification_render",
-    "what_is_seen": "lighting.analysis.appearance.appearance",
+    "compare_appearance": "lighting.analysis.appearance.appearance",
     "write_basis": "basis.basis_file",
     "write_demo": "demo",
     "write_exports": "relit.export.exports",

@@ -1,6 +1,7 @@
 """Docstrings say what a function does, and what a class, a property or a module is."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -77,3 +78,62 @@ def test_the_rule_finds_what_it_forbids(tmp_path: Path) -> None:
         encoding="utf-8",
     )
     assert faults(file) == [("f", "What"), ("g", "The"), ("p", "How")]
+
+
+#: Functions whose docstrings describe columns of a table that they return, and a class that has
+#: fields of another one.
+DESCRIBE_OTHERS = frozenset(["to_dataframe", "to_xarray", "Settings"])
+
+#: Words before a colon that describe no parameter, each in one place.
+NO_PARAMETERS = frozenset([("additions", "help"), ("threads", "unknown")])
+
+#: `name:` or `name, other:` at the beginning of a line or of a sentence.
+DESCRIBED = re.compile(r"(?:^|\. )\s*((?:\*{0,2}[a-z_]\w*, )*\*{0,2}[a-z_]\w*): ", re.MULTILINE)
+
+
+def described(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
+    """Return the names that a docstring describes as parameters or attributes."""
+    found = DESCRIBED.findall(ast.get_docstring(node) or "")
+    return {name.strip("*") for names in found for name in names.split(", ")}
+
+
+def names_in(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
+    """Return the parameters of a function, or all that a class defines."""
+    tree: ast.AST = node.args if isinstance(node, ast.FunctionDef) else node
+    names = set()
+    for part in ast.walk(tree):
+        match part:
+            case ast.arg(arg=name) | ast.FunctionDef(name=name) | ast.Attribute(attr=name):
+                names.add(name)
+            case ast.AnnAssign(target=ast.Name(id=name)):
+                names.add(name)
+    return names
+
+
+def stale_parameters(file: Path) -> list[tuple[str, str]]:
+    """Return functions and classes with parameters that only their docstrings have."""
+    nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+    return [
+        (node.name, name)
+        for node in nodes
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name not in DESCRIBE_OTHERS
+        for name in sorted(described(node) - names_in(node))
+        if not {(node.name, name), (file.stem, name)} & NO_PARAMETERS
+    ]
+
+
+def test_described_parameters_are_there() -> None:
+    """A parameter that was renamed keeps no description under its old name."""
+    by_file = {
+        str(file.relative_to(PACKAGE)): stale_parameters(file) for file in PACKAGE.rglob("*.py")
+    }
+    assert {name: stale for name, stale in by_file.items() if stale} == {}
+
+
+def test_a_stale_parameter_is_found(tmp_path: Path) -> None:
+    file = tmp_path / "bad.py"
+    file.write_text(
+        'def f(new, other):\n    """Add. old, other: two numbers. new: a third."""\n',
+        encoding="utf-8",
+    )
+    assert stale_parameters(file) == [("f", "old")]

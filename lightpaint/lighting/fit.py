@@ -37,8 +37,7 @@ class Fit:
     None is resolved by the way the target was painted. Over the current look: the fit holds the
     rest to it, and lamps keep their colour. Through a view of a display: lamps keep their colour,
     and the fit compares display values. A float EXR with a mask of its own and nothing under it is
-    fitted
-    literally: as light, each channel by itself.
+    fitted literally: as light, each channel by itself.
 
     Attributes:
         space: `linear`, or `display` to come closest in what a display shows.
@@ -127,8 +126,8 @@ def resolve_fit(
     """
     over_look = over_look and not fit.literal
     on_display = through_view and not fit.literal
-    is_seen = on_display or (fit.transform is not None and not fit.literal)
-    space: Space = fit.space or ("display" if is_seen else "linear")
+    is_displayed = on_display or (fit.transform is not None and not fit.literal)
+    space: Space = fit.space or ("display" if is_displayed else "linear")
     return replace(
         fit,
         space=space,
@@ -140,10 +139,10 @@ def resolve_fit(
 
 def _common_transform(targets: Sequence[Target]) -> ViewTransform:
     """Return the one view that all targets were painted through."""
-    seen = {target.transform for target in targets if target.transform is not None}
-    if len(seen) > 1:
-        names = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in seen))
+    transforms = {target.transform for target in targets if target.transform is not None}
+    if len(transforms) > 1:
+        names = " and ".join(sorted(f"{x.name} at {x.stops:+g} stops" for x in transforms))
         raise TargetError(
             f"the paintings were painted through {names}: choose one of them with transform=..."
         )
-    return next(iter(seen), None) or ViewTransform("srgb", choose_exposure(targets[0].image))
+    return next(iter(transforms), None) or ViewTransform("srgb", choose_exposure(targets[0].image))

@@ -75,8 +75,9 @@ class LinearProblem:
         raise NotImplementedError
 
     def remove_traces(self, weights: Doubles, is_constrained: Bools) -> Doubles:
-        """Return weights (n, 3) without those that round-off made. is_asked: (n,), lights to leave
-        alone. is_asked: (n,), whose are kept.
+        """Return weights (n, 3) without those that round-off made.
+
+        is_constrained: (n,), lights whose weights stay.
         """
         raise NotImplementedError
 

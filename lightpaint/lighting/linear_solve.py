@@ -37,34 +37,32 @@ class LinearAnswer(Generic[_Problem]):
 
 
 def solve_linear(problem: _Problem, start: Doubles) -> LinearAnswer[_Problem]:
-    """Solve the squares from weights (n, 3); with `sparse`, for the best lights in it. With
-    `sparse`, of the best lights in it.
-    """
+    """Solve the squares from weights (n, 3); with `sparse`, for the best lights alone."""
     count = problem.constraints.sparse
     if count is None or not problem.full.knobs:
         return solve_reduction(problem, start)
     equations, curve = problem.with_pull(problem.solved), []
     path = choose_knobs(reduced_problems(equations, problem.full), problem.full, count)
     for chosen in path:
-        _, found = solve_on_locus(equations, only_knobs(problem.full, chosen), start)
-        curve.append((len(chosen), found.weights))
+        _, optimum = solve_on_locus(equations, only_knobs(problem.full, chosen), start)
+        curve.append((len(chosen), optimum.weights))
     best = max((chosen for chosen in path if len(chosen) <= count), key=len)
     answer = solve_reduction(problem.with_reduction(only_knobs(problem.full, best)), start)
     # Chosen lights that come out dark are left out as well.
     on = [k for k, x in enumerate(problem.full.knobs) if answer.weights[list(x.lights)].any()]
-    left = answer.problem.with_reduction(only_knobs(answer.problem.full, on))
+    solved = answer.problem.with_reduction(only_knobs(answer.problem.full, on))
     norm = np.where(problem.norm2 > 0, problem.norm2, 1).sum()
-    told = [(n, float(np.sqrt(problem.objective(w).sum() / norm))) for n, w in curve]
+    errors = [(n, float(np.sqrt(problem.objective(w).sum() / norm))) for n, w in curve]
     certificate = answer.lighting.certificate
     assert certificate is not None
-    lighting = answer.lighting.with_certificate(replace(certificate, curve=tuple(told)))
-    return replace(answer, problem=left, lighting=lighting, tried=tuple(curve))
+    lighting = answer.lighting.with_certificate(replace(certificate, curve=tuple(errors)))
+    return replace(answer, problem=solved, lighting=lighting, tried=tuple(curve))
 
 
 def solve_reduction(
     problem: _Problem, start: Doubles, reached: Bools | None = None
 ) -> LinearAnswer[_Problem]:
-    """Solve the squares under the present reduction. reached: as of `make_answer`."""
+    """Solve the squares under the present reduction. reached: as in `make_answer`."""
     equations, method = problem.with_pull(problem.solved), problem.fit.method
     reduction, optimum = solve_on_locus(equations, problem.reduction, start, method=method)
     return make_answer(problem.with_whites(reduction), optimum, optimum.weights, equations, reached)
@@ -101,10 +99,10 @@ def make_answer(
         basis_spp=problem.spp,
     ).with_objective(problem.objective(weights), problem.norm2)
     labels_and_effects = _labels_and_effects(problem, equations, optimum.weights)
-    about: dict[str, Any] = {"target": problem.name, "certificate": certificate}
-    about["scene_identity"] = problem.scene_identity
+    fields: dict[str, Any] = {"target": problem.name, "certificate": certificate}
+    fields["scene_identity"] = problem.scene_identity
     lighting = Lighting.of_weights(
-        problem.lights, weights, labels=labels_and_effects, reached=reached, **about
+        problem.lights, weights, labels=labels_and_effects, reached=reached, **fields
     )
     return LinearAnswer(problem, lighting, weights)
 
@@ -116,8 +114,10 @@ def _labels_and_effects(
     labels = problem.reduction.labels
     if not any(labels):
         return [(label, False) for label in labels]
-    held = _has_effect(equations, problem.lights.is_scalar, weights)
-    return [(label, bool(label) and bool(h)) for label, h in zip(labels, held, strict=True)]
+    effects = _has_effect(equations, problem.lights.is_scalar, weights)
+    return [
+        (label, bool(label) and bool(effect)) for label, effect in zip(labels, effects, strict=True)
+    ]
 
 
 def _has_effect(equations: NormalEquations, scalar: Bools, weights: Doubles) -> Bools:

@@ -73,20 +73,20 @@ class NormalEquations:
 
     def gradient(self, w: Doubles) -> Doubles:
         """Return half the gradient of the objective, M w − b, (n, 3). w: (n, 3)."""
-        made = np.einsum("cij,jc->ic", self.M, w) - self.b.T
+        gradient = np.einsum("cij,jc->ic", self.M, w) - self.b.T
         if self.coupling is not None:
-            made += np.einsum("icd,id->ic", self.coupling, w)
-        return np.asarray(made)
+            gradient += np.einsum("icd,id->ic", self.coupling, w)
+        return np.asarray(gradient)
 
     @property
     def full_matrix(self) -> Doubles:
         """(3 n, 3 n), M for flat weights, channel by channel."""
         n = self.M.shape[1]
-        made = block_diagonal(self.M).reshape(3, n, 3, n)
+        matrix = block_diagonal(self.M).reshape(3, n, 3, n)
         if self.coupling is not None:
-            its = np.arange(n)
-            made[:, its, :, its] += self.coupling
-        return made.reshape(3 * n, 3 * n)
+            lights = np.arange(n)
+            matrix[:, lights, :, lights] += self.coupling
+        return matrix.reshape(3 * n, 3 * n)
 
     @classmethod
     def of(cls, basis: Basis, image: Floats, importance: Floats) -> "NormalEquations":

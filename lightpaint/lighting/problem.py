@@ -118,10 +118,9 @@ class Problem(LinearProblem):
         fit: Fit | None = None,
         resize: bool = False,
     ) -> "Problem":
-        """Make the problem of one view, or of several, with bases and targets in the same order. As
-        of `solve`.
+        """Make the problem of one view, or of several, with bases and targets in the same order.
 
-        What the bases' scene asks of its lights is heeded; `constraints` go before it.
+        Arguments are those of `solve`. `constraints` win over those of the scene's lights file.
         """
         bases = [basis] if isinstance(basis, Basis) else _bases(basis)
         targets = [target] if isinstance(target, Target) else _targets(target)
@@ -134,16 +133,21 @@ class Problem(LinearProblem):
         fit = fit or Fit()
         fitted = [
             resolve_importance(
-                its.fitted_to(one.size, resize=resize), one.emitters_seen, fit.emitters
+                target_of_view.fitted_to(view_basis.size, resize=resize),
+                view_basis.emitters_seen,
+                fit.emitters,
             )
-            for its, one in zip(targets, parts, strict=True)
+            for target_of_view, view_basis in zip(targets, parts, strict=True)
         ]
         fit = resolve_for_targets(fit, fitted)
-        read = [resolve_emitter_paint(x, one, fit) for x, one in zip(fitted, parts, strict=True)]
-        views = Views(parts, tuple(read))
-        word = joint_squares(views, unpainted=unpainted_weight_of(views, fit))
+        resolved = [
+            resolve_emitter_paint(x, view_basis, fit)
+            for x, view_basis in zip(fitted, parts, strict=True)
+        ]
+        views = Views(parts, tuple(resolved))
+        squares = joint_squares(views, unpainted=unpainted_weight_of(views, fit))
         loss = choose_loss(
-            word,
+            squares,
             at_least_mask(views),
             fit.transform,
             painted=lambda: target_light(views),
@@ -154,8 +158,8 @@ class Problem(LinearProblem):
             basis=whole,
             views=views,
             loss=loss,
-            squares=word,
-            equations=NormalEquations.of(whole, word.image, word.weight),
+            squares=squares,
+            equations=NormalEquations.of(whole, squares.image, squares.weight),
             constraints=all_constraints,
             reduction=reduction,
             full=reduction,
@@ -194,8 +198,9 @@ class Problem(LinearProblem):
         return self.loss.transform
 
     def remove_traces(self, weights: Doubles, is_constrained: Bools) -> Doubles:
-        """Return weights (n, 3) with 0 for those that show in no pixel. is_asked: (n,), lights to
-        leave alone. is_asked: (n,), whose are kept.
+        """Return weights (n, 3) with 0 for those that show in no pixel.
+
+        is_constrained: (n,), lights whose weights stay.
         """
         return remove_traces(self.basis, weights, self.squares.image, is_constrained=is_constrained)
 
@@ -222,8 +227,8 @@ class Problem(LinearProblem):
     @cached_property
     def painted_share(self) -> float:
         """The total importance, relative to the number of pixels."""
-        painted = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
-        return painted / sum(x.importance.size for x in self.views.targets)
+        total = sum(float(x.importance.sum(dtype=np.float64)) for x in self.views.targets)
+        return total / sum(x.importance.size for x in self.views.targets)
 
     @property
     def norm2(self) -> Doubles:
@@ -261,11 +266,11 @@ def gamuts_for(basis: Basis, views: Views, fit: Fit) -> Gamuts | None:
     """Return the colours that each light may take; None if `fit` does not limit them."""
     if fit.colors != "gentle":
         return None
-    its = [
-        (one, target.image, _color_importance(target))
-        for one, target in zip(views.bases, views.targets, strict=True)
+    views_of_paint = [
+        (view_basis, target.image, _color_importance(target))
+        for view_basis, target in zip(views.bases, views.targets, strict=True)
     ]
-    return Gamuts(partial(PaintedLight.of, its), basis.power, basis.present_weights)
+    return Gamuts(partial(PaintedLight.of, views_of_paint), basis.power, basis.present_weights)
 
 
 def _color_importance(target: Target) -> Floats:

@@ -56,16 +56,21 @@ def sum_rows(basis: Basis, target: Target, rows: slice, fit: Fit) -> Sums:
 
 
 def row_importance(target: Target, seen: Bools, rows: slice, fit: Fit) -> Floats:
-    """Return the weight of each pixel of some rows. seen: (rows, w), where an emitter is visible.
-    seen: (rows, w), where an emitter is seen.
+    """Return the weight of each pixel of some rows.
+
+    seen: (rows, w), where an emitter is visible.
     """
-    its = target.importance[rows]
-    if not its.any():  # a target would refuse that
-        return its
+    importance = target.importance[rows]
+    if not importance.any():  # a target would refuse that
+        return importance
     part = Target(
-        target.name, target.image[rows], its, everything=target.everything, files=target.files
+        target.name,
+        target.image[rows],
+        importance,
+        everything=target.everything,
+        files=target.files,
     )
-    return np.where(ignored_paint(part, seen, fit.emitters), np.float32(0), its)
+    return np.where(ignored_paint(part, seen, fit.emitters), np.float32(0), importance)
 
 
 def summed_problem(

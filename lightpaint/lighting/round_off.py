@@ -25,7 +25,7 @@ def remove_traces(
 ) -> Doubles:
     """Return weights (n, 3) with 0 for those that show in no pixel.
 
-    is_asked: (n,), lights with constraints, whose weights stay.
+    is_constrained: (n,), lights with constraints, whose weights stay.
 
     A weight is a trace if it is small, and its light in each pixel is below the round-off of the
     other lights there, or of the picture's mean where there are none. Round-off is that of the
@@ -42,12 +42,12 @@ def remove_traces(
     resolution = ROUNDINGS * (HALF_ROUND_OFF if is_half else SINGLE_ROUND_OFF)
     mixed = basis.mix(weights)
     size = np.sqrt(np.square(mixed, dtype=np.float64).mean())
-    kept = weights.copy()
+    cleaned = weights.copy()
     for k, c in np.argwhere(small):
         added = weights[k, c] * basis.planes.plane(k)[..., c]
         if (np.abs(added) <= resolution * (np.abs(mixed[..., c] - added) + size)).all():
-            kept[k, c] = 0
-    return kept
+            cleaned[k, c] = 0
+    return cleaned
 
 
 def _is_half(image: Floats) -> bool:

@@ -56,8 +56,7 @@ def solve(
             of all views count the same, and `views` of the solution has the answer to each.
         target: Of one view; or of several, in the same order.
         constraints: Constraints on the lights; they win over those of the scene's lights file,
-        which
-            a basis that was rendered here knows.
+            which a basis that was rendered here knows.
         start: Lighting to begin with (the present one by default). A good guess saves sweeps; the
             answer is the same, except for lights that reach no painted pixel, which keep the start.
         resize: Whether to resample a target of the same shape as the basis, but of another size.
@@ -102,16 +101,16 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     dimming = dimming_factors(problem.basis.present_weights, solution.weights)
     if problem.dimming is not None or (dimming[problem.keeps_color] == 1).all():
         return solution
-    drawn = replace(solution.problem, dimming=dimming)
+    dimmed = replace(solution.problem, dimming=dimming)
     if problem.is_linear:
-        nearer = _solve_under_reduction(drawn, solution.weights)
+        nearer = _solve_under_reduction(dimmed, solution.weights)
     else:
-        nearer = _descend(drawn, solution.weights, solution.reached, blocks, is_near=True)
+        nearer = _descend(dimmed, solution.weights, solution.reached, blocks, is_near=True)
     before = solution.certificate
-    told = nearer.with_certificate_fields(
+    result = nearer.with_certificate_fields(
         curve=before.curve, rounds=before.rounds + nearer.certificate.rounds
     )
-    return replace(told, tried=solution.tried)
+    return replace(result, tried=solution.tried)
 
 
 def _blocks_of(problem: Problem) -> BinnedPixels | None:
@@ -130,20 +129,22 @@ def _solve_once(problem: Problem, begin: Doubles, blocks: BinnedPixels | None) -
     if problem.is_linear:
         return _solve_squares(problem, begin)
     # The literal squares come first, which also tell what lights reach.
-    every = replace(problem, constraints=_without_sparse(problem.constraints))
-    first = _solve_squares(replace(every, loss=problem.squares), begin)
+    all_lights = replace(problem, constraints=_without_sparse(problem.constraints))
+    first = _solve_squares(replace(all_lights, loss=problem.squares), begin)
     reached = first.reached
-    every = every.with_whites(first.problem.reduction)
-    solution = _descend(every, first.weights, reached, blocks)
+    all_lights = all_lights.with_whites(first.problem.reduction)
+    solution = _descend(all_lights, first.weights, reached, blocks)
     if problem.constraints.sparse is not None:
         # The lights are chosen at the optimum of all lights.
         chosen = _solve_squares(
             replace(solution.problem, constraints=problem.constraints), solution.weights
         )
-        its = chosen.problem
-        held = replace(problem, reduction=its.reduction, full=its.full)
+        sparse = chosen.problem
+        restricted = replace(problem, reduction=sparse.reduction, full=sparse.full)
         reached = chosen.reached
-        solution = replace(_descend(held, chosen.weights, reached, blocks), tried=chosen.tried)
+        solution = replace(
+            _descend(restricted, chosen.weights, reached, blocks), tried=chosen.tried
+        )
         first = chosen
     return solution.with_certificate_fields(curve=first.certificate.curve)
 
@@ -160,22 +161,20 @@ def solve_again(solution: Solution, problem: Problem) -> Solution:
     step = _solve_under_reduction(problem, solution.weights, solution.reached)
     before, reweighting = solution.certificate, solution.reweighting
     converged = step.certificate.converged and reweighting.converged
-    kept = {name: getattr(before, name) for name in ("curve", "rounds")}
-    told = step.with_certificate_fields(converged=converged, **kept)
-    return replace(told, tried=solution.tried, reweighting=reweighting)
+    history = {name: getattr(before, name) for name in ("curve", "rounds")}
+    result = step.with_certificate_fields(converged=converged, **history)
+    return replace(result, tried=solution.tried, reweighting=reweighting)
 
 
 def _solve_squares(problem: Problem, start: Doubles) -> Solution:
-    """Solve the squares; with `sparse`, for the best lights in it. With `sparse`, of the best
-    lights in it.
-    """
+    """Solve the squares; with `sparse`, for the best lights alone."""
     return _solution(solve_linear(problem, start))
 
 
 def _solve_under_reduction(
     problem: Problem, start: Doubles, reached: Bools | None = None
 ) -> Solution:
-    """Solve the squares under the present reduction. reached: as of `make_answer`."""
+    """Solve the squares under the present reduction. reached: as in `make_answer`."""
     return _solution(solve_reduction(problem, start, reached))
 
 
@@ -193,7 +192,7 @@ def _descend(
 ) -> Solution:
     """Descend from weights (n, 3) to the least loss under the constraints.
 
-    reached: as of `make_answer`. blocks: as of `_blocks_of`. is_near: whether the start is near the
+    reached: as in `make_answer`. blocks: from `_blocks_of`. is_near: whether the start is near the
     least. The two whites that lights mix, and the lights that are confined to their gamuts, stay
     the same while the loss falls, and are chosen anew at its minimum.
     """
@@ -202,19 +201,19 @@ def _descend(
         return solution
     count, value = solution.certificate.rounds, _total_loss(solution)
     for _ in range(MAX_WHITE_STEPS):
-        at = solution.problem
-        equations = at.with_pull(at.solved)
-        reduction, optimum = next_whites(equations, at.reduction, solution.weights)
-        if all(a is b for a, b in zip(reduction.knobs, at.reduction.knobs, strict=True)):
+        current = solution.problem
+        equations = current.with_pull(current.solved)
+        reduction, optimum = next_whites(equations, current.reduction, solution.weights)
+        if all(a is b for a, b in zip(reduction.knobs, current.reduction.knobs, strict=True)):
             break
-        is_confined = reduction.gamut_knobs != at.reduction.gamut_knobs
-        at = at.with_whites(reduction)
-        nearer = _descend_once(at, optimum.weights, reached, blocks, is_near=True)
-        count, missed = count + nearer.certificate.rounds, _total_loss(nearer)
+        is_confined = reduction.gamut_knobs != current.reduction.gamut_knobs
+        current = current.with_whites(reduction)
+        nearer = _descend_once(current, optimum.weights, reached, blocks, is_near=True)
+        count, reached_loss = count + nearer.certificate.rounds, _total_loss(nearer)
         # A light that left its gamut has to return, whatever that costs.
-        if not is_confined and missed > value * (1 - MIN_GAIN):
+        if not is_confined and reached_loss > value * (1 - MIN_GAIN):
             break
-        solution, value = nearer, missed
+        solution, value = nearer, reached_loss
     return solution.with_certificate_fields(rounds=count)
 
 
@@ -233,9 +232,7 @@ def _descend_once(
     *,
     is_near: bool = False,
 ) -> Solution:
-    """Descend to the least loss over the present reduction. For the arguments see `_descend`.
-    Others as of `_descend`.
-    """
+    """Descend to the least loss over the present reduction. For the arguments see `_descend`."""
     basis, loss, pull, equations = problem.basis, problem.loss, problem.pull, problem.equations
     if blocks is not None:
         basis, loss, equations = blocks.basis, blocks.loss, blocks.equations
@@ -249,33 +246,35 @@ def _descend_once(
         return best_of(equations, begin).weights
 
     def descend_from(begin: Doubles) -> Descent:
-        near = None
+        near_optimum = None
         if not is_near:
-            near = find_near_optimum(basis, loss, equations, begin, weights_of, pull=pull)
-        begin, from_clipping = (begin, not is_near) if near is None else (near, False)
+            near_optimum = find_near_optimum(basis, loss, equations, begin, weights_of, pull=pull)
+        begin, from_clipping = (
+            (begin, not is_near) if near_optimum is None else (near_optimum, False)
+        )
         return descend(basis, loss, begin, weights_of, pull=pull, from_clipping=from_clipping)
 
-    found = descend_from(start)
+    descent = descend_from(start)
     present, lit = nearest_to_present(problem), LitPixels.of(basis, loss)
 
-    def missed(weights: Doubles) -> float:
+    def loss_at(weights: Doubles) -> float:
         return total_loss(lit.pixels, WeightTerms(pull), weights, lit.predicted(weights))
 
-    if missed(found.weights) > missed(present):
+    if loss_at(descent.weights) > loss_at(present):
         # A worse valley: from the present every step leads downhill.
-        found = descend_from(present)
-    optimum = best_of(found.equations, found.reweighting.at)
+        descent = descend_from(present)
+    optimum = best_of(descent.equations, descent.reweighting.at)
     if blocks is not None:
-        solved = _problem_of_blocks(problem, found, blocks)
+        solved = _problem_of_blocks(problem, descent, blocks)
     else:
-        solved = replace(problem, squares=found.squares, equations=found.equations)
+        solved = replace(problem, squares=descent.squares, equations=descent.equations)
     equations = solved.with_pull(solved.solved)
-    solution = _solution(make_answer(solved, optimum, found.weights, equations, reached))
-    converged = optimum.converged and found.reweighting.converged
-    told = solution.with_certificate_fields(
-        converged=converged, rounds=1 + found.reweighting.rounds
+    solution = _solution(make_answer(solved, optimum, descent.weights, equations, reached))
+    converged = optimum.converged and descent.reweighting.converged
+    result = solution.with_certificate_fields(
+        converged=converged, rounds=1 + descent.reweighting.rounds
     )
-    return replace(told, reweighting=found.reweighting)
+    return replace(result, reweighting=descent.reweighting)
 
 
 def nearest_to_present(problem: Problem) -> Doubles:
@@ -285,14 +284,14 @@ def nearest_to_present(problem: Problem) -> Doubles:
     return solve_reduced(pull, problem.reduction, present).weights
 
 
-def _problem_of_blocks(problem: Problem, found: Descent, blocks: BinnedPixels) -> Problem:
+def _problem_of_blocks(problem: Problem, descent: Descent, blocks: BinnedPixels) -> Problem:
     """Return the problem of all pixels, with squares that stand for its loss at the answer of
     blocks.
 
     Its corrected equations are those of the blocks with their prior: without most of the noise.
     """
-    at, loss = found.reweighting.at, problem.loss
-    x = LitPixels.whole(problem.basis, loss).predicted(at)
+    weights, loss = descent.reweighting.at, problem.loss
+    x = LitPixels.whole(problem.basis, loss).predicted(weights)
     image, weight = loss.pixels.squares(x, from_clipping=False)
     parts = (image, weight, loss.pixels.shares(x, weight))
     squares = Squares(*(image_in_place(part, problem.basis.size) for part in parts))
@@ -300,7 +299,7 @@ def _problem_of_blocks(problem: Problem, found: Descent, blocks: BinnedPixels) -
         problem,
         squares=squares,
         equations=NormalEquations.of(problem.basis, squares.image, squares.weight),
-        corrected=found.equations + blocks.prior,
+        corrected=descent.equations + blocks.prior,
         noise_removed=1 - 1 / blocks.side**2,
         block_side=blocks.side,
     )

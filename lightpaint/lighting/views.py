@@ -67,8 +67,8 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
     noise, views_noise = joined_planes([basis.noise for basis in bases], ROW_PIXELS)
     joint = first.on_pixels(planes, noise, join_rows([basis.emitters_seen for basis in bases]))
     views = tuple(
-        replace(basis, planes=its, noise=its_noise)
-        for basis, its, its_noise in zip(bases, views_planes, views_noise, strict=True)
+        replace(basis, planes=view_planes, noise=view_noise)
+        for basis, view_planes, view_noise in zip(bases, views_planes, views_noise, strict=True)
     )
     return joint, views
 
@@ -97,23 +97,23 @@ def check_same_lights(a: Basis, b: Basis) -> None:
             f"the bases of {a.origin.sensor} and {b.origin.sensor} have different lights, "
             f"{some_names(a.names)} and {some_names(b.names)}: make both of one scene"
         )
-    for one, other in zip(a.lights, b.lights, strict=True):
-        for what in ("unit", "members", "is_fixed", "is_scalar", "emission"):
-            if (its := getattr(one, what)) != (others := getattr(other, what)):
+    for first, second in zip(a.lights, b.lights, strict=True):
+        for field in ("unit", "members", "is_fixed", "is_scalar", "emission"):
+            if (value := getattr(first, field)) != (other_value := getattr(second, field)):
                 raise BasisError(
-                    f"light {one.name!r} has {_describe(what, its)} in the basis of "
-                    f"{a.origin.sensor} and {_describe(what, others)} in that of "
+                    f"light {first.name!r} has {_describe(field, value)} in the basis of "
+                    f"{a.origin.sensor} and {_describe(field, other_value)} in that of "
                     f"{b.origin.sensor}: "
                     "make both of one scene as it is"
                 )
 
 
-def _describe(what: str, value: Any) -> str:
+def _describe(field: str, value: Any) -> str:
     """Return a property of a light as a noun."""
-    if what == "is_fixed":
+    if field == "is_fixed":
         return "no weight of its own" if value else "a weight of its own"
-    if what == "is_scalar":
+    if field == "is_scalar":
         return "one weight for all channels" if value else "a weight for each channel"
-    if what == "emission":
+    if field == "emission":
         return "the emission " + " ".join(f"{v:g}" for v in value)
-    return f"the {what} {value if isinstance(value, str) else some_names(value)}"
+    return f"the {field} {value if isinstance(value, str) else some_names(value)}"

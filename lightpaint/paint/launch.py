@@ -37,7 +37,7 @@ def paint_in_browser(
     work.
 
     on_ready: called when the page can be opened. new: whether an earlier session is set aside.
-    host, port: as of `listen`. say: receives remarks.
+    host, port: as in `listen`. say: receives remarks.
 
     Raises PaintError where the session cannot be opened, OutputError where the last steps could not
     be written.

@@ -100,13 +100,19 @@ class Look:
 
     def _repr_html_(self) -> str:
         return look_html(
-            self.target, self.solution, self.predicted, self.verification, seen=self.analysis.seen
+            self.target,
+            self.solution,
+            self.predicted,
+            self.verification,
+            appearance=self.analysis.appearance,
         )
 
     @property
     def verdict(self) -> str:
         """Sentences on how close the lights come to the painting."""
-        return verdict(self.solution, self.predicted, self.verification, seen=self.analysis.seen)
+        return verdict(
+            self.solution, self.predicted, self.verification, appearance=self.analysis.appearance
+        )
 
     @property
     def uncertainty(self) -> Uncertainty | None:
@@ -204,7 +210,7 @@ def write_report(folder: Path, look: Look, *, command: str, is_shown: bool = Tru
             solution=look.solution,
             predicted=look.predicted.image,
             verified=verified,
-            seen=look.analysis.seen,
+            appearance=look.analysis.appearance,
             looks=looks,
             missed=missed,
         )
@@ -232,7 +238,7 @@ def _report_arguments(look: Look, command: str) -> dict[str, Any]:
         "diagnosis": look.diagnosis,
         "unconstrained": look.analysis.unconstrained,
         "suggestions": look.suggestions,
-        "seen": look.analysis.seen,
+        "appearance": look.analysis.appearance,
         "color_choices": look.analysis.color_choices,
     }
 

@@ -103,7 +103,7 @@ def detection_power(
     4 S d², where S is the variance of the block's difference. The light's own noise is taken out of
     d².
 
-    predicted, verified: as of `compare`, of one size.
+    predicted, verified: as in `compare`, of one size.
     """
     squares, magnitude = noise_of(predicted, verified)
     deviation = np.sqrt(squares.sum(axis=(0, 1)))

@@ -89,7 +89,7 @@ def unchecked(
 ) -> float:
     """Return the share of the picture's light that only more samples would check.
 
-    predicted, verified: as of `compare`, of one size. done: share of the samples that are rendered.
+    predicted, verified: as in `compare`, of one size. done: share of the samples that are rendered.
     """
     now = detection_power(predicted, verified, lights, limit=limit)
     half = verified.half_difference * done**0.5

@@ -11,7 +11,7 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
-from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.solution import Solution
 from lightpaint.report.answer_pictures import (
     Residual,
@@ -53,7 +53,7 @@ def comparison_image(
     solution: Solution,
     predicted: Floats,
     verified: Floats | None,
-    seen: Seen | None = None,
+    appearance: Appearance | None = None,
     looks: CleanLooks | None = None,
     missed: Residual | None = None,
 ) -> npt.NDArray[np.uint8]:
@@ -62,9 +62,9 @@ def comparison_image(
     predicted, verified: (h, w, 3) linear, the latter possibly with a block of pixels for each; what
     is smaller is shown with larger pixels. Three pictures where `verified` is None. The
     residual is false-coloured luminance of prediction minus target, of raw data; pixels that
-    do not count are grey, dim and hatched. seen: the result of `what_is_seen`, if known. looks:
-    shown instead of raw renders. missed: the result of `residual_of`. Raises SizeError if target
-    and basis differ in size.
+    do not count are grey, dim and hatched. appearance: the result of `compare_appearance`, if
+    known. looks: shown instead of raw renders. missed: the result of `residual_of`. Raises
+    SizeError if target and basis differ in size.
     """
     target = target.fitted_to(basis.size, resize=False)
     looks = looks or CleanLooks.raw(basis, predicted, verified)
@@ -79,7 +79,7 @@ def comparison_image(
         ),
         Tile(
             f"predicted{at}",
-            _short_verdict(seen or what_is_seen(solution)),
+            _short_verdict(appearance or compare_appearance(solution)),
             to_8_bit(transform.encode(looks.predicted)),
         ),
     ]
@@ -171,6 +171,13 @@ def shorten_to_width(words: str, font: Any, width: int) -> str:
     return words.rstrip() + "…"
 
 
-def _short_verdict(seen: Seen) -> str:
-    how = "close" if seen.is_close else "out of reach" if seen.is_far else "part of the way"
-    return f"{how}: mean dE {seen.delta_e:.1f} where painted (noise explains {seen.noise:.1f})"
+def _short_verdict(appearance: Appearance) -> str:
+    how = (
+        "close"
+        if appearance.is_close
+        else "out of reach"
+        if appearance.is_far
+        else "part of the way"
+    )
+    delta_e, noise = appearance.delta_e, appearance.noise
+    return f"{how}: mean dE {delta_e:.1f} where painted (noise explains {noise:.1f})"

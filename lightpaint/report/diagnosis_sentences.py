@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, error_shares
 from lightpaint.lighting.answer.active_bound import Bound
@@ -29,12 +29,15 @@ MIN_SWITCHED_OFF_SHARE = 0.01
 
 
 def error_sentences(
-    diagnosis: Diagnosis, seen: Seen | None = None, *, holds: Sequence[str] | None = None
+    diagnosis: Diagnosis,
+    appearance: Appearance | None = None,
+    *,
+    holds: Sequence[str] | None = None,
 ) -> list[str]:
     """Return at most four sentences on why it does not look like the painting, the main one first.
 
-    seen: the result of `what_is_seen`, whose reasons go before single bounds. holds: instead of the
-    sentences of `bound_sentences`.
+    appearance: the result of `compare_appearance`, whose reasons go before single bounds. holds:
+    instead of the sentences of `bound_sentences`.
     """
     d = diagnosis
     if not (parts := error_shares(d)):
@@ -42,7 +45,7 @@ def error_sentences(
     # What is kept has a bound of its own below.
     which = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
     words = {
-        "unreachable": f"is out of reach of any mix of {which}{hold_clause(seen)}",
+        "unreachable": f"is out of reach of any mix of {which}{hold_clause(appearance)}",
         "forbidden": "would need other limits of the lights or light below zero"
         if d.is_constrained
         else "would need light below zero",
@@ -53,28 +56,28 @@ def error_sentences(
     percents = spoken_percents(parts.values())
     shares = [f"{share} {words[part]}" for part, share in zip(parts, percents, strict=True)]
     sentences = [f"Of the difference (in energy), {', '.join(shares)}."]
-    is_told = seen is not None and seen.place is not None  # by the headline
+    is_told = appearance is not None and appearance.place is not None  # by the headline
     if d.place is not None and not is_told and d.share(d.unreachable) >= MIN_SHARE:
         sentences.append(spoken_place(d.place))
-    return [*sentences, *(bound_sentences(d, seen) if holds is None else holds)]
+    return [*sentences, *(bound_sentences(d, appearance) if holds is None else holds)]
 
 
-def hold_clause(seen: Seen | None) -> str:
+def hold_clause(appearance: Appearance | None) -> str:
     """Return ` while the rest is held` if that keeps the lights from the paint, else ""."""
-    is_held = seen is not None and any(reason.kind == "hold" for reason in seen.reasons)
+    is_held = appearance is not None and any(reason.kind == "hold" for reason in appearance.reasons)
     return " while the rest is held" if is_held else ""
 
 
 def bound_sentences(
-    diagnosis: Diagnosis, seen: Seen | None = None, *, any_color: str = ANY_COLOR
+    diagnosis: Diagnosis, appearance: Appearance | None = None, *, any_color: str = ANY_COLOR
 ) -> list[str]:
     """Return at most two sentences on what holds the lights, the most important first.
 
-    seen: the result of `what_is_seen`; its reasons come with their shares, and single bounds only
+    appearance: the result of `compare_appearance`; its reasons come with their shares, and single bounds only
     if there are none. any_color: how to let lights have any colour.
     """
-    if seen is not None and seen.reasons:
-        told = [spoken_cause(reason, any_color=any_color) for reason in seen.reasons]
+    if appearance is not None and appearance.reasons:
+        told = [spoken_cause(reason, any_color=any_color) for reason in appearance.reasons]
         return [sentence for sentence in told if sentence][:2]
     d = diagnosis
     most = [bound for bound in d.bounds[:1] if d.gain_share(bound) >= MIN_SHARE]
@@ -127,7 +130,7 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = 
     held = "Unpainted parts are held near their present look;"
     if (loosening := reason.loosening) is None:
         return f"{held} releasing them {gained}."
-    share, rest = spoken_percent(loosening.share), loosening.elsewhere
+    share, rest = spoken_percent(loosening.share), loosening.unpainted_change
     cost = "" if rest is None else f", and change {spoken_changed(rest)}"
     return f"{held} {weaker} {loosening.hold:g} would remove {share} of the difference{cost}."
 

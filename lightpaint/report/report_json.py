@@ -14,7 +14,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.analysis.appearance.color_choices import Choices, ColorChoice
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
@@ -64,7 +64,7 @@ def report_numbers(
     diagnosis: Diagnosis | None = None,
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
-    seen: Seen | None = None,
+    appearance: Appearance | None = None,
     color_choices: Choices = (),
     missed: Residual | None = None,
 ) -> str:
@@ -85,7 +85,7 @@ def report_numbers(
             "residual_limit": residual.limit,
             "residual_pixels": 2 * residual.radius + 1,
         },
-        "seen": _seen(seen or what_is_seen(solution, predicted)),
+        "seen": _seen(appearance or compare_appearance(solution, predicted)),
         "meant": fit_options(solution),
         "colors": {choice.colors: _choice(choice) for choice in color_choices} or None,
         "fit": _fit(solution, predicted, unconstrained),
@@ -123,21 +123,21 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
     }
 
 
-def _seen(seen: Seen) -> dict[str, Any]:
+def _seen(appearance: Appearance) -> dict[str, Any]:
     """Return the mean CIEDE2000 over the paint, and the share of the request that has come
     about."""
-    place = seen.place
+    place = appearance.place
     return {
-        "delta_e": seen.delta_e,
-        "noise": seen.noise,
-        "asked": seen.asked,
-        "share_met": seen.share_met,
+        "delta_e": appearance.delta_e,
+        "noise": appearance.noise,
+        "asked": appearance.requested_change,
+        "share_met": appearance.share_met,
         "region": None if place is None else place.region,
         "object": place.object or None if place else None,
-        "held": seen.limit_groups or None,
-        "held_by_views": seen.limiting_views or None,
-        "reasons": [_reason(reason) for reason in seen.reasons] or None,
-        "elsewhere": _unpainted(seen.elsewhere),
+        "held": appearance.limit_groups or None,
+        "held_by_views": appearance.limiting_views or None,
+        "reasons": [_reason(reason) for reason in appearance.reasons] or None,
+        "elsewhere": _unpainted(appearance.unpainted_change),
     }
 
 
@@ -147,7 +147,7 @@ def _reason(reason: Reason) -> dict[str, Any]:
     told |= {"share": reason.share, "is_joint": reason.is_joint or None}
     if (its := reason.loosening) is not None:
         told |= {"weaker_hold": its.hold, "weaker_hold_share": its.share}
-        told |= {"weaker_hold_elsewhere": _unpainted(its.elsewhere)}
+        told |= {"weaker_hold_elsewhere": _unpainted(its.unpainted_change)}
     return told
 
 
@@ -168,9 +168,7 @@ def _choice(choice: ColorChoice) -> dict[str, Any]:
 
 
 def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
-    """Return RMS errors relative to the painting. norm2: the scale of relative objectives. norm2:
-    what relative objectives are relative to.
-    """
+    """Return RMS errors relative to the painting, and `norm2`, the scale of the objectives."""
     told = {
         "missed": relative_residual(solution),
         "noise": noise_residual(solution, predicted),

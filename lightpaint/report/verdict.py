@@ -5,7 +5,7 @@ import numpy as np
 from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
@@ -48,7 +48,7 @@ def verdict(
     predicted: Estimate,
     verification: Verification | None,
     *,
-    seen: Seen | None = None,
+    appearance: Appearance | None = None,
 ) -> str:
     """Return how near the lights come to what was painted, and whether a render confirms it.
 
@@ -56,15 +56,18 @@ def verdict(
         solution: The answer.
         predicted: The result of `combine`.
         verification: The result of `verify`; None without a render.
-        seen: The result of `what_is_seen`, if known.
+        appearance: The result of `compare_appearance`, if known.
 
     Examples:
         >>> solution = lp.solve(basis, target)
         >>> lp.verdict(solution, lp.combine(basis, solution.lighting), None)
         'Close: it looks as painted. Mean ΔE 0.0 over what was painted (... as the scene is now...'
     """
-    seen = seen or what_is_seen(solution, predicted)
-    said = [headline(seen), f"{spoken_delta_e(seen, known=bool(predicted.half_difference.any()))}."]
+    appearance = appearance or compare_appearance(solution, predicted)
+    said = [
+        headline(appearance),
+        f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
+    ]
     if not solution.certificate.converged:
         said.append("The solve stopped before it converged.")
     if verification is None:
@@ -78,78 +81,86 @@ def verdict(
     return " ".join(said)
 
 
-def headline(seen: Seen) -> str:
+def headline(appearance: Appearance) -> str:
     """Say whether the lights make what was painted, what is missing and why, and what else changes.
 
     A cause is named only if a third of what the fit misses is due to it.
     """
-    told = spoken_elsewhere(seen.elsewhere) if seen.changes_elsewhere else ""
-    present = f"{spoken_present(seen)} " if seen.is_worse else ""
-    return f"{present}{_paint_headline(seen)} {told}".rstrip()
+    told = spoken_elsewhere(appearance.unpainted_change) if appearance.changes_unpainted else ""
+    present = f"{spoken_present(appearance)} " if appearance.is_worse else ""
+    return f"{present}{_paint_headline(appearance)} {told}".rstrip()
 
 
-def spoken_present(seen: Seen) -> str:
+def spoken_present(appearance: Appearance) -> str:
     """Say that the present lighting comes closer than the answer, and offer it."""
     return (
-        f"The present lighting comes closer to the paint (mean ΔE {seen.asked:.1f}) than "
-        f"this answer ({seen.delta_e:.1f}): keep the scene as it is."
+        "The present lighting comes closer to the paint (mean ΔE "
+        f"{appearance.requested_change:.1f}) than this answer ({appearance.delta_e:.1f}): keep the "
+        "scene as it is."
     )
 
 
-def _paint_headline(seen: Seen) -> str:
-    if seen.is_close and not (seen.is_spot and seen.place):
+def _paint_headline(appearance: Appearance) -> str:
+    if appearance.is_close and not (appearance.is_spot and appearance.place):
         return "Close: it looks as painted."
-    if seen.place is None:
-        return f"{_headline_start(seen)}: too much of what was painted is out of reach."
-    if seen.is_far:
-        where = spoken_where(seen.place)
-        change = spoken_difference(seen.place.painted, seen.place.reached)
+    if appearance.place is None:
+        return f"{_headline_start(appearance)}: too much of what was painted is out of reach."
+    if appearance.is_far:
+        where = spoken_where(appearance.place)
+        change = spoken_difference(appearance.place.painted, appearance.place.reached)
         painted = f"{where} the painting is {change} than the lights make it"
-        return f"{_headline_start(seen)}: {painted}; {spoken_reason(seen)}."
-    state = "is out of reach" if not seen.causes and seen.is_beyond else "is missing"
-    return f"{_headline_start(seen)} the {spoken_missing(seen)} {state}: {spoken_reason(seen)}."
+        return f"{_headline_start(appearance)}: {painted}; {spoken_reason(appearance)}."
+    state = (
+        "is out of reach" if not appearance.causes and appearance.is_out_of_reach else "is missing"
+    )
+    start, missing = _headline_start(appearance), spoken_missing(appearance)
+    return f"{start} the {missing} {state}: {spoken_reason(appearance)}."
 
 
-def _headline_start(seen: Seen) -> str:
-    if seen.is_close:
+def _headline_start(appearance: Appearance) -> str:
+    if appearance.is_close:
         return "Close, but"
-    if not seen.is_far:
+    if not appearance.is_far:
         return "Part of the way, but"
     # "The lights cannot" would not be true if something else holds them.
-    if seen.causes or _are_kept(seen):
+    if appearance.causes or _are_kept(appearance):
         return "Constraints keep the lights from this"
-    return "These lights cannot match this" if seen.is_beyond else "The lights do not match this"
+    return (
+        "These lights cannot match this"
+        if appearance.is_out_of_reach
+        else "The lights do not match this"
+    )
 
 
-def spoken_missing(seen: Seen) -> str:
+def spoken_missing(appearance: Appearance) -> str:
     """Return the main error as a phrase, `brighter light on the floor`. The answer must have a
     place. Of an answer that has such a place.
     """
-    assert seen.place is not None
-    change = spoken_difference(seen.place.painted, seen.place.reached)
-    light = "shade" if is_darker(seen) else "light"
-    return f"{change.replace('a little', 'slightly')} {light} {spoken_where(seen.place)}"
+    assert appearance.place is not None
+    change = spoken_difference(appearance.place.painted, appearance.place.reached)
+    light = "shade" if is_darker(appearance) else "light"
+    return f"{change.replace('a little', 'slightly')} {light} {spoken_where(appearance.place)}"
 
 
-def spoken_reason(seen: Seen) -> str:
+def spoken_reason(appearance: Appearance) -> str:
     """Say what keeps the lights from the worst place: the main cause first."""
-    assert seen.place is not None
-    if seen.causes:
-        *most, last = (spoken_holding(reason) for reason in seen.causes)
+    assert appearance.place is not None
+    if appearance.causes:
+        *most, last = (spoken_holding(reason) for reason in appearance.causes)
         return f"{', '.join(most)}, and {last}" if most else last
-    if not seen.is_beyond:
-        return spoken_noise(seen) or NO_MAIN_CAUSE
-    if not seen.there:
+    if not appearance.is_out_of_reach:
+        return spoken_noise(appearance) or NO_MAIN_CAUSE
+    if not appearance.local_lights:
         return "no light reaches it"
-    some, is_one = _spoken_some(seen.there)
-    if is_darker(seen):
+    some, is_one = _spoken_some(appearance.local_lights)
+    if is_darker(appearance):
         return f"{some} {'lights' if is_one else 'light'} it too"
-    if not seen.does_much:
+    if not appearance.has_strong_light:
         return f"{some} {'does' if is_one else 'do'} little there"
-    if _are_kept(seen):
+    if _are_kept(appearance):
         its = "is limited by its constraints"
         return f"{some} {its if is_one else 'are limited by their constraints'}"
-    free = tuple(name for name in seen.there if name not in seen.kept_there)
+    free = tuple(name for name in appearance.local_lights if name not in appearance.held_lights)
     return f"{_spoken_some(free)[0]} would light too much else"
 
 
@@ -166,20 +177,26 @@ def spoken_holding(reason: Reason) -> str:
     return (one if len(reason.names) == 1 else several).format(which)
 
 
-def spoken_noise(seen: Seen) -> str:
+def spoken_noise(appearance: Appearance) -> str:
     """Return a clause on noise, if it is a third of the error; else ""."""
-    share = spoken_percent(seen.parts.get(seen.noise_that_counts, 0.0))
-    if seen.noise_that_counts == "noise":
+    share = spoken_percent(appearance.error_shares.get(appearance.main_noise, 0.0))
+    if appearance.main_noise == "noise":
         return f"{share} of the difference is render noise"
-    if seen.noise_that_counts == "painting_noise":
+    if appearance.main_noise == "painting_noise":
         return f"{share} of the difference is finer detail than light can show"
     return ""
 
 
-def _are_kept(seen: Seen) -> bool:
+def _are_kept(appearance: Appearance) -> bool:
     """Return whether constraints hold back all lights that contribute much to the place."""
-    is_short = seen.place is not None and seen.does_much and not is_darker(seen)
-    return is_short and bool(seen.there) and set(seen.there) <= set(seen.kept_there)
+    is_short = (
+        appearance.place is not None and appearance.has_strong_light and not is_darker(appearance)
+    )
+    return (
+        is_short
+        and bool(appearance.local_lights)
+        and set(appearance.local_lights) <= set(appearance.held_lights)
+    )
 
 
 def _spoken_some(names: tuple[str, ...]) -> tuple[str, bool]:
@@ -187,18 +204,20 @@ def _spoken_some(names: tuple[str, ...]) -> tuple[str, bool]:
     return some_names(names[:2], joint=" and "), len(names) == 1
 
 
-def is_darker(seen: Seen) -> bool:
+def is_darker(appearance: Appearance) -> bool:
     """Return whether the worst place is painted darker than the lights make it."""
-    assert seen.place is not None
-    painted, reached = (luminance(np.array(x)) for x in (seen.place.painted, seen.place.reached))
+    assert appearance.place is not None
+    painted, reached = (
+        luminance(np.array(x)) for x in (appearance.place.painted, appearance.place.reached)
+    )
     return bool(painted < reached)
 
 
-def spoken_delta_e(seen: Seen, *, known: bool) -> str:
+def spoken_delta_e(appearance: Appearance, *, known: bool) -> str:
     """Return `Mean ΔE 4.2 over what was painted (11.3 as the scene is now; noise explains 0.8)`."""
-    noise = f"noise explains {seen.noise:.1f}" if known else "noise included"
-    now = f"{seen.asked:.1f} as the scene is now"
-    return f"Mean ΔE {seen.delta_e:.1f} over what was painted ({now}; {noise})"
+    noise = f"noise explains {appearance.noise:.1f}" if known else "noise included"
+    now = f"{appearance.requested_change:.1f} as the scene is now"
+    return f"Mean ΔE {appearance.delta_e:.1f} over what was painted ({now}; {noise})"
 
 
 def spoken_blindness(verification: Verification) -> str:

@@ -59,8 +59,8 @@ class Scene(Shown):
         files: All XML files.
         content: Hash of all XML files and assets, the parameters and the sensor; the same on a
             reduced film.
-        unlit_content: Hash of all that the image of each light depends on but for that light
-            itself: of the scene without its lights, but with the shapes of area lights.
+        unlit_content: Hash of all that the image of each light depends on, except that light: the
+            scene without its lights, but with the shapes of area lights.
         lights_file: The lights file that went into `lights`, if one did.
         requests: The constraints that it asks for.
         chosen: Names of the lights that `only` left; none where all are there.

@@ -164,7 +164,7 @@ def _averaged(
     )
 
 
-def _names_by_index(loaded: Any, named: Sequence[str]) -> dict[int, str]:
+def _names_by_index(loaded: Any, names: Sequence[str]) -> dict[int, str]:
     """Return the name of each shape, by the index that the integrator writes.
 
     names: those of the shapes in their order, including unnamed ones.
@@ -174,10 +174,10 @@ def _names_by_index(loaded: Any, named: Sequence[str]) -> dict[int, str]:
 
     shapes = loaded.shapes()
     ids = [shape.id() for shape in shapes]
-    names = [its or other for its, other in zip(ids, named, strict=False)]
-    if len(named) != len(shapes):
-        names = ids
+    names_or_ids = [shape_id or name for shape_id, name in zip(ids, names, strict=False)]
+    if len(names) != len(shapes):
+        names_or_ids = ids
     if not dr.is_jit_v(mi.Float):
-        return {k + 1: name for k, name in enumerate(names)}
+        return {k + 1: name for k, name in enumerate(names_or_ids)}
     indices = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes]
-    return dict(zip(indices, names, strict=True))
+    return dict(zip(indices, names_or_ids, strict=True))

@@ -112,7 +112,7 @@ def read_over_look(
     Only for a painting that does not say itself what counts, and of which no template is known.
 
     look: (h, w, 3) linear, what a basis or light groups show as they are. name: what messages call
-    it. layer, transform: as of `read_target`.
+    it. layer, transform: as in `read_target`.
     """
     picture = read_picture(path, layer=layer, transform=transform)
     view = view_of_look(path, picture, look, transform)
@@ -176,7 +176,7 @@ def _opened(
     find: bool,
 ) -> _Reading:
     """Open the picture, and the template it was painted on. For the arguments see `read_target`.
-    Arguments as of `read_target`.
+    Arguments as in `read_target`.
     """
     asked, made = TransformChoice.of(transform), None
     notes: tuple[str, ...] = ()

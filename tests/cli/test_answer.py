@@ -224,7 +224,7 @@ def test_what_holds_the_lights_is_said_with_its_option(reason: Reason, where: st
     constraints = Constraints.of(asked, where=where)
     look = SimpleNamespace(
         solution=SimpleNamespace(problem=SimpleNamespace(constraints=constraints)),
-        analysis=SimpleNamespace(seen=SimpleNamespace(reasons=(reason,))),
+        analysis=SimpleNamespace(appearance=SimpleNamespace(reasons=(reason,))),
     )
     [sentence] = _what_holds(look)  # type: ignore[arg-type]
     assert said in spoken(sentence)

@@ -15,7 +15,7 @@ from lightpaint.basis.basis_file import write_basis
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
 
 #: A name that steers a terminal, breaks lines, and would end a text of JSON.
 BAD = 'b\x1b[2J\r\n\t\x7f\x9b\u202e\u2028"\\'
@@ -99,7 +99,7 @@ def test_a_share_is_at_most_1(here: Path) -> None:
 
 def test_shares_of_what_was_asked() -> None:
     for delta_e, asked, share in ((2, 10, 0.8), (0, 10, 1), (12, 10, 0), (0, 0, 1), (1, 0, 0)):
-        seen = Seen(float(delta_e), 0.0, float(asked))
+        seen = Appearance(float(delta_e), 0.0, float(asked))
         assert seen.share_met == pytest.approx(share)
         assert Tolerances().shortfalls(seen) == []
         assert Tolerances().document(seen) == {}

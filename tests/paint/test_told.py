@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Loosening, Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
@@ -78,8 +78,8 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
     ],
 )
 def test_a_sketch_is_helped_and_not_judged(missed: float, about: Any, said: str):
-    seen = replace(Seen(missed, 0.0, 20.0, PLACE), **about)
-    assert sketch_headline(seen) == said
+    appearance = replace(Appearance(missed, 0.0, 20.0, PLACE), **about)
+    assert sketch_headline(appearance) == said
     assert "cannot" not in said
 
 
@@ -97,28 +97,28 @@ def test_a_sketch_is_helped_and_not_judged(missed: float, about: Any, said: str)
     ],
 )
 def test_what_a_sentence_advises_is_said_as_data(about: Any, helps: str | None):
-    seen = replace(Seen(10.0, 0.0, 20.0, PLACE), **about)
-    cause, fields = removable_reason(seen), advice(seen)
+    appearance = replace(Appearance(10.0, 0.0, 20.0, PLACE), **about)
+    cause, fields = removable_reason(appearance), advice(appearance)
     assert (cause and cause.kind) == helps
     assert (fields and fields.kind) == helps
-    advised = [held for held, words in ADVICE_TEXTS.items() if words in sketch_headline(seen)]
+    advised = [held for held, words in ADVICE_TEXTS.items() if words in sketch_headline(appearance)]
     assert advised == [one for one in (helps,) if one in ADVICE_TEXTS]
 
 
 def test_a_button_says_what_it_lets_go_and_what_that_brings():
-    seen = replace(Seen(10.0, 0.0, 20.0, PLACE), reasons=(OFF, HOLD))
-    assert ": annex_window is switched off." in sketch_headline(seen)
+    appearance = replace(Appearance(10.0, 0.0, 20.0, PLACE), reasons=(OFF, HOLD))
+    assert ": annex_window is switched off." in sketch_headline(appearance)
     fields = Advice("off", ("annex_window",), closes=0.57, hold=None)
-    assert advice(seen) == fields
+    assert advice(appearance) == fields
     weaker = Loosening(0.8, 0.35, UnpaintedChange(2.0, 12.0, "annex"))
-    held = replace(seen, reasons=(replace(HOLD, loosening=weaker),))
+    held = replace(appearance, reasons=(replace(HOLD, loosening=weaker),))
     assert advice(held) == Advice("hold", (), closes=0.35, hold=0.8)
     assert spoken_cause(held.reasons[0]) == (
         "Unpainted parts are held near their present look; a hold of 0.8 would remove 35 % of "
         "the difference, and change the annex by ΔE 12."
     )
     # Of what takes several, none closes a share by itself.
-    joint = replace(seen, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))
+    joint = replace(appearance, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))
     told = advice(joint)
     assert told is not None
     assert told.closes is None
@@ -137,18 +137,23 @@ def test_a_preview_says_what_it_brings_and_what_it_costs():
 
 def test_what_harms_the_rest_is_not_praised():
     """Letting go blew out the annex, and was told as 57 %."""
-    seen = Seen(
-        8.6, 0.0, 20.0, PLACE, there=("lamp",), elsewhere=UnpaintedChange(19.0, 51.0, "annex")
+    appearance = Appearance(
+        8.6,
+        0.0,
+        20.0,
+        PLACE,
+        local_lights=("lamp",),
+        unpainted_change=UnpaintedChange(19.0, 51.0, "annex"),
     )
-    said = sketch_headline(seen)
+    said = sketch_headline(appearance)
     assert said.startswith("57 % of the way, at the cost of the annex (ΔE 51). ")
-    mild = sketch_headline(replace(seen, elsewhere=UnpaintedChange(2.0, 7.0, "annex")))
+    mild = sketch_headline(replace(appearance, unpainted_change=UnpaintedChange(2.0, 7.0, "annex")))
     assert mild.startswith("About half way (57 %), and changes the annex by ΔE 7.0. ")
 
 
 def test_what_is_close_is_said_as_elsewhere():
-    seen = Seen(2.0, 0.0, 20.0, PLACE)
-    assert sketch_headline(seen) == headline(seen)
+    appearance = Appearance(2.0, 0.0, 20.0, PLACE)
+    assert sketch_headline(appearance) == headline(appearance)
 
 
 @pytest.mark.parametrize("colors", ["free", "white"])
@@ -172,7 +177,7 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
     kept = replace(analysis, seen=replace(analysis.seen, reasons=(COLORS,)))
     assert "Lights keep their colours; any colour would remove 50 %" in why_not_closer(kept)[-1]
     # Where it is missed most is told once: of a whole, or of a place that is seen.
-    unseen = replace(analysis, seen=replace(analysis.seen, place=None))
+    unseen = replace(analysis, appearance=replace(analysis.appearance, place=None))
     assert "Most of what is out of reach is" in why_not_closer(unseen)[1]
     met = replace(analysis, diagnosis=replace(analysis.diagnosis, missed=0.009))
     assert why_not_closer(met) == ["The lights can make what is painted."]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.diagnosis import Place, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
@@ -152,9 +152,9 @@ def test_the_most_useful_comes_first(make_basis: Any):
 
 def test_what_is_out_of_reach_is_so_beside_what_is_held(make_basis: Any):
     *_, found = _solved(make_basis)
-    seen = Seen(12.0, 0.0, 20.0)
-    assert "is out of reach of any mix of the lights," in error_sentences(found, seen)[0]
-    held = replace(seen, reasons=(Reason("hold", (), 0.7),))
+    appearance = Appearance(12.0, 0.0, 20.0)
+    assert "is out of reach of any mix of the lights," in error_sentences(found, appearance)[0]
+    held = replace(appearance, reasons=(Reason("hold", (), 0.7),))
     assert (
         "is out of reach of any mix of the lights while the rest is "
         "held," in error_sentences(found, held)[0]

@@ -14,7 +14,7 @@ from conftest import BasisFactory
 from lightpaint.basis.basis_file import write_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import HEADLINE_SHARE, Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import Place
@@ -28,33 +28,33 @@ from lightpaint.target.target import Target
 DARK, LIT = (0.1, 0.1, 0.1), (0.4, 0.4, 0.4)
 
 
-def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
+def _seen(missed: float, asked: float = 20.0, **about: Any) -> Appearance:
     region, painted, reached = about.pop("at", ((1, 1), LIT, DARK))
     place = Place(region, 0.9, (0, 0, 8, 8), painted, reached, about.pop("on", ""))
-    return replace(Seen(missed, 0.0, asked, place), **about)
+    return replace(Appearance(missed, 0.0, asked, place), **about)
 
 
 @pytest.mark.parametrize(
     ("seen", "said"),
     [
-        (Seen(0.0, 0.0, 0.0), "Close: it looks as painted."),
+        (Appearance(0.0, 0.0, 0.0), "Close: it looks as painted."),
         (_seen(2.9), "Close: it looks as painted."),
         (
             _seen(2.0, is_spot=True),
             "Close, but the brighter light in the middle is out of reach: no light reaches it.",
         ),
         (
-            _seen(2.0, is_spot=True, there=("lamp", "sun"), does_much=False),
+            _seen(2.0, is_spot=True, local_lights=("lamp", "sun"), has_strong_light=False),
             "Close, but the brighter light in the middle is out of reach: lamp and sun do little "
             "there.",
         ),
         (
-            _seen(5.0, there=("lamp",), at=((0, 2), LIT, DARK)),
+            _seen(5.0, local_lights=("lamp",), at=((0, 2), LIT, DARK)),
             "Part of the way, but the brighter light at the top right is out of reach: lamp would "
             "light too much else.",
         ),
         (
-            _seen(5.0, there=("sky",), at=((1, 0), DARK, LIT)),
+            _seen(5.0, local_lights=("sky",), at=((1, 0), DARK, LIT)),
             "Part of the way, but the darker shade on the left is out of reach: sky lights it too.",
         ),
         (
@@ -78,7 +78,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
             "light reaches it.",
         ),
         (
-            _seen(14.0, on="<b>\x1b[1m", there=("lamp",)),
+            _seen(14.0, on="<b>\x1b[1m", local_lights=("lamp",)),
             "These lights cannot match this: on the <b>\\x1b[1m the painting is "
             "brighter than the lights make it; lamp would light too much else.",
         ),
@@ -93,31 +93,31 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Seen:
             "colours, and views a and b ask for different light.",
         ),
         (
-            _seen(5.0, there=("lamp", "sun", "sky"), kept_there=("lamp", "sun")),
+            _seen(5.0, local_lights=("lamp", "sun", "sky"), held_lights=("lamp", "sun")),
             "Part of the way, but the brighter light in the middle is out of reach: sky would "
             "light too much else.",
         ),
         (
-            _seen(14.0, there=("lamp",), kept_there=("lamp",)),
+            _seen(14.0, local_lights=("lamp",), held_lights=("lamp",)),
             "Constraints keep the lights from this: in the middle the painting is "
             "brighter than the lights make it; lamp is limited by its constraints.",
         ),
         (
-            _seen(5.0, there=("lamp", "sun"), kept_there=("sun", "lamp")),
+            _seen(5.0, local_lights=("lamp", "sun"), held_lights=("sun", "lamp")),
             "Part of the way, but the brighter light in the middle is out of reach: lamp and sun "
             "are limited by their constraints.",
         ),
         (
-            _seen(5.0, there=("sky",), kept_there=("sky",), at=((1, 0), DARK, LIT)),
+            _seen(5.0, local_lights=("sky",), held_lights=("sky",), at=((1, 0), DARK, LIT)),
             "Part of the way, but the darker shade on the left is out of reach: sky lights it too.",
         ),
         (
-            Seen(14.0, 0.0, 20.0),
+            Appearance(14.0, 0.0, 20.0),
             "These lights cannot match this: too much of what was painted is out of reach.",
         ),
     ],
 )
-def test_the_headline_in_words(seen: Seen, said: str):
+def test_the_headline_in_words(seen: Appearance, said: str):
     assert headline(seen) == said
 
 
@@ -138,7 +138,7 @@ def test_a_headline_names_no_cause_of_less_than_a_third(part: str, share: float)
     """Whatever the rest is, of parts as report.json has them."""
     others = [x for x in PARTS if x not in (part, "unreachable", "forbidden")]
     parts = {part: share} | dict.fromkeys(others, (1 - share) / 4)
-    said = headline(_seen(5.0, there=("lamp",), parts=parts))
+    said = headline(_seen(5.0, local_lights=("lamp",), error_shares=parts))
     named = [x for x in PARTS if SAID[x] in said]
     assert all(parts.get(x, 0) >= HEADLINE_SHARE for x in named if x == part)
     assert (part in named) == (share >= HEADLINE_SHARE)
@@ -148,23 +148,25 @@ def test_a_headline_names_no_cause_of_less_than_a_third(part: str, share: float)
 @pytest.mark.parametrize(("share", "is_named"), [(0.3, False), (0.36, True)])
 def test_a_headline_names_no_reason_of_less_than_a_third(share: float, is_named: bool):
     off = Reason("off", ("cove",), share)
-    said = headline(_seen(5.0, there=("lamp",), reasons=(off,), parts={"unreachable": 0.9}))
+    said = headline(
+        _seen(5.0, local_lights=("lamp",), reasons=(off,), error_shares={"unreachable": 0.9})
+    )
     assert ("cove is switched off" in said) == is_named
     assert ("out of reach" in said) != is_named
 
 
 def test_what_changes_elsewhere_is_part_of_the_verdict():
     annex = UnpaintedChange(19.0, 51.0, "annex")
-    close = _seen(1.0, elsewhere=annex)
+    close = _seen(1.0, unpainted_change=annex)
     said = "Unpainted parts change too, most of all the annex, by ΔE 51."
     assert headline(close) == f"Close: it looks as painted. {said}"
-    assert headline(_seen(5.0, elsewhere=annex)).endswith(said)
+    assert headline(_seen(5.0, unpainted_change=annex)).endswith(said)
     corner = UnpaintedChange(3.0, 7.5, region=(0, 2))
-    assert headline(_seen(1.0, elsewhere=corner)).endswith(
+    assert headline(_seen(1.0, unpainted_change=corner)).endswith(
         "most of all at the top right, by ΔE 7.5."
     )
     # What nobody sees at a glance is not spoken of.
-    assert headline(_seen(1.0, elsewhere=UnpaintedChange(1.0, 5.0, "annex"))) == headline(
+    assert headline(_seen(1.0, unpainted_change=UnpaintedChange(1.0, 5.0, "annex"))) == headline(
         _seen(1.0)
     )
 
@@ -241,10 +243,10 @@ def test_what_a_render_would_have_missed_is_said(make_basis: BasisFactory):
 
 
 def test_an_answer_that_is_worse_than_the_present_says_so_first():
-    worse = _seen(3.6, 3.4, there=("lamp",))
+    worse = _seen(3.6, 3.4, local_lights=("lamp",))
     assert headline(worse).startswith(
         "The present lighting comes closer to the paint (mean ΔE 3.4) than this answer (3.6): "
         "keep the scene as it is. "
     )
     # What nobody reads is no difference.
-    assert not headline(_seen(3.42, 3.4, there=("lamp",))).startswith("The present lighting")
+    assert not headline(_seen(3.42, 3.4, local_lights=("lamp",))).startswith("The present lighting")

@@ -37,7 +37,7 @@ class Roles:
 def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Roles:
     """Tell the layers of the file or folder at `path` apart. Raises BasisError where names do not.
 
-    pattern: as of `choose_layers`.
+    pattern: as in `choose_layers`.
     """
     layers = {layer.name: layer for layer in read}
     choice = _choose_roles(path, layers, pattern)

@@ -150,7 +150,7 @@ def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
         raise BasisError(f"{path} holds NaN or Inf in every pixel: render it again")
     _check_light(path, roles.lights, holes)
     missing = _missing_light(roles, holes)
-    listed = f"light groups as of {roles.renderer}: {some_names(names)}"
+    listed = f"light groups named as in {roles.renderer}: {some_names(names)}"
     if beauty is not None:
         listed += f"; the whole picture: {beauty.name or 'R, G, B'}"
     remarks = [*told, listed, *roles.remarks, missing.told]

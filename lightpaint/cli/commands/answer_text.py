@@ -87,9 +87,12 @@ def _sentences(look: Look, table: Table) -> list[str]:
     choice = closer_choice(look.analysis.color_choices)
     closer = [f"Other colours come closer: --colors {choice}."] if choice else []
     if table == "short":
-        is_told = not look.analysis.seen.is_close
+        is_told = not look.analysis.appearance.is_close
         return [*(_what_holds(look)[:1] if is_told else []), *closer]
-    told = [*error_sentences(look.diagnosis, look.analysis.seen, holds=_what_holds(look)), *closer]
+    told = [
+        *error_sentences(look.diagnosis, look.analysis.appearance, holds=_what_holds(look)),
+        *closer,
+    ]
     if look.uncertainty is not None:
         told.append(uncertainty_sentence(look.basis, look.solution, look.uncertainty))
     return told
@@ -97,9 +100,9 @@ def _sentences(look: Look, table: Table) -> list[str]:
 
 def _what_holds(look: Look) -> list[str]:
     """Return what keeps the lights from the painting, the main reason first, with options."""
-    if not look.analysis.seen.reasons:
+    if not look.analysis.appearance.reasons:
         return bound_sentences(look.diagnosis)
-    told = [_spoken_cause(look, reason) for reason in look.analysis.seen.reasons]
+    told = [_spoken_cause(look, reason) for reason in look.analysis.appearance.reasons]
     return [sentence for sentence in told if sentence][:2]
 
 
@@ -139,8 +142,8 @@ def left_open(look: Look) -> str:
     told = []
     if dark:
         told.append(f"the picture shows nothing of {some_names(dark)}: kept as it is")
-    if seen := [name for name in unreached if name not in dark]:
-        told.append(f"no painted pixel sees {some_names(seen)}: kept as it is")
+    if appearance := [name for name in unreached if name not in dark]:
+        told.append(f"no painted pixel sees {some_names(appearance)}: kept as it is")
     told += partly_reached(look.lighting)
     told += [ambiguity.sentence for ambiguity in look.analysis.ambiguities]
     return f"the painting leaves lights open: {some_of(told, joint='; ')}" if told else ""
@@ -222,11 +225,15 @@ def _color(look: Look, light: LightSetting) -> str | None:
 
 def _spoken_color(look: Look, light: LightSetting) -> str:
     """Return `2700 K` for nearly white, else `#ff2010`."""
-    seen = look.lighting.photometry(light)
-    if light.is_fixed or seen.hex is None:
+    appearance = look.lighting.photometry(light)
+    if light.is_fixed or appearance.hex is None:
         return ""
-    is_white = seen.kelvin is not None and seen.duv is not None and abs(seen.duv) <= WHITE
-    return f"{seen.kelvin:.0f} K" if is_white else seen.hex
+    is_white = (
+        appearance.kelvin is not None
+        and appearance.duv is not None
+        and abs(appearance.duv) <= WHITE
+    )
+    return f"{appearance.kelvin:.0f} K" if is_white else appearance.hex
 
 
 def _show_all(look: Look) -> None:
@@ -239,7 +246,7 @@ def _show_all(look: Look) -> None:
     table = terminal.table(*headings, *amounts, *asked)
     errors = spoken_errors(look.uncertainty, len(shares))
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
-        seen = look.lighting.photometry(light)
+        appearance = look.lighting.photometry(light)
         table.row(
             light.name,
             light.plugin,
@@ -248,8 +255,8 @@ def _show_all(look: Look) -> None:
             errors[k],
             "" if light.is_fixed else light.unit,
             f"{100 * shares[k]:.1f} %",
-            "" if light.is_fixed else seen.color,
-            *seen.amounts[: len(amounts)],
+            "" if light.is_fixed else appearance.color,
+            *appearance.amounts[: len(amounts)],
             *([light.constraint + "*" * light.is_active] if held else []),
         )
     terminal.print_table(table)

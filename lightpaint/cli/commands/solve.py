@@ -52,7 +52,9 @@ def solve(
         _show(job, looks, table)
         for view, look in zip(job.views, looks, strict=True):
             results.append((job, view, look))
-            shortfalls += [f"{view.folder} {x}" for x in wanted.shortfalls(look.analysis.seen)]
+            shortfalls += [
+                f"{view.folder} {x}" for x in wanted.shortfalls(look.analysis.appearance)
+            ]
     if several is not None:
         several.show(obtained or [])
     if jobs and not jobs[0].scenes and jobs[0].groups is None:

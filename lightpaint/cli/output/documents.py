@@ -85,8 +85,8 @@ def result_document(job: Job, view: PaintedView, look: Look, wanted: Tolerances)
         "view": str(view.folder),
         "files": [str(x) for x in files if x.is_file() and x.parent not in others],
         "verdict": look.verdict,
-        "is_close": look.analysis.seen.is_close,
-        **wanted.document(look.analysis.seen),
+        "is_close": look.analysis.appearance.is_close,
+        **wanted.document(look.analysis.appearance),
         "report": _in_file(view.folder / "report.json"),
         "lighting": _in_file(job.folder / "lighting.json"),
     }

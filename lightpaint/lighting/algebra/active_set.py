@@ -86,8 +86,8 @@ def _working_set(q: Quadratic, x: Doubles) -> _Working:
 def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> Doubles:
     """Return the step (n,) to the optimum of the free unknowns; held caps stay as they are."""
     free = np.flatnonzero(working.free)
-    held = np.flatnonzero(working.capped & (q.A[:, working.free] > 0).any(axis=1))
-    f, k = free.size, held.size
+    held_caps = np.flatnonzero(working.capped & (q.A[:, working.free] > 0).any(axis=1))
+    f, k = free.size, held_caps.size
     move = np.zeros(q.n)
     if f == 0:
         return move
@@ -98,12 +98,12 @@ def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> D
     rest = np.zeros(f + k)
     rest[:f] = -gradient[free]
     if k:
-        A = q.A[np.ix_(held, free)]
+        A = q.A[np.ix_(held_caps, free)]
         matrix[f:, :f], matrix[:f, f:] = A, A.T
-        value = q.A[held] @ x
+        value = q.A[held_caps] @ x
         # The same step corrects round-off in held caps.
-        at_lower = np.abs(value - q.cap_lower[held]) <= np.abs(value - q.cap_upper[held])
-        rest[f:] = np.where(at_lower, q.cap_lower[held], q.cap_upper[held]) - value
+        at_lower = np.abs(value - q.cap_lower[held_caps]) <= np.abs(value - q.cap_upper[held_caps])
+        rest[f:] = np.where(at_lower, q.cap_lower[held_caps], q.cap_upper[held_caps]) - value
     move[free] = np.linalg.solve(matrix, rest)[:f]
     return move
 
@@ -113,8 +113,8 @@ def _exceeded_caps(q: Quadratic, target: Doubles, working: _Working) -> Bools:
     if not q.groups:
         return np.zeros(0, bool)
     value, room = q.A @ target, 64 * EPSILON * (q.A @ np.abs(target))
-    out = (value > q.cap_upper + room) | (value < q.cap_lower - room)
-    return out & ~working.capped
+    exceeded = (value > q.cap_upper + room) | (value < q.cap_lower - room)
+    return exceeded & ~working.capped
 
 
 def _objective_change(q: Quadratic, gradient: Doubles, move: Doubles) -> float:

@@ -27,19 +27,23 @@ def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Double
     for step in range(MAX_STEPS + 1):
         check()
         gradient = q.gradient(x)
-        left = gradient - multipliers @ q.A
+        free_gradient = gradient - multipliers @ q.A
         value = q.A @ x
-        over = np.maximum(value - q.cap_upper, q.cap_lower - value).max()
-        residual = max(kkt_residual(left, x, q.size, q.lower, q.upper), float(over) / q.size)
+        excess = np.maximum(value - q.cap_upper, q.cap_lower - value).max()
+        residual = max(
+            kkt_residual(free_gradient, x, q.size, q.lower, q.upper), float(excess) / q.size
+        )
         if residual <= tolerance or step == MAX_STEPS:
             break
-        free = ~(((x <= q.lower) & (left > 0)) | ((x >= q.upper) & (left < 0)))
-        held = np.flatnonzero((at_lower | at_upper) & (q.A[:, free] > 0).any(axis=1))
-        goal = np.where(at_lower, q.cap_lower, q.cap_upper)[held]
-        move, pushes = _newton(q, gradient, np.flatnonzero(free), held, goal - value[held])
+        free = ~(((x <= q.lower) & (free_gradient > 0)) | ((x >= q.upper) & (free_gradient < 0)))
+        held_caps = np.flatnonzero((at_lower | at_upper) & (q.A[:, free] > 0).any(axis=1))
+        goal = np.where(at_lower, q.cap_lower, q.cap_upper)[held_caps]
+        move, pushes = _newton(
+            q, gradient, np.flatnonzero(free), held_caps, goal - value[held_caps]
+        )
         x = np.clip(x + move, q.lower, q.upper)
         multipliers = np.zeros(len(q.groups))
-        multipliers[held] = pushes
+        multipliers[held_caps] = pushes
         # A cap goes on holding only if it pushes inwards; one that is exceeded begins to hold.
         at_lower, at_upper = at_lower & (multipliers > 0), at_upper & (multipliers < 0)
         value, room = q.A @ x, 64 * EPSILON * (q.A @ np.abs(x))
@@ -50,21 +54,21 @@ def capped_newton(q: Quadratic, x: Doubles, *, tolerance: float) -> tuple[Double
 
 
 def _newton(
-    q: Quadratic, gradient: Doubles, free: Indices, held: Indices, short: Doubles
+    q: Quadratic, gradient: Doubles, free: Indices, held_caps: Indices, shortfall: Doubles
 ) -> tuple[Doubles, Doubles]:
     """Return the step to the optimum of the free unknowns, (n,), and the multipliers of held caps,
     (h,).
 
-    short: (h,), the changes that the sums under these caps need.
+    shortfall: (h,), the changes that the sums under these caps need.
     """
-    f, k = free.size, held.size
+    f, k = free.size, held_caps.size
     move = np.zeros(q.n)
     matrix, right = np.zeros((f + k, f + k)), np.zeros(f + k)
     matrix[:f, :f] = q.M[free][:, free]
     matrix.flat[: f * (f + k) : f + k + 1] += RIDGE * np.sqrt(f)
-    A = q.A[held][:, free]
+    A = q.A[held_caps][:, free]
     matrix[f:, :f], matrix[:f, f:] = A, -A.T
-    right[:f], right[f:] = -gradient[free], short
+    right[:f], right[f:] = -gradient[free], shortfall
     solved = np.linalg.solve(matrix, right) if f else right
     move[free] = solved[:f]
     return move, np.asarray(solved[f:])

@@ -66,15 +66,15 @@ def _newton(M: Doubles, gradient: Doubles, free: Bools) -> tuple[Doubles, Double
     # All matrices have the unknowns that are free in any problem. An unknown that is not free in
     # one has a row of the identity there, which moves nothing.
     rows = np.flatnonzero(free.any(axis=0))
-    here = free[:, rows]
+    is_free = free[:, rows]
     matrix = M.copy() if rows.size == M.shape[1] else M[:, rows][:, :, rows]
     diagonal = np.einsum("cii->ci", matrix)  # which looks at its memory
     right = -gradient[:, rows]
-    if not here.all():
-        matrix *= here[:, :, None]
-        matrix *= here[:, None, :]
-        diagonal += ~here
-        right *= here
+    if not is_free.all():
+        matrix *= is_free[:, :, None]
+        matrix *= is_free[:, None, :]
+        diagonal += ~is_free
+        right *= is_free
     diagonal += RIDGE * rows.size**0.5
     move = np.zeros_like(gradient)
     move[:, rows] = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]

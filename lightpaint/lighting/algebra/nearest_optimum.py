@@ -46,6 +46,6 @@ def nearest_equal(q: Quadratic, x: Doubles, begin: Doubles) -> Doubles:
     # Straight back, up to the first bound.
     room = np.where(away > 0, x[f] - q.lower[f], q.upper[f] - x[f])
     part = float(np.min(room / np.abs(away), initial=1.0))
-    moved = x.copy()
-    moved[f] = np.clip(x[f] - part * away, q.lower[f], q.upper[f])
-    return moved if f.size else x
+    nearest = x.copy()
+    nearest[f] = np.clip(x[f] - part * away, q.lower[f], q.upper[f])
+    return nearest if f.size else x

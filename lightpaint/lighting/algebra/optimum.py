@@ -94,10 +94,10 @@ def minimise(
     with one_thread():
         x, sweeps, steps = by_method(q, x, tolerance, max_sweeps)
         left, multipliers, residual = q.violations(x)
-        if steps and (near := nearest_equal(q, x, start_at)) is not x:
-            there = q.violations(near)
-            if there[2] <= max(tolerance, residual):
-                x, (left, multipliers, residual) = near, there
+        if steps and (nearest := nearest_equal(q, x, start_at)) is not x:
+            violations = q.violations(nearest)
+            if violations[2] <= max(tolerance, residual):
+                x, (left, multipliers, residual) = nearest, violations
     return Optimum(
         _unscaled(q, x, lower, upper),
         left / q.scale,
@@ -126,9 +126,9 @@ def minimise_each(
     the arithmetic in them, so that the same calls solve all problems; larger ones run on threads.
     """
     count, n = b.shape
-    found: dict[int, Optimum] = {}
+    optima: dict[int, Optimum] = {}
     if n <= MAX_BATCHED_UNKNOWNS and method == "polished" and max_sweeps > 0:
-        found = _solve_together(M, b, lower, upper, start, tolerance)
+        optima = _solve_together(M, b, lower, upper, start, tolerance)
 
     def solve(c: int) -> Optimum:
         return minimise(
@@ -142,14 +142,14 @@ def minimise_each(
             max_sweeps=max_sweeps,
         )
 
-    left = [c for c in range(count) if c not in found]
+    left = [c for c in range(count) if c not in optima]
     solved = (
         parallel_map(solve, left)
         if n > MAX_BATCHED_UNKNOWNS and len(left) > 1
         else map(solve, left)
     )
-    found.update(zip(left, solved, strict=True))
-    return [found[c] for c in range(count)]
+    optima.update(zip(left, solved, strict=True))
+    return [optima[c] for c in range(count)]
 
 
 def _solve_together(
@@ -207,9 +207,9 @@ def _solve_polished(
     _, _, residual = q.violations(x)
     sweeps, steps = 0, 0
     if residual > tolerance and max_sweeps > 0 and q.groups:
-        found, kkt, steps = capped_newton(q, x, tolerance=tolerance)
-        if kkt <= tolerance and q.violations(found)[2] <= tolerance:
-            return found, 0, steps
+        solved, kkt, steps = capped_newton(q, x, tolerance=tolerance)
+        if kkt <= tolerance and q.violations(solved)[2] <= tolerance:
+            return solved, 0, steps
     elif residual > tolerance and max_sweeps > 0:
         trial, left, steps, _ = clipped_newton(
             q.M[None],
@@ -228,8 +228,8 @@ def _solve_polished(
         for _ in range(min(count, max_sweeps - sweeps)):
             sweep(q, x, gradient)
             sweeps += 1
-        x, taken = polish(q, x, tolerance=tolerance, max_steps=50 + 3 * min(q.n, 300))
-        steps += taken
+        x, extra_steps = polish(q, x, tolerance=tolerance, max_steps=50 + 3 * min(q.n, 300))
+        steps += extra_steps
         _, _, residual = q.violations(x)
         if residual <= q.round_off(x) or sweeps >= 8 * SWEEPS_BETWEEN:
             break

@@ -63,13 +63,15 @@ class Quadratic:
         """Return the nearest point to x that keeps to all bounds and caps."""
         x = np.clip(x, self.lower, self.upper)
         value = self.A @ x
-        wanted = np.minimum(np.maximum(value, self.cap_lower), self.cap_upper)
-        out = np.flatnonzero(value != wanted)
-        for size in {self.groups[k].size for k in out}:
-            caps = np.array([k for k in out if self.groups[k].size == size])
-            its = np.stack([self.groups[k] for k in caps])
-            low, high = self.lower[its], self.upper[its]
-            x[its] = clip_to_sums(self.A[caps[:, None], its], x[its], low, high, wanted[caps])
+        goal = np.minimum(np.maximum(value, self.cap_lower), self.cap_upper)
+        violated = np.flatnonzero(value != goal)
+        for size in {self.groups[k].size for k in violated}:
+            caps = np.array([k for k in violated if self.groups[k].size == size])
+            members = np.stack([self.groups[k] for k in caps])
+            low, high = self.lower[members], self.upper[members]
+            x[members] = clip_to_sums(
+                self.A[caps[:, None], members], x[members], low, high, goal[caps]
+            )
         return x
 
     def active_caps(self, x: Doubles) -> tuple[Bools, Bools]:
@@ -120,8 +122,8 @@ class Quadratic:
         residual = kkt_residual(gradient, x, self.size, self.lower, self.upper)
         if self.groups:
             value = self.A @ x
-            over = np.maximum(value - self.cap_upper, self.cap_lower - value).max()
-            residual = max(residual, float(over) / self.size)
+            excess = np.maximum(value - self.cap_upper, self.cap_lower - value).max()
+            residual = max(residual, float(excess) / self.size)
         return gradient, multipliers, residual
 
     def round_off(self, x: Doubles) -> float:
@@ -238,11 +240,11 @@ def clip_to_sums(a: Doubles, x: Doubles, low: Doubles, high: Doubles, goal: Doub
     first, last = walls[rows, after], walls[rows, after + 1]
     # A t between the two that enclose the answer.
     least, most = (np.where(np.isfinite(end), end, 0) for end in (first, last))
-    some = (least + most) / 2
-    some = np.where(np.isfinite(last), some, least + 1)
-    some = np.where(np.isfinite(first), some, np.where(np.isfinite(last), most - 1, 0))
-    there = x + some[:, None] * a
-    slope = (np.square(a) * ((there > low) & (there < high))).sum(axis=1)
-    short = goal - (a * np.clip(there, low, high)).sum(axis=1)
-    t = np.clip(some + short / np.where(slope > 0, slope, np.inf), first, last)
+    middle = (least + most) / 2
+    middle = np.where(np.isfinite(last), middle, least + 1)
+    middle = np.where(np.isfinite(first), middle, np.where(np.isfinite(last), most - 1, 0))
+    moved = x + middle[:, None] * a
+    slope = (np.square(a) * ((moved > low) & (moved < high))).sum(axis=1)
+    short = goal - (a * np.clip(moved, low, high)).sum(axis=1)
+    t = np.clip(middle + short / np.where(slope > 0, slope, np.inf), first, last)
     return np.asarray(np.clip(x + t[:, None] * a, low, high))

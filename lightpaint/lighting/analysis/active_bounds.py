@@ -93,11 +93,11 @@ def _unchosen_bound(o: BoundedAnswer, place: int) -> ActiveBound:
 
 def _zero_bounds(o: BoundedAnswer, place: int) -> Iterator[ActiveBound]:
     """Yield the bound at zero of a light that would rather be negative."""
-    knob, its = o.reduction.knobs[place], list(o.reduction.places[place])
-    off = (o.reduction.lower[its] == 0) & (o.optimum.x[its] == 0)
-    if not off.any() or (not off.all() and not knob.is_free):
+    knob, unknowns = o.reduction.knobs[place], list(o.reduction.places[place])
+    is_off = (o.reduction.lower[unknowns] == 0) & (o.optimum.x[unknowns] == 0)
+    if not is_off.any() or (not is_off.all() and not knob.is_free):
         return  # a light that mixes primaries is on if one of them is
-    forces = np.where(off, 2 * np.maximum(o.optimum.multipliers[its], 0), 0)
+    forces = np.where(is_off, 2 * np.maximum(o.optimum.multipliers[unknowns], 0), 0)
     powers = np.array([_power(o, x) for x in knob.unknowns])
     forces = np.where(powers > 0, forces, 0)
     if not forces.any():
@@ -110,19 +110,19 @@ def _zero_bounds(o: BoundedAnswer, place: int) -> Iterator[ActiveBound]:
 
 def _constraint_bound(o: BoundedAnswer, place: int) -> ActiveBound:
     """Return the constraint on a light that has a knob, or on the lights of one dimmer."""
-    knob, its = o.reduction.knobs[place], list(o.reduction.places[place])
+    knob, unknowns = o.reduction.knobs[place], list(o.reduction.places[place])
     lights, estimate = knob.lights, _release_estimate(o, knob.lights)
     if len(lights) > 1:
         [unknown] = knob.unknowns
-        each = tuple(2 * float(rgb @ o.gradient[k]) for k, rgb in unknown.columns)
-        return ActiveBound(lights, "tie", estimate, each, "dimmer", place)
+        multipliers = tuple(2 * float(rgb @ o.gradient[k]) for k, rgb in unknown.columns)
+        return ActiveBound(lights, "tie", estimate, multipliers, "dimmer", place)
     [k] = lights
-    at_limit = np.array([_is_at_limit(o, i) for i in its])
-    forces = np.where(at_limit, 2 * o.optimum.multipliers[its], 0)
+    at_limit = np.array([_is_at_limit(o, i) for i in unknowns])
+    forces = np.where(at_limit, 2 * o.optimum.multipliers[unknowns], 0)
     cap = sum(
         2 * float(o.optimum.cap_multipliers[j])
         for j, cap in enumerate(o.reduction.caps)
-        if cap.unknowns[0] == its[0]
+        if cap.unknowns[0] == unknowns[0]
     )
     if forces.any() and knob.is_free:
         # With a limit of luminance besides, a channel feels both.

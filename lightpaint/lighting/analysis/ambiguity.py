@@ -37,13 +37,13 @@ class Ambiguity:
     def sentence(self) -> str:
         """The meaning and the remedy, as a sentence."""
         lights = " and ".join([", ".join(self.names[:-1]), self.names[-1]])
-        what = (
+        effect = (
             f"mixes of {lights} light the painted part alike"
             if self.is_mix
             else f"{lights} light the painted part alike"
         )
         return (
-            f"{what}: only their sum is determined. A wider mask or another view "
+            f"{effect}: only their sum is determined. A wider mask or another view "
             "would tell them apart; or tie them, or keep one as it is"
         )
 
@@ -86,7 +86,7 @@ def indistinguishable(
             groups.append([i])
         else:
             home.append(i)
-    found = [
+    ambiguities = [
         Ambiguity(
             tuple(names[i] for i in group),
             max(0.0, 1 - min(_least_cosine(cosines, lit, group[0], i) for i in group[1:])),
@@ -106,7 +106,7 @@ def indistinguishable(
                 part = np.abs(vector) > MIN_PART * np.abs(vector).max()
                 mixed = tuple(names[i] for i in heads[part].tolist())
                 mixes[mixed] = min(mixes.get(mixed, np.inf), max(0.0, float(value)))
-    return (*found, *(Ambiguity(mixed, left, is_mix=True) for mixed, left in mixes.items()))
+    return (*ambiguities, *(Ambiguity(mixed, left, is_mix=True) for mixed, left in mixes.items()))
 
 
 def _least_cosine(cosines: Doubles, lit: Bools, i: int, j: int) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 from lightpaint.images.bands import in_turns
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.ambiguity import Ambiguity, ambiguities
-from lightpaint.lighting.analysis.appearance.appearance import Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance, compare_appearance
 from lightpaint.lighting.analysis.appearance.color_choices import (
     Choices,
     best_by_colors,
@@ -30,7 +30,7 @@ class Analysis:
         solution: The solution, with its errors, and with active bounds in its certificate.
         uncertainty: The errors of the lights, None if the noise is unknown.
         diagnosis: The reasons why the painting is not met.
-        seen: The visible difference between answer and painting.
+        appearance: The visible difference between answer and painting.
         ambiguities: Lights that the painting cannot tell apart, if there are no constraints.
         unconstrained: The best answer without constraints, None if there are none, and for one view
             of several.
@@ -46,7 +46,7 @@ class Analysis:
     solution: Solution
     uncertainty: Uncertainty | None
     diagnosis: Diagnosis
-    seen: Seen
+    appearance: Appearance
     ambiguities: tuple[Ambiguity, ...]
     unconstrained: Solution | None
     color_choices: Choices = ()
@@ -75,19 +75,27 @@ def analyse(solution: Solution) -> tuple[Analysis, ...]:
     # All of them ask for it.
     solution.basis.predict(solution.weights)
     # The jobs are independent, and each leaves a processor idle now and then.
-    answers = iter(in_turns(lambda ask: ask(), jobs, solution.basis.size))
-    looked_at: list[tuple[Seen, Diagnosis]] = [next(answers) for _ in views]
-    seen = [its for its, _ in looked_at]
+    answers = iter(in_turns(lambda call: call(), jobs, solution.basis.size))
+    looked_at: list[tuple[Appearance, Diagnosis]] = [next(answers) for _ in views]
+    appearances = [view_appearance for view_appearance, _ in looked_at]
     diagnoses = [diagnosis for _, diagnosis in looked_at]
     uncertainty, best, alike = next(answers), next(answers), next(answers)
     solution = with_error_bars(solution, uncertainty)
-    choices = color_choices(solution, [its.delta_e for its in seen], best)
-    found = []
-    for view, its, diagnosis, colors in zip(solution.views, seen, diagnoses, choices, strict=True):
-        told = view.with_certificate_fields(bounds=diagnosis.bounds, **_certificate_fields(its))
+    choices = color_choices(
+        solution, [view_appearance.delta_e for view_appearance in appearances], best
+    )
+    analyses = []
+    for view, view_appearance, diagnosis, colors in zip(
+        solution.views, appearances, diagnoses, choices, strict=True
+    ):
+        certified = view.with_certificate_fields(
+            bounds=diagnosis.bounds, **_certificate_fields(view_appearance)
+        )
         free = next(answers)
-        found.append(Analysis(told, uncertainty, diagnosis, its, alike, free, colors))
-    return tuple(found)
+        analyses.append(
+            Analysis(certified, uncertainty, diagnosis, view_appearance, alike, free, colors)
+        )
+    return tuple(analyses)
 
 
 def _ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
@@ -97,17 +105,23 @@ def _ambiguities(solution: Solution) -> tuple[Ambiguity, ...]:
 def with_findings(solution: Solution, analyses: tuple[Analysis, ...]) -> Solution:
     """Return the answer to all views with its analysis, for lighting.json."""
     first = analyses[0]
-    seen = first.seen if len(analyses) == 1 else what_is_seen(solution)
-    told = with_error_bars(solution, first.uncertainty)
-    return told.with_certificate_fields(bounds=first.diagnosis.bounds, **_certificate_fields(seen))
+    appearance = first.appearance if len(analyses) == 1 else compare_appearance(solution)
+    with_errors = with_error_bars(solution, first.uncertainty)
+    return with_errors.with_certificate_fields(
+        bounds=first.diagnosis.bounds, **_certificate_fields(appearance)
+    )
 
 
-def _appearance_and_diagnosis(view: Solution) -> tuple[Seen, Diagnosis]:
+def _appearance_and_diagnosis(view: Solution) -> tuple[Appearance, Diagnosis]:
     """Return the visible difference of a view from its painting, and the diagnosis."""
     diagnosis = diagnose(view)
-    return what_is_seen(view, diagnosis=diagnosis), diagnosis
+    return compare_appearance(view, diagnosis=diagnosis), diagnosis
 
 
-def _certificate_fields(seen: Seen) -> dict[str, float]:
+def _certificate_fields(appearance: Appearance) -> dict[str, float]:
     """Return the differences as fields of a certificate."""
-    return {"delta_e": seen.delta_e, "delta_e_noise": seen.noise, "delta_e_asked": seen.asked}
+    return {
+        "delta_e": appearance.delta_e,
+        "delta_e_noise": appearance.noise,
+        "delta_e_asked": appearance.requested_change,
+    }

@@ -43,11 +43,11 @@ def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
     equations = problem.with_pull(problem.solved)
     answer = _bounded_answer(solution, equations)
     least = MIN_GAIN * float(solution.equations.target_norm2.sum())
-    held = [h for h in find_active_bounds(answer) if h.estimate > least]
-    held.sort(key=lambda h: -h.estimate)
+    active = [h for h in find_active_bounds(answer) if h.estimate > least]
+    active.sort(key=lambda h: -h.estimate)
     before, bounds = _relative_objective(problem.solved, answer.w), []
     size = len(answer.reduction.unknowns) // len(answer.reduction.channel_groups)
-    for h in held[: min(max(MAX_UNKNOWNS // max(size, 1), MIN_RELEASED), MAX_RELEASED)]:
+    for h in active[: min(max(MAX_UNKNOWNS // max(size, 1), MIN_RELEASED), MAX_RELEASED)]:
         reduction, x = _release(answer, h)
         if h.kind == "left out" and reduction.knobs[h.knob].whites is not None:
             freed = next_whites(equations, reduction, answer.w, only=[h.knob])[1]
@@ -61,31 +61,31 @@ def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
         label = answer.full.labels[h.lights[0]]
         held_by = h.kind if h.kind in ("zero", "kept", "left out") else label
         bounds.append(Bound(names, h.kind, held_by, gain, h.multiplier, h.per, tint))
-    return tuple(sorted(bounds, key=lambda bound: -bound.gain)), len(held) - len(bounds)
+    return tuple(sorted(bounds, key=lambda bound: -bound.gain)), len(active) - len(bounds)
 
 
 def _bounded_answer(solution: Solution, equations: NormalEquations) -> BoundedAnswer:
     reduction = solution.problem.local_reduction
-    found = solve_reduced(equations, reduction, solution.weights)
+    optimum = solve_reduced(equations, reduction, solution.weights)
     lit = equations.reached
     return BoundedAnswer(
         solution.basis,
         reduction,
         solution.problem.full,
-        found,
-        np.where(lit, equations.gradient(found.weights), 0),
+        optimum,
+        np.where(lit, equations.gradient(optimum.weights), 0),
         np.where(lit, np.einsum("cii->ic", equations.M), 0),
         tuple(light.is_active for light in solution.lighting.lights),
     )
 
 
-def _tint(o: BoundedAnswer, held: ActiveBound, freed: Doubles) -> Tint:
+def _tint(o: BoundedAnswer, bound: ActiveBound, freed: Doubles) -> Tint:
     """Return the side of its range of white to which a light goes in weights (n, 3) after
     release."""
-    its = [knob.whites for knob in o.full.knobs if knob.lights == held.lights]
-    if held.kind != "colour" or not its or (whites := its[0]) is None:
+    white_ranges = [knob.whites for knob in o.full.knobs if knob.lights == bound.lights]
+    if bound.kind != "colour" or not white_ranges or (whites := white_ranges[0]) is None:
         return ""
-    [green] = whites.greener(freed[list(held.lights)])
+    [green] = whites.greener(freed[list(bound.lights)])
     if abs(green) <= VISIBLE_DUV:
         return ""
     return "greener" if green > 0 else "pinker"
@@ -97,25 +97,27 @@ def _relative_objective(equations: NormalEquations, w: Doubles) -> float:
     return float(quadratic - 2 * np.einsum("ci,ic->", equations.b, w))
 
 
-def _release(o: BoundedAnswer, held: ActiveBound) -> tuple[Reduction, Doubles]:
+def _release(o: BoundedAnswer, bound: ActiveBound) -> tuple[Reduction, Doubles]:
     """Return the reduction without one bound, and the answer in its unknowns."""
     knobs, x = [*o.reduction.knobs], o.optimum.x
-    if held.kind == "left out":
-        knobs[held.knob] = move_to_best_white(o.full.knobs[held.knob], o.gradient)
-    elif held.kind == "zero":
-        knob, its = knobs[held.knob], o.reduction.places[held.knob]
+    if bound.kind == "left out":
+        knobs[bound.knob] = move_to_best_white(o.full.knobs[bound.knob], o.gradient)
+    elif bound.kind == "zero":
+        knob, places = knobs[bound.knob], o.reduction.places[bound.knob]
         below = tuple(
             replace(u, lower=-np.inf, upper=0.0) if x[i] == 0 else u
-            for u, i in zip(knob.unknowns, its, strict=True)
+            for u, i in zip(knob.unknowns, places, strict=True)
         )
-        knobs[held.knob] = replace(knob, unknowns=below)
-    if held.kind in ("left out", "zero"):
+        knobs[bound.knob] = replace(knob, unknowns=below)
+    if bound.kind in ("left out", "zero"):
         return replace(o.reduction, knobs=tuple(knobs)), x
-    left = [k for k, knob in enumerate(knobs) if not set(knob.lights) & set(held.lights)]
+    left = [k for k, knob in enumerate(knobs) if not set(knob.lights) & set(bound.lights)]
     weights = o.reduction.fixed_weights.copy()
-    weights[list(held.lights)] = 0
-    freed = [Knob.of_any_colour(k, is_scalar=o.basis.lights[k].is_scalar) for k in held.lights]
+    weights[list(bound.lights)] = 0
+    freed = [Knob.of_any_colour(k, is_scalar=o.basis.lights[k].is_scalar) for k in bound.lights]
     values = [x[list(o.reduction.places[k])] for k in left]
     values += [o.w[k.lights[0], : len(k.unknowns)] for k in freed]
-    made = replace(o.reduction, fixed_weights=weights, knobs=(*(knobs[k] for k in left), *freed))
-    return made, np.concatenate(values)
+    released = replace(
+        o.reduction, fixed_weights=weights, knobs=(*(knobs[k] for k in left), *freed)
+    )
+    return released, np.concatenate(values)

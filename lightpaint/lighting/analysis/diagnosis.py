@@ -124,8 +124,8 @@ def error_shares(diagnosis: Diagnosis) -> dict[str, float]:
         return {}
     parts = ("unreachable", "forbidden", "compromise", "noise", "painting_noise")
     shares = {part: diagnosis.share(getattr(diagnosis, part)) for part in parts}
-    told = sorted(shares.items(), key=lambda item: -item[1])
-    return {part: share for part, share in told if share >= 0.005}
+    sorted_shares = sorted(shares.items(), key=lambda item: -item[1])
+    return {part: share for part, share in sorted_shares if share >= 0.005}
 
 
 @keywords()
@@ -201,9 +201,11 @@ def unbounded_weights(solution: Solution) -> Doubles:
     """Return the closest weights (n, 3) of any sign; kept lights stay at 1."""
     equations, weights = solution.equations, solution.weights
     whole = equations.full_matrix
-    for to in all_columns(solution):
+    for columns in all_columns(solution):
         gradient = np.einsum("cij,jc->ci", equations.M, weights) - equations.b
-        step = to @ pseudo_inverse(to.T @ whole @ to) @ (to.T @ gradient.ravel())
+        step = (
+            columns @ pseudo_inverse(columns.T @ whole @ columns) @ (columns.T @ gradient.ravel())
+        )
         weights = weights - step.reshape(3, -1).T
     return weights
 

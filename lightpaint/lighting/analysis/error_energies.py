@@ -52,7 +52,7 @@ class ErrorEnergies:
             uncounted = np.where(np.any(target.image[rows] > 0, axis=-1), uncounted, 0)
             outside = target.image[rows].astype(np.float64) - mixed
             is_linear = solution.problem.is_linear
-            seen = outside if is_linear else loss.cut(lambda x: x[rows]).residual(mixed)
+            residual = outside if is_linear else loss.cut(lambda x: x[rows]).residual(mixed)
             unreachable_map[rows] = unreachable
             ignored_map[rows] = uncounted * luminance(outside)
             return np.array(
@@ -60,7 +60,7 @@ class ErrorEnergies:
                     (D * np.square(missed)).sum(),
                     (D * np.square(unreachable)).sum(),
                     (D * np.square(noise.reshape(missed.shape))).sum(),
-                    (uncounted[..., None] * np.square(seen)).sum(),
+                    (uncounted[..., None] * np.square(residual)).sum(),
                     (D * np.square(image)).sum(),
                 ]
             )
@@ -79,7 +79,7 @@ def grain_power(solution: Solution, unreachable: Doubles) -> float:
     counted, weight = solution.importance > 0, solution.weight
     power = 0.0
     for c in range(3):
-        its = np.sqrt(weight[..., c % weight.shape[2]].astype(np.float64))
-        its *= unreachable[..., c]
-        power += float(channel_grain(its, counted).sum())
+        root_weight = np.sqrt(weight[..., c % weight.shape[2]].astype(np.float64))
+        root_weight *= unreachable[..., c]
+        power += float(channel_grain(root_weight, counted).sum())
     return power

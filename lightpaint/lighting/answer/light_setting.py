@@ -55,16 +55,16 @@ class LightSetting:
         if not self.members:
             object.__setattr__(self, "members", (self.name,))
         self._check_errors()
-        given = {"emission": self.emission, "weight": self.weight}
-        for what, rgb in given.items():
+        values = {"emission": self.emission, "weight": self.weight}
+        for name, rgb in values.items():
             if not all(map(is_amount, rgb)):
                 raise LightingError(
-                    f"light {self.name!r} has the {what} {list(rgb)}: need three numbers from 0 "
+                    f"light {self.name!r} has the {name} {list(rgb)}: need three numbers from 0 "
                     f"to {BRIGHTEST:g}"
                 )
             if self.is_fixed and rgb != (1, 1, 1):
                 raise LightingError(
-                    f"light {self.name!r} is kept as it is, so its {what} must be 1 1 1, "
+                    f"light {self.name!r} is kept as it is, so its {name} must be 1 1 1, "
                     f"not {list(rgb)}"
                 )
         if self.unit_flux and not all(map(is_amount, self.unit_flux)):

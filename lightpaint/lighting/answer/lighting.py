@@ -51,9 +51,11 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
     def __repr__(self) -> str:
         rgb = [" ".join(f"{v:.4g}" for v in light.emission) for light in self.lights]
-        told = [f"{light.name} {its}" for light, its in zip(self.lights, rgb, strict=True)]
+        texts = [
+            f"{light.name} {emission}" for light, emission in zip(self.lights, rgb, strict=True)
+        ]
         target = f" for {self.target}" if self.target else ""
-        return f"Lighting({len(told)} lights{target}: {some_of(told, room=600)})"
+        return f"Lighting({len(texts)} lights{target}: {some_of(texts, room=600)})"
 
     def __post_init__(self) -> None:
         names = [light.name for light in self.lights]
@@ -107,13 +109,13 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
         The colour of a light that reaches something in some channels only is unknown.
         """
-        seen = photometry(
+        measured = photometry(
             light.emission,
             unit=light.unit,
             unit_flux=light.unit_flux,
             cd_per_unit=self.cd_per_unit,
         )
-        return seen.without_colour() if light.is_partly_reached else seen
+        return measured.without_colour() if light.is_partly_reached else measured
 
     def to_dataframe(self) -> Any:
         """Return a pandas.DataFrame with a row for each light, by its name.
@@ -126,16 +128,16 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         return pandas().DataFrame(rows, index=pandas().Index([*self], name="light"))
 
     def _row(self, light: LightSetting) -> dict[str, Any]:
-        seen, nothing = self.photometry(light), (None, None, None)
+        measured, nothing = self.photometry(light), (None, None, None)
         errors = [number(x) for x in light.standard_error or nothing]
         ends = [x or (math.nan, math.nan) for x in light.interval or nothing]
         return {
             **by_channel("", light.emission),
             "unit": light.unit,
-            "y": seen.y,
-            "kelvin": number(seen.kelvin),
-            "duv": number(seen.duv),
-            "hex": seen.hex,
+            "y": measured.y,
+            "kelvin": number(measured.kelvin),
+            "duv": number(measured.duv),
+            "hex": measured.hex,
             **by_channel("error", errors),
             **by_channel("lower", [x[0] for x in ends]),
             **by_channel("upper", [x[1] for x in ends]),
@@ -174,7 +176,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
         Raises UnknownLightError if there is no such light.
         """
-        changed = self[name]
+        old = self[name]
         lights = tuple(
             replace(
                 light,
@@ -187,7 +189,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                 interval=None,
                 untold=False,
             )
-            if light is changed
+            if light is old
             else light
             for light in self.lights
         )
@@ -210,7 +212,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         *,
         labels: Sequence[tuple[str, bool]] | None = None,
         reached: Bools | None = None,
-        **about: Any,
+        **fields: Any,
     ) -> "Lighting":
         """Make a lighting of weights (n, 3) in the order of `lights`, which may be those of a
         basis.
@@ -218,17 +220,22 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         labels: for each light its `constraint` and whether this `is_active`. reached: (n, 3).
         """
         if isinstance(lights, Basis):
-            about.setdefault("scene_identity", lights.origin.scene_identity)
+            fields.setdefault("scene_identity", lights.origin.scene_identity)
             lights = lights.lights
         count = len(lights)
-        told = np.ones((count, 3), dtype=bool) if reached is None else reached
+        is_reached = np.ones((count, 3), dtype=bool) if reached is None else reached
         settings = tuple(
-            _setting(light, as_rgb(weight), one, (bool(its[0]), bool(its[1]), bool(its[2])))
-            for light, weight, one, its in zip(
-                lights, weights, labels or [("", False)] * count, told, strict=True
+            _setting(
+                light,
+                as_rgb(weight),
+                label,
+                (bool(channels[0]), bool(channels[1]), bool(channels[2])),
+            )
+            for light, weight, label, channels in zip(
+                lights, weights, labels or [("", False)] * count, is_reached, strict=True
             )
         )
-        return cls(settings, **about)
+        return cls(settings, **fields)
 
     @classmethod
     @keywords()
@@ -241,12 +248,12 @@ class Lighting(Shown, Mapping[str, LightSetting]):
 
         Raises LightingError if the two do not name the same lights.
         """
-        given = {light.name: light.weight for light in self.lights}
+        by_name = {light.name: light.weight for light in self.lights}
         if isinstance(lights, Basis):
             lights = lights.lights
-        if set(given) != set(lights.names):
-            missing = sorted(set(lights.names) - set(given))
-            unknown = sorted(set(given) - set(lights.names))
+        if set(by_name) != set(lights.names):
+            missing = sorted(set(lights.names) - set(by_name))
+            unknown = sorted(set(by_name) - set(lights.names))
             raise LightingError(
                 "lighting and basis name different lights: "
                 f"missing {some_names(missing) or 'none'}; unknown {some_names(unknown) or 'none'}"
@@ -258,7 +265,7 @@ class Lighting(Shown, Mapping[str, LightSetting]):
                     f"{some_names(self.members[light.name])} in the lighting, of "
                     f"{some_names(light.members)} in the basis"
                 )
-        return np.array([given[name] for name in lights.names], dtype=np.float64)
+        return np.array([by_name[name] for name in lights.names], dtype=np.float64)
 
 
 def _setting(

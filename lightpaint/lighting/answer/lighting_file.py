@@ -96,17 +96,21 @@ def read_lighting(path: str | Path) -> Lighting:
         data = strict_json(text)
     except ValueError as error:
         raise LightingError(f"{path} is not a JSON file: {one_line(str(error))}") from None
-    found = data.get("format") if isinstance(data, dict) else None
-    if found != FORMAT:
-        raise LightingError(f"{path} has the format {one_line(repr(found))}: expected {FORMAT!r}")
+    format_found = data.get("format") if isinstance(data, dict) else None
+    if format_found != FORMAT:
+        raise LightingError(
+            f"{path} has the format {one_line(repr(format_found))}: expected {FORMAT!r}"
+        )
     try:
-        about = {key: data[key] for key in PLAIN_FIELDS if key in data}
-        lighting = read_record(Lighting, {"lights": [], **about})
+        fields = {key: data[key] for key in PLAIN_FIELDS if key in data}
+        lighting = read_record(Lighting, {"lights": [], **fields})
         lights = tuple(_read_setting(name, light) for name, light in data["lights"].items())
         certificate = None
         if "solve" in data:
-            its = data["solve"]
-            certificate = read_record(Certificate, its, required=["unreached"], others=True)
+            solve_record = data["solve"]
+            certificate = read_record(
+                Certificate, solve_record, required=["unreached"], others=True
+            )
         return replace(lighting, lights=lights, certificate=certificate)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise LightingError(f"{path} is no complete lighting: {one_line(repr(error))}") from None
@@ -144,5 +148,7 @@ def _photometry(lighting: Lighting, light: LightSetting) -> dict[str, Any]:
     """Return values that follow from the emission, for people and programs; only `unit_flux` is
     read back.
     """
-    known: dict[str, Any] = {} if light.unit_flux is None else {"unit_flux": light.unit_flux}
-    return known if light.is_fixed else {**known, "photometry": lighting.photometry(light).fields()}
+    fields: dict[str, Any] = {} if light.unit_flux is None else {"unit_flux": light.unit_flux}
+    return (
+        fields if light.is_fixed else {**fields, "photometry": lighting.photometry(light).fields()}
+    )

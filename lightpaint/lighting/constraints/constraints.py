@@ -214,12 +214,12 @@ def is_pattern(name: str) -> bool:
 
 def merge_tables(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of `below` that `above` does not contradict, and all of `above`."""
-    gone = set(above)
+    removed = set(above)
     for key, value in above.items():
-        gone |= set(_CONTRADICTS.get(key, ())) if value is not False else set()
-    if gone & {"color", "kelvin"}:
-        gone.add("duv")
-    return {**{k: v for k, v in below.items() if k not in gone}, **above}
+        removed |= set(_CONTRADICTS.get(key, ())) if value is not False else set()
+    if removed & {"color", "kelvin"}:
+        removed.add("duv")
+    return {**{k: v for k, v in below.items() if k not in removed}, **above}
 
 
 _CONTRADICTS = {

@@ -34,17 +34,17 @@ def read_constraints(path: str | Path) -> Constraints:
     return constraints_of(SceneRequests.of(Path(path), read_keys(Path(path))))
 
 
-def constraints_of(asked: SceneRequests) -> Constraints:
+def constraints_of(requests: SceneRequests) -> Constraints:
     """Return the constraints in the keys of a lights file. Raises ConstraintError."""
-    keys = asked.keys
+    keys = requests.keys
     try:
-        strength = _pull_strength(keys, asked.source)
+        strength = _pull_strength(keys, requests.source)
         return Constraints.of(
             keys.get("light"),
             tie=keys.get("tie", ()),
             prefer_current=strength,
             sparse=keys.get("sparse"),
-            where=asked.source,
+            where=requests.source,
         )
     except ConstraintError as error:
         # A value in the file may be of any length.
@@ -62,8 +62,8 @@ def _pull_strength(keys: Mapping[str, Any], source: str) -> Any:
         raise ConstraintError(
             f"{source}: both prefer_current and prefer, which is its older name: leave prefer out"
         )
-    strength, where = keys["prefer"], f"{source}: prefer"
+    strength, place = keys["prefer"], f"{source}: prefer"
     if isinstance(strength, Mapping):
-        check_keys(strength, ("current",), where)
-        strength, where = strength.get("current", 0.0), f"{where}.current"
-    return parse_strength(strength, where)
+        check_keys(strength, ("current",), place)
+        strength, place = strength.get("current", 0.0), f"{place}.current"
+    return parse_strength(strength, place)

@@ -22,8 +22,8 @@ def constraints_by_light(
 ) -> list[LightConstraint | None]:
     """Return the constraint on each light, None without one; names win over patterns."""
     return [
-        LightConstraint.of(asked, where=where) if asked else None
-        for asked, where in tables_by_light(constraints, lights)
+        LightConstraint.of(table, where=where) if table else None
+        for table, where in tables_by_light(constraints, lights)
     ]
 
 
@@ -80,10 +80,10 @@ def _match_lights(
                 f"{where}: {name!r} is part of the light {light.name!r}: ask it of that"
             )
     matching = fnmatchcase if is_pattern(name) else str.__eq__
-    found = [k for k, x in enumerate(lights) if not x.is_fixed and matching(x.name, name)]
-    if not found:
-        there = [light.name for light in lights if not light.is_fixed]
-        close = difflib.get_close_matches(name, there, n=1)
+    matches = [k for k, x in enumerate(lights) if not x.is_fixed and matching(x.name, name)]
+    if not matches:
+        adjustable = [light.name for light in lights if not light.is_fixed]
+        close = difflib.get_close_matches(name, adjustable, n=1)
         hint = f"did you mean {close[0]!r}? There" if close else "there"
-        raise ConstraintError(f"{where}: no light {name!r}; {hint} are {some_names(there)}")
-    return found
+        raise ConstraintError(f"{where}: no light {name!r}; {hint} are {some_names(adjustable)}")
+    return matches

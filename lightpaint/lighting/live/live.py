@@ -58,7 +58,7 @@ _Pulls = tuple[tuple[LiveView, ...], NormalEquations | None, NormalEquations | N
 
 
 class LiveSolver:
-    """The lighting for paintings that change under a brush, updated in place. Updated in place.
+    """The lighting for paintings that change under a brush, updated in place.
 
     views: of one lighting; report strokes to each by `update`. fit: with nothing left open, as
     `resolve_for_targets` returns it. constraints: all constraints on the lights.
@@ -119,13 +119,13 @@ class LiveSolver:
         if self.mode == "linear":
             equations = reduce(add, (x.tiles().equations(unpainted) for x in views))
             pull = self._pull(views, self._basis.present_weights)
-            found = best(equations, start)
+            weights = best(equations, start)
             if self._fit.colors != "gentle":
-                return found
+                return weights
             # Once more, as `solve` does, with a stronger pull to the colours of lights that came
             # out dim.
-            pull = self._pull(views, found)
-            return best(equations, found)
+            pull = self._pull(views, weights)
+            return best(equations, weights)
         pull = self._pull(views, start)
         films = self._joint_films(views)
         pixels = films.pixels(unpainted, self._fit.transform)
@@ -146,22 +146,22 @@ class LiveSolver:
         """
         if self._fit.colors != "gentle":
             return self._reduction
-        within = self._within
-        if within.gamuts is None or self._gamuts_of != views:
+        confined = self._within
+        if confined.gamuts is None or self._gamuts_of != views:
             painted = partial(PaintedLight.of, [x.painting for x in views], max_pixels=GAMUT_PIXELS)
             gamuts = Gamuts(painted, _power(views), self._basis.present_weights)
-            within, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
+            confined, self._gamuts_of = self._reduction.with_gamuts(gamuts), views
         else:
-            within.gamuts.refresh()
-        self._within = within
-        return within
+            confined.gamuts.refresh()
+        self._within = confined
+        return confined
 
     def _best(self, equations: NormalEquations, start: Doubles) -> Doubles:
         """Return the best weights (n, 3) under the constraints, from those to begin with."""
         method, reduction = self._fit.method, self._within
         if not reduction.white_knobs:
-            self._within, found = solve_near_sides(equations, reduction, start, method=method)
-            return found
+            self._within, weights = solve_near_sides(equations, reduction, start, method=method)
+            return weights
         start = snap_to_whites(reduction, start)
         wide = center_windows(reduction, start, WHITE_WIDTH)
         start = solve_reduced(equations, wide, start, method=method).weights
@@ -208,7 +208,7 @@ class LiveSolver:
         """Return the film of a view; all films together have the pixels of one, or fewer with less
         noise.
         """
-        side = block_side([one.basis for one in self._views], self._fit.transform)
+        side = block_side([view_of_all.basis for view_of_all in self._views], self._fit.transform)
         most = min(MAX_FILM_PIXELS // len(self._views), view.pixels // side**2)
         return view.film(self._fit.transform, max(1, most))
 

@@ -50,12 +50,12 @@ class PaintedTiles:
     def _update_rest(self, region: Slices) -> None:
         """Update the sums of the rest; as the complement of the paint where both add up to 1."""
         side = self._rest.side
-        within = tuple(
+        pixels = tuple(
             slice(part.start * side, part.stop * side) for part in self._rest.tiles_in(region)
         )
-        counted = self._importance[within] + self._unpainted[within]
-        one = np.where(self._seen[within], np.float32(0), np.float32(1))
-        if np.abs(counted - one).max(initial=0) <= IMPORTANCE_ROUND_OFF:
+        counted = self._importance[pixels] + self._unpainted[pixels]
+        expected = np.where(self._seen[pixels], np.float32(0), np.float32(1))
+        if np.abs(counted - expected).max(initial=0) <= IMPORTANCE_ROUND_OFF:
             self._rest.update_as_complement(region, self._whole, self._paint, self._present)
         else:
             self._rest.update(region)
@@ -129,18 +129,18 @@ class SmallFilm:
         )
         if top >= bottom or left >= right:
             return
-        where = slice(top, bottom), slice(left, right)
-        a = self._importance[where] * self._shown[where]
-        light = self._image[where] * a[..., None]
-        rest = np.where(self._seen[where], 0, np.maximum(1 - a, 0))
+        pixels = slice(top, bottom), slice(left, right)
+        a = self._importance[pixels] * self._shown[pixels]
+        light = self._image[pixels] * a[..., None]
+        rest = np.where(self._seen[pixels], 0, np.maximum(1 - a, 0))
         total, lit, unpainted = (block_sums(x, side) for x in (a, light, rest))
         rows = slice(top // side, -(-bottom // side))
         columns = slice(left // side, -(-right // side))
-        some = total > 0
-        mean = lit / np.where(some, total, 1)[..., None]
+        is_lit = total > 0
+        mean = lit / np.where(is_lit, total, 1)[..., None]
         painted = self._painted.reshape(3, *self._size)[:, rows, columns]
         current = self._current.reshape(3, *self._size)[:, rows, columns]
-        painted[...] = np.where(some, mean.transpose(2, 0, 1), current)
+        painted[...] = np.where(is_lit, mean.transpose(2, 0, 1), current)
         self._a.reshape(self._size)[rows, columns] = total
         self._left.reshape(self._size)[rows, columns] = unpainted
         if self._transform is not None:
@@ -176,8 +176,8 @@ class Films:
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:
         """Return the loss of all pixels, as `SmallFilm.pixels` does."""
-        each = [film.pixels(rest_weight, transform) for film in self._films]
-        return each[0] if len(each) == 1 else join_pixels(each)
+        parts = [film.pixels(rest_weight, transform) for film in self._films]
+        return parts[0] if len(parts) == 1 else join_pixels(parts)
 
     def improve(
         self,
@@ -191,8 +191,8 @@ class Films:
         start, or less.
 
         The round is one of `reweighting.rounds`, but in float32, and with a step that is halved a
-        few times only, as long as a shorter one lowers the loss. allowed: projects weights between
-        two allowed ones onto the constraints.
+        few times only, as long as a shorter one lowers the loss. project: moves weights between two
+        allowed ones onto the constraints.
         """
 
         def missed(w: Doubles, x: Doubles) -> float:
@@ -213,9 +213,9 @@ class Films:
         equations = NormalEquations(
             M.astype(np.float64), b.astype(np.float64), norm2.sum(axis=1, dtype=np.float64)
         )
-        found, nearest = best(equations, start), start
+        best_weights, nearest = best(equations, start), start
         for part in STEP_SHARES:
-            step = project(interpolate(start, found, part))
+            step = project(interpolate(start, best_weights, part))
             reached = missed(step, self._mixed(step))
             if reached > value and nearest is not start:
                 break
@@ -230,11 +230,11 @@ class Films:
         return mixed.astype(np.float64)
 
 
-def _bounding_region(one: Slices, other: Slices) -> Slices:
+def _bounding_region(first: Slices, second: Slices) -> Slices:
     """Return the smallest region that holds both."""
     (top, left), (below, right) = (
-        [min(a.start, b.start) for a, b in zip(one, other, strict=True)],
-        [max(a.stop, b.stop) for a, b in zip(one, other, strict=True)],
+        [min(a.start, b.start) for a, b in zip(first, second, strict=True)],
+        [max(a.stop, b.stop) for a, b in zip(first, second, strict=True)],
     )
     return slice(top, below), slice(left, right)
 

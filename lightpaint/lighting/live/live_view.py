@@ -13,7 +13,7 @@ SEGMENT_PIXELS = 64
 
 
 class LiveView:
-    """A view whose painting changes under a brush, updated in place. Updated in place.
+    """A view whose painting changes under a brush, updated in place.
 
     image: (h, w, 3) linear; importance: (h, w). Painters write to these arrays, and then call
     `update`.
@@ -96,19 +96,19 @@ class LiveView:
             self._counted[region] = self._importance[region]
             return region, False
         # The surroundings of the emitters in this rectangle lie in a wider one.
-        its = affected_region(wide, self._counted.shape)
-        importance = self._importance[its]
+        affected = affected_region(wide, self._counted.shape)
+        importance = self._importance[affected]
         glows = find_glow_paint(
-            self._image[its],
+            self._image[affected],
             importance,
-            self.basis.present_look[its],
-            self.basis.emitters_seen[its],
+            self.basis.present_look[affected],
+            self.basis.emitters_seen[affected],
             self._transform,
             dark=self._dark,
         )
         inner = tuple(
             slice(part.start - outer.start, part.stop - outer.start)
-            for part, outer in zip(wide, its, strict=True)
+            for part, outer in zip(wide, affected, strict=True)
         )
         counted = np.where(glows, np.float32(0), importance)[inner]
         is_other = not np.array_equal(self._counted[wide], counted)
@@ -122,9 +122,9 @@ class LiveView:
         """
         rows, columns = region
         first, last = columns.start // SEGMENT_PIXELS, -(-columns.stop // SEGMENT_PIXELS)
-        where = rows, slice(first * SEGMENT_PIXELS, last * SEGMENT_PIXELS)
-        a = self._counted[where].astype(np.float64)
-        left = np.where(self.basis.emitters_seen[where], 0, np.maximum(1 - a, 0))
+        segment = rows, slice(first * SEGMENT_PIXELS, last * SEGMENT_PIXELS)
+        a = self._counted[segment].astype(np.float64)
+        left = np.where(self.basis.emitters_seen[segment], 0, np.maximum(1 - a, 0))
         starts = np.arange(0, a.shape[1], SEGMENT_PIXELS)
         for k, values in enumerate((a, left)):
             if a.size:

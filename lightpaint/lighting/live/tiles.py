@@ -52,7 +52,7 @@ class TiledEquations:
         side: int | None = None,
         twin: "TiledEquations | None" = None,
     ) -> None:
-        """Sum all tiles. like: equations of the same planes and strokes, whose reads of planes are
+        """Sum all tiles. twin: equations of the same planes and strokes, whose reads of planes are
         shared.
         """
         planes = as_planes(planes)
@@ -99,9 +99,9 @@ class TiledEquations:
         rows, columns = self.tiles_in(region)
         if not (rows and columns):
             return
-        few = max(CHUNK_BYTES // (8 * 3 * (self._count + 1) * self.side**2), 1)
-        wide = min(few, len(columns))
-        blocks = product(_split_range(rows, few // wide), _split_range(columns, wide))
+        rows_per_chunk = max(CHUNK_BYTES // (8 * 3 * (self._count + 1) * self.side**2), 1)
+        wide = min(rows_per_chunk, len(columns))
+        blocks = product(_split_range(rows, rows_per_chunk // wide), _split_range(columns, wide))
         sum_block = partial(self._sum, with_M=with_M)
         if with_M and self._count > MAX_CHEAP_LIGHTS:
             parallel_map(sum_block, blocks)
@@ -192,13 +192,13 @@ class _TileReader:
         last = self._last
         if last is not None and last[0] == where:
             return last[1]
-        made = np.empty((*tiles, 3, self._planes.count, self._side**2))
+        cut = np.empty((*tiles, 3, self._planes.count, self._side**2))
         rows, columns = where
         lit = self._planes.rows(rows.start, rows.stop)[:, :, columns]
-        _cut(lit, self._side, out=made)
+        _cut(lit, self._side, out=cut)
         if self.is_shared:
-            self._last = (where, made)
-        return made
+            self._last = (where, cut)
+        return cut
 
 
 class _Buffers(threading.local):
@@ -237,8 +237,8 @@ def _cut(pictures: Floats, side: int, out: Doubles) -> None:
         part = pictures
         pictures = np.zeros((n, rows * side, columns * side, channels), part.dtype)
         pictures[:, :height, :width] = part
-    apart = pictures.reshape(n, rows, side, columns, side, channels).transpose(1, 3, 5, 0, 2, 4)
-    out.reshape(rows, columns, channels, n, side, side)[...] = apart
+    tiles = pictures.reshape(n, rows, side, columns, side, channels).transpose(1, 3, 5, 0, 2, 4)
+    out.reshape(rows, columns, channels, n, side, side)[...] = tiles
 
 
 def _pyramid(shape: tuple[int, int], node: tuple[int, ...]) -> list[Doubles]:

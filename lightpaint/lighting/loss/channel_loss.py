@@ -73,20 +73,20 @@ class PaintedPixels(PixelLoss):
         nowhere."""
         if self.at_least is None:
             return None
-        found = self.at_least & (x > self.painted)
-        return found if found.any() else None
+        exceeded = self.at_least & (x > self.painted)
+        return exceeded if exceeded.any() else None
 
     def objective(self, x: Doubles) -> Doubles:
         """Return F per channel, (3,), of x, (3, p)."""
-        return np.asarray(sum(self.map_strips(lambda where, its: its._objective(x[:, where]))))
+        return np.asarray(sum(self.map_strips(lambda strip, part: part._objective(x[:, strip]))))
 
     def _objective(self, x: Doubles, shown: Doubles | None = None) -> Doubles:
         shown, q = self.encode(x) if shown is None else shown, self.share
         missed = self._shown_painting - shown
         if (exceeds := self.exceeds(x)) is not None:
-            its = np.flatnonzero(exceeds.any(axis=0))
-            moved = np.where(exceeds, x, self.painted)[:, its]
-            missed[:, its] = self.encode(moved) - shown[:, its]
+            columns = np.flatnonzero(exceeds.any(axis=0))
+            goal = np.where(exceeds, x, self.painted)[:, columns]
+            missed[:, columns] = self.encode(goal) - shown[:, columns]
         terms = np.square(missed)
         if self._is_shared:
             terms *= 1 - q
@@ -98,13 +98,13 @@ class PaintedPixels(PixelLoss):
         """Return image and weight, (3, p) each, of squares with the gradient of F at x, (3, p)."""
         image, weight = np.empty((2, *x.shape))
 
-        def fill(where: slice, its: "PaintedPixels") -> None:
-            lit = x[:, where]
-            gradient, factor = its.gradient(lit, from_clipping=from_clipping)
-            some = factor > 0
-            gradient /= factor if some.all() else np.where(some, factor, 1)
-            np.add(lit, gradient, out=image[:, where])
-            np.multiply(factor, its.importance, out=weight[:, where])
+        def fill(strip: slice, part: "PaintedPixels") -> None:
+            lit = x[:, strip]
+            gradient, factor = part.gradient(lit, from_clipping=from_clipping)
+            has_weight = factor > 0
+            gradient /= factor if has_weight.all() else np.where(has_weight, factor, 1)
+            np.add(lit, gradient, out=image[:, strip])
+            np.multiply(factor, part.importance, out=weight[:, strip])
 
         self.map_strips(fill)
         return image, weight
@@ -130,24 +130,24 @@ class PaintedPixels(PixelLoss):
         if self.transform is None:
             counts = (1 - q) * (np.ones_like(x) if exceeds is None else ~exceeds)
             return counts * (self.painted - x) + q * (self.current - x), counts + q
-        shown, own = self._with_slopes(x) if encoded is None else encoded
-        slope, missed, way = own, self._shown_painting - shown, self.painted - x
+        shown, own_slope = self._with_slopes(x) if encoded is None else encoded
+        slope, missed, distance = own_slope, self._shown_painting - shown, self.painted - x
         if exceeds is not None:
             # The goal there moves along with x.
-            its = np.flatnonzero(exceeds.any(axis=0))
-            moved = np.where(exceeds, x, self.painted)[:, its]
-            moved_shown, moved_slope = self._with_slopes(moved)
-            missed[:, its] = moved_shown - shown[:, its]
-            slope = own.copy()
-            slope[..., its] -= moved_slope * exceeds[:, its]
-            way[exceeds] = 0
+            columns = np.flatnonzero(exceeds.any(axis=0))
+            goal = np.where(exceeds, x, self.painted)[:, columns]
+            moved_shown, moved_slope = self._with_slopes(goal)
+            missed[:, columns] = moved_shown - shown[:, columns]
+            slope = own_slope.copy()
+            slope[..., columns] -= moved_slope * exceeds[:, columns]
+            distance[exceeds] = 0
         if from_clipping:
-            slope = _with_chords(own, slope, missed, way)
+            slope = _with_chords(own_slope, slope, missed, distance)
         gradient, factor = _square_terms(slope, missed)
         if self._is_shared:
-            slope, missed = own, self._shown_current - shown
+            slope, missed = own_slope, self._shown_current - shown
             if from_clipping:
-                slope = _with_chords(own, slope, missed, self.current - x)
+                slope = _with_chords(own_slope, slope, missed, self.current - x)
             of_current = _square_terms(slope, missed)
             gradient, factor = (
                 (1 - q) * a + q * b for a, b in zip((gradient, factor), of_current, strict=True)
@@ -162,9 +162,9 @@ class PaintedPixels(PixelLoss):
             return super().shares(x, weight)
         share = np.zeros_like(x)
 
-        def fill(where: slice, its: "PaintedPixels") -> None:
-            steep = its._slope_product(x[:, where]) * its.share * its.importance
-            np.divide(steep, weight[:, where], out=share[:, where], where=weight[:, where] > 0)
+        def fill(strip: slice, part: "PaintedPixels") -> None:
+            steep = part._slope_product(x[:, strip]) * part.share * part.importance
+            np.divide(steep, weight[:, strip], out=share[:, strip], where=weight[:, strip] > 0)
 
         self.map_strips(fill)
         return share
@@ -173,9 +173,9 @@ class PaintedPixels(PixelLoss):
         """Return the product of the slopes of V at x and at C, (3, p)."""
         if self.transform is None:
             return np.ones_like(x)
-        own, current = (self._with_slopes(y)[1] for y in (x, self.current))
-        both = own * current
-        return both if both.ndim == 2 else np.asarray(both.sum(axis=0))
+        own_slope, current = (self._with_slopes(y)[1] for y in (x, self.current))
+        product = own_slope * current
+        return product if product.ndim == 2 else np.asarray(product.sum(axis=0))
 
     def has_same_squares(self, a: Doubles, b: Doubles) -> bool:
         """Return whether the squares made for two pictures are equal, and so exact between them."""
@@ -202,27 +202,30 @@ class PaintedPixels(PixelLoss):
     @cached_property
     def _unavoidable(self) -> Doubles:
         """The least loss between painting and current look, (3, p), without importance."""
-        apart = np.square(self._shown_painting - self._shown_current)
+        distance = np.square(self._shown_painting - self._shown_current)
         if self.at_least is not None:
-            apart[self.at_least & (self.current >= self.painted)] = 0
-        return np.asarray(self.share * (1 - self.share) * apart)
+            distance[self.at_least & (self.current >= self.painted)] = 0
+        return np.asarray(self.share * (1 - self.share) * distance)
 
 
 def join_pixels(parts: Sequence[PaintedPixels]) -> PaintedPixels:
     """Join pixels of several pictures into one set, where brighter is nowhere as good."""
     first = parts[0]
 
-    def put(get: Callable[[PaintedPixels], Floats]) -> Doubles:
-        return np.concatenate([get(part) for part in parts], axis=-1, dtype=np.float64)
+    def concatenate(read: Callable[[PaintedPixels], Floats]) -> Doubles:
+        return np.concatenate([read(part) for part in parts], axis=-1, dtype=np.float64)
 
     return PaintedPixels(
-        put(lambda its: its.painted),
-        put(lambda its: its.importance),
-        put(lambda its: its.share),
-        put(lambda its: its.current),
+        concatenate(lambda part: part.painted),
+        concatenate(lambda part: part.importance),
+        concatenate(lambda part: part.share),
+        concatenate(lambda part: part.current),
         None,
         first.transform,
-        (put(lambda its: its._shown_painting), put(lambda its: its._shown_current)),
+        (
+            concatenate(lambda part: part._shown_painting),
+            concatenate(lambda part: part._shown_current),
+        ),
     )
 
 
@@ -236,18 +239,19 @@ def _square_terms(slope: Doubles, missed: Doubles) -> tuple[Doubles, Doubles]:
     return np.einsum("kcp,kp->cp", slope, missed), np.abs(mixed, out=mixed).sum(axis=1)
 
 
-def _with_chords(own: Doubles, slope: Doubles, missed: Doubles, way: Doubles) -> Doubles:
-    """Return `slope` with chords in place of derivatives where display values are flat by `own` and
-    have an error.
+def _with_chords(own_slope: Doubles, slope: Doubles, missed: Doubles, distance: Doubles) -> Doubles:
+    """Return `slope` with chords in place of derivatives where display values are flat and off.
+
+    own_slope: of the picture itself, which tells where values are flat.
     """
-    is_flat = own == 0 if own.ndim == 2 else ~own.any(axis=1)
-    flat = is_flat & (missed * way > 0)
+    is_flat = own_slope == 0 if own_slope.ndim == 2 else ~own_slope.any(axis=1)
+    flat = is_flat & (missed * distance > 0)
     if not flat.any():
         return slope
     slope = slope.copy()
     if slope.ndim == 2:
-        slope[flat] += missed[flat] / way[flat]
+        slope[flat] += missed[flat] / distance[flat]
         return slope
-    k, its = np.nonzero(flat)
-    slope[k, k, its] += missed[k, its] / way[k, its]
+    k, columns = np.nonzero(flat)
+    slope[k, k, columns] += missed[k, columns] / distance[k, columns]
     return slope

@@ -52,34 +52,34 @@ def find_glow_paint(
     one; seen: (h, w), where an emitter is. transform: that shows both; None for light itself. dark:
     see `dark_threshold`, of the whole picture, of which these arrays may be a part.
     """
-    found = seen & (importance > 0)
-    if not found.any():
-        return found
+    painted_emitters = seen & (importance > 0)
+    if not painted_emitters.any():
+        return painted_emitters
     counts = importance * ~seen
     radius = paint_radius(seen.shape)
-    near, painted, now = (
+    paint_nearby, painted, now = (
         box_mean(np.asarray(x, np.float64), radius)
         for x in (counts, counts * _brightness(image), counts * _brightness(look))
     )
     # Sums that slide along have round-off where they are 0.
-    is_near = near > NO_IMPORTANCE
+    is_near = paint_nearby > NO_IMPORTANCE
     # Ratios of means, since single pixels are noise.
-    change = _stops(painted + dark * near, now + dark * near)
-    own = _stops(
+    change = _stops(painted + dark * paint_nearby, now + dark * paint_nearby)
+    own_change = _stops(
         _brightness(_clip_to_display(image, transform)) + dark,
         _brightness(_clip_to_display(look, transform)) + dark,
     )
-    return np.asarray(found & (np.where(is_near, change, own) > -DARKER_STOPS))
+    return np.asarray(painted_emitters & (np.where(is_near, change, own_change) > -DARKER_STOPS))
 
 
 def affected_region(region: Slices, size: tuple[int, int]) -> Slices:
     """Return the rectangle in which paint within `region` may change the meaning of paint."""
-    by = paint_radius(size)
+    radius = paint_radius(size)
     (top, bottom, _), (left, right, _) = (
         part.indices(length) for part, length in zip(region, size, strict=True)
     )
-    rows = slice(max(top - by, 0), min(bottom + by, size[0]))
-    return rows, slice(max(left - by, 0), min(right + by, size[1]))
+    rows = slice(max(top - radius, 0), min(bottom + radius, size[0]))
+    return rows, slice(max(left - radius, 0), min(right + radius, size[1]))
 
 
 def _brightness(image: Floats | Doubles) -> Doubles:
@@ -91,6 +91,6 @@ def _clip_to_display(image: Floats, transform: ViewTransform | None) -> Floats |
     return image if transform is None else np.minimum(image, transform.white)
 
 
-def _stops(to: Doubles, of: Doubles) -> Doubles:
-    safe = np.maximum(of, 1e-30)
-    return np.asarray(np.log2(np.maximum(to, 1e-30) / safe))
+def _stops(value: Doubles, reference: Doubles) -> Doubles:
+    safe = np.maximum(reference, 1e-30)
+    return np.asarray(np.log2(np.maximum(value, 1e-30) / safe))

@@ -41,40 +41,42 @@ class LitPixels:
 
     def predicted(self, weights: Doubles) -> Doubles:
         """Return Σ w_i Φ_i, (3, p), in float64: a float32's round-off would hide the last steps."""
-        made = np.empty((3, len(self.pixels)))
+        picture = np.empty((3, len(self.pixels)))
 
-        def mix(where: slice, _: PixelLoss) -> None:
-            lit = self.planes.pixels(where)
+        def mix(strip: slice, _: PixelLoss) -> None:
+            lit = self.planes.pixels(strip)
             for c in range(3):
-                made[c, where] = weights[:, c] @ lit[..., c].astype(np.float64)
+                picture[c, strip] = weights[:, c] @ lit[..., c].astype(np.float64)
 
         self.pixels.map_strips(mix)
-        return made
+        return picture
 
     def objective_and_gradient(self, weights: Doubles) -> tuple[float, Doubles]:
         """Return the loss of weights, (n, 3), and half its gradient, (n, 3)."""
 
-        def its(where: slice, pixels: PixelLoss) -> tuple[float, Doubles]:
-            rows = self.planes.pixels(where).transpose(2, 0, 1).astype(np.float64, order="C")
+        def strip_terms(strip: slice, pixels: PixelLoss) -> tuple[float, Doubles]:
+            rows = self.planes.pixels(strip).transpose(2, 0, 1).astype(np.float64, order="C")
             x = np.stack([w @ lit for w, lit in zip(weights.T, rows, strict=True)])
             value, slope = pixels.objective_and_gradient(x)
             return value, np.stack([lit @ s for lit, s in zip(rows, slope, strict=True)], axis=1)
 
-        values, slopes = zip(*self.pixels.map_strips(its), strict=True)
+        values, slopes = zip(*self.pixels.map_strips(strip_terms), strict=True)
         return sum(values), np.asarray(sum(slopes))
 
     def slope(self, image: Doubles, weight: Doubles, x: Doubles, ahead: Doubles) -> float:
         """Return half of the slope at which Σ weight (image − x)² falls at x on the way to
         `ahead`."""
 
-        def its(where: slice, _: PixelLoss) -> float:
-            at = x[:, where]
-            return float((weight[:, where] * (image[:, where] - at) * (ahead[:, where] - at)).sum())
+        def strip_slope(strip: slice, _: PixelLoss) -> float:
+            here_x = x[:, strip]
+            return float(
+                (weight[:, strip] * (image[:, strip] - here_x) * (ahead[:, strip] - here_x)).sum()
+            )
 
-        return sum(self.pixels.map_strips(its))
+        return sum(self.pixels.map_strips(strip_slope))
 
     def equations(self, image: Doubles, weight: Doubles) -> NormalEquations:
         """Return the linear problem of squares, (3, p) each."""
         shape = (*self.planes.size, 3)
-        its, weights = image.T.reshape(shape), weight.T.reshape(shape)
-        return NormalEquations(*self.planes.sums(weights, its))
+        picture, weights = image.T.reshape(shape), weight.T.reshape(shape)
+        return NormalEquations(*self.planes.sums(weights, picture))

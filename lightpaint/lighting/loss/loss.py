@@ -98,7 +98,7 @@ class PixelLoss(ABC):
     @cached_property
     def _kept_strips(self) -> list[tuple[slice, Self]]:
         """All pixels in parts, which keep what they compute once."""
-        return [(where, self.subset(where)) for where in self._parts]
+        return [(strip, self.subset(strip)) for strip in self._parts]
 
     @property
     def _parts(self) -> list[slice]:
@@ -111,7 +111,7 @@ class PixelLoss(ABC):
         if len(self) <= STRIP_PIXELS:
             return [work(slice(0, len(self)), self)]
         if len(self) > MAX_KEPT_PIXELS:
-            return parallel_map(lambda where: work(where, self.subset(where)), self._parts)
+            return parallel_map(lambda part: work(part, self.subset(part)), self._parts)
         return parallel_map(lambda strip: work(*strip), self._kept_strips)
 
 

@@ -51,7 +51,7 @@ def ignored_paint(target: Target, seen: Bools, emitters: Emitters) -> Bools:
 def resolve_importance(target: Target, seen: Bools, emitters: Emitters = "auto") -> Target:
     """Return `target` with the final importance of each pixel.
 
-    seen, emitters: as of `ignored_paint`.
+    seen, emitters: as in `ignored_paint`.
 
     Raises TargetError if nothing is left.
     """
@@ -81,8 +81,8 @@ def resolve_emitter_paint(target: Target, basis: Basis, fit: Fit) -> Target:
         dark=dark_threshold(basis.present_look, basis.emitters_seen),
     )[..., None]
     at_least = glows if target.at_least is None else target.at_least | glows
-    its = np.broadcast_to(at_least, target.image.shape) if glows.any() else target.at_least
-    return replace(target, at_least=its, reads_emitters=False)
+    mask = np.broadcast_to(at_least, target.image.shape) if glows.any() else target.at_least
+    return replace(target, at_least=mask, reads_emitters=False)
 
 
 def present_look(basis: Basis, unpainted: float) -> Floats | None:
@@ -130,14 +130,14 @@ def importance_sums(views: Views) -> tuple[float, float]:
 
 def joint_squares(views: Views, *, unpainted: float) -> Squares:
     """Return the literal squares of all paintings as one problem."""
-    each = [
+    parts = [
         target_squares(basis, target, unpainted=unpainted)
         for basis, target in zip(views.bases, views.targets, strict=True)
     ]
     return Squares(
-        views.join([word.image for word in each]),
-        views.join([word.weight for word in each]),
-        views.join([word.share for word in each]),
+        views.join([squares.image for squares in parts]),
+        views.join([squares.weight for squares in parts]),
+        views.join([squares.share for squares in parts]),
     )
 
 
@@ -169,8 +169,8 @@ def choose_loss(
 def at_least_mask(views: Views) -> Bools:
     """Return where brighter than the painting is as good, in all views."""
     nowhere = [np.zeros((*basis.size, 3), bool) for basis in views.bases]
-    given = [target.at_least for target in views.targets]
-    return views.join([n if a is None else a for a, n in zip(given, nowhere, strict=True)])
+    masks = [target.at_least for target in views.targets]
+    return views.join([n if a is None else a for a, n in zip(masks, nowhere, strict=True)])
 
 
 def target_light(views: Views) -> Floats:

@@ -66,11 +66,11 @@ class PaintingLoss(Loss):
         if self.transform is None:
             return np.array(image, np.float64)
         planes = planes_of(image)
-        out = np.empty_like(planes)
+        encoded = np.empty_like(planes)
         for start in range(0, planes.shape[1], STRIP_PIXELS):
-            where = slice(start, start + STRIP_PIXELS)
-            out[:, where] = self.transform.encode_planes(planes[:, where])
-        return image_of(out, image.shape[:-1])
+            strip = slice(start, start + STRIP_PIXELS)
+            encoded[:, strip] = self.transform.encode_planes(planes[:, strip])
+        return image_of(encoded, image.shape[:-1])
 
     def goal(self, x: Floats) -> Doubles:
         """Return (1 − q) ψ + q C at a picture x, (h, w, 3) linear."""
@@ -79,8 +79,8 @@ class PaintingLoss(Loss):
             q, psi = q[..., None], np.where(at_least & (x > painted), x, painted)
             return np.asarray((1 - q) * psi.astype(np.float64) + q * current, np.float64)
 
-        its = self.share, x, self.painted, self.at_least, self.current
-        return np.asarray(by_bands(mean, *its))
+        arrays = self.share, x, self.painted, self.at_least, self.current
+        return np.asarray(by_bands(mean, *arrays))
 
     def residual(self, x: Floats) -> Doubles:
         """Return V(ψ) − V(x), (h, w, 3)."""
@@ -98,10 +98,10 @@ class PaintingLoss(Loss):
         return np.asarray(np.where(self.exceeds(x), x, self.painted), np.float64)
 
     def block_means(self, parts: Sequence[tuple[Cut, Doubles]], side: int) -> "PaintingLoss":
-        each = [self.cut(cut)._block_average(counts, side) for cut, counts in parts]
+        averages = [self.cut(cut)._block_average(counts, side) for cut, counts in parts]
 
         def row(name: str) -> npt.NDArray[Any]:
-            arrays = [getattr(part, name) for part in each]
+            arrays = [getattr(part, name) for part in averages]
             return np.concatenate([x.reshape(-1, *x.shape[2:]) for x in arrays])[None]
 
         names = ("painted", "importance", "share", "current", "at_least")
@@ -111,18 +111,19 @@ class PaintingLoss(Loss):
     def _block_average(self, counts: Doubles, side: int) -> "PaintingLoss":
         """Return the loss of means over blocks of one view. counts: (h, w), the importance."""
         total = block_sums(counts, side)
-        painted, held = (1 - self.share) * counts, self.share * counts
+        painted_weight, current_weight = (1 - self.share) * counts, self.share * counts
 
         def mean(image: Floats, weight: Floats) -> Doubles:
-            some = block_sums(weight.astype(np.float64), side)
-            its = block_sums(image * weight[..., None].astype(np.float64), side)
-            return np.asarray(its / np.where(some > 0, some, 1)[..., None])
+            total = block_sums(weight.astype(np.float64), side)
+            sums = block_sums(image * weight[..., None].astype(np.float64), side)
+            return np.asarray(sums / np.where(total > 0, total, 1)[..., None])
 
         return replace(
             self,
-            painted=mean(self.painted, painted),
+            painted=mean(self.painted, painted_weight),
             importance=total,
-            share=block_sums(held.astype(np.float64), side) / np.where(total > 0, total, 1),
-            current=mean(self.current, held),
-            at_least=mean(self.at_least.astype(np.float64), painted) > 0.5,
+            share=block_sums(current_weight.astype(np.float64), side)
+            / np.where(total > 0, total, 1),
+            current=mean(self.current, current_weight),
+            at_least=mean(self.at_least.astype(np.float64), painted_weight) > 0.5,
         )

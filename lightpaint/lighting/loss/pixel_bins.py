@@ -54,8 +54,8 @@ class BinnedPixels:
     def equations(self) -> NormalEquations:
         """The linear problem at the present lighting, with the importance of all pixels of a
         block."""
-        meant = self.loss.goal(self.basis.mix(self.basis.present_weights))
-        return NormalEquations.of(self.basis, meant, self.loss.importance[..., None])
+        goal = self.loss.goal(self.basis.mix(self.basis.present_weights))
+        return NormalEquations.of(self.basis, goal, self.loss.importance[..., None])
 
     @cached_property
     def prior(self) -> NormalEquations:
@@ -66,8 +66,8 @@ class BinnedPixels:
         noise the present is the best guess. M contains N anyway, where it pulls towards 0.
         """
         present = self.basis.present_weights
-        at = LitPixels.whole(self.basis, self.loss).predicted(present)
-        _, weight = self.loss.pixels.squares(at, from_clipping=False)
+        present_picture = LitPixels.whole(self.basis, self.loss).predicted(present)
+        _, weight = self.loss.pixels.squares(present_picture, from_clipping=False)
         halves = self.basis.noise.pixels(slice(None)).astype(np.float64)
         power = np.einsum("cp,npc->nc", weight, np.square(halves))
         return pull_to_present(PRIOR_STRENGTH * power, present)
@@ -100,12 +100,14 @@ def _strips(basis: Basis) -> tuple[Floats, Floats, Bools]:
 
     The strips, of whole blocks of any side, are spread over the picture.
     """
-    every = max(1, basis.emitters_seen.size // NOISE_PIXELS)
-    rows = np.flatnonzero(np.arange(basis.size[0]) // STRIP_ROWS % every == 0)
+    step = max(1, basis.emitters_seen.size // NOISE_PIXELS)
+    rows = np.flatnonzero(np.arange(basis.size[0]) // STRIP_ROWS % step == 0)
     weights = basis.present_weights
-    its = np.flatnonzero(np.repeat(np.isin(np.arange(basis.size[0]), rows), basis.size[1]))
+    pixels = np.flatnonzero(np.repeat(np.isin(np.arange(basis.size[0]), rows), basis.size[1]))
     picture = (len(rows), basis.size[1], 3)
-    look, half = (x.picked(its).mix(weights).reshape(picture) for x in (basis.planes, basis.noise))
+    look, half = (
+        x.picked(pixels).mix(weights).reshape(picture) for x in (basis.planes, basis.noise)
+    )
     return look, half, basis.emitters_seen[rows]
 
 
@@ -116,8 +118,8 @@ def _display_noise(
     unseen = (~seen).astype(np.float64)
     counts = block_sums(unseen, side)
     safe = np.where(counts > 0, counts, 1)[..., None]
-    light, its = (block_sums(x * unseen[..., None], side) / safe for x in (look, half))
-    ends = (transform.encode(np.maximum(light + sign * its, 0)) for sign in (1, -1))
+    light, noise = (block_sums(x * unseen[..., None], side) / safe for x in (look, half))
+    ends = (transform.encode(np.maximum(light + sign * noise, 0)) for sign in (1, -1))
     return np.asarray(np.square(np.subtract(*ends, dtype=np.float64) / 2)[counts > 0].ravel())
 
 
@@ -130,19 +132,19 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
     parts: list[tuple[Cut, Doubles]] = []
     for k, basis in enumerate(views.bases):
         cut = partial(views.part, k=k)
-        its = loss.cut(cut)
-        counts = its.importance.astype(np.float64)
+        view_loss = loss.cut(cut)
+        counts = view_loss.importance.astype(np.float64)
         # Emitters that may be brighter count in a block that has nothing else.
-        glows = basis.emitters_seen & its.exceeds(np.inf).all(axis=-1)
-        others = enlarged(block_sums(np.where(glows, 0, counts), side), side)
-        counts[glows & (others[: counts.shape[0], : counts.shape[1]] > 0)] = 0
+        glows = basis.emitters_seen & view_loss.exceeds(np.inf).all(axis=-1)
+        weights = enlarged(block_sums(np.where(glows, 0, counts), side), side)
+        counts[glows & (weights[: counts.shape[0], : counts.shape[1]] > 0)] = 0
         total = block_sums(counts, side)
         safe = np.where(total > 0, total, 1)
-        for made, pictures in zip(planes, (basis.planes, basis.noise), strict=True):
+        for block_planes, pictures in zip(planes, (basis.planes, basis.noise), strict=True):
             means = np.empty((len(basis.lights), *total.shape, 3), np.float32)
             for mean, image in zip(means, pictures, strict=True):
                 mean[...] = block_sums(image * counts[..., None], side) / safe[..., None]
-            made.append(means.reshape(len(means), -1, 3))
+            block_planes.append(means.reshape(len(means), -1, 3))
         parts.append((cut, counts))
     if (blocks := loss.block_means(parts, side)) is None:
         return None

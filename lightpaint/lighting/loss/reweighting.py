@@ -88,10 +88,10 @@ class WeightTerms:
 
     def fall(self, w: Doubles, best: Doubles) -> float:
         """Return the initial slope at which the terms fall on the way from w to `best`."""
-        way, fall = best - w, 0.0
+        step, fall = best - w, 0.0
         if self.pull is not None:
-            fall -= 2 * float((self.pull.gradient(w) * way).sum())
-        return fall if self.tilt is None else fall + 2 * float((self.tilt * way).sum())
+            fall -= 2 * float((self.pull.gradient(w) * step).sum())
+        return fall if self.tilt is None else fall + 2 * float((self.tilt * step).sum())
 
     def tilted(self, equations: NormalEquations) -> NormalEquations:
         """Return `equations` with the tilt; the solve adds the pull itself."""
@@ -201,8 +201,8 @@ def relative_change(equations: NormalEquations, w: Doubles, best: Doubles) -> fl
     channel."""
     size = np.sqrt(np.einsum("cii->ic", equations.M))
     largest = (size * np.maximum(w, best)).max(axis=0, initial=0)
-    moved = (size * np.abs(best - w)).max(axis=0, initial=0)
-    return float((moved / np.where(largest > 0, largest, 1)).max())
+    change = (size * np.abs(best - w)).max(axis=0, initial=0)
+    return float((change / np.where(largest > 0, largest, 1)).max())
 
 
 def total_loss(pixels: PixelLoss, terms: WeightTerms, w: Doubles, x: Doubles) -> float:

@@ -61,25 +61,25 @@ def find_near_optimum(
     lit = LitPixels.of(basis, loss)
     part = sample_pixels(lit, np.einsum("cii->ic", equations.M), size)
     terms = WeightTerms(pull)
-    near, least = None, total_loss(lit.pixels, terms, start, lit.predicted(start))
+    found_near, least = None, total_loss(lit.pixels, terms, start, lit.predicted(start))
     w = run_rounds(part, terms, start, solve, from_clipping=True, until=FIRST_STEP).weights
-    before, until = np.inf, STEP_RATIO * FIRST_STEP
+    before, tolerance = np.inf, STEP_RATIO * FIRST_STEP
     for _ in range(MAX_CORRECTIONS):
         value, slope = lit.objective_and_gradient(w)
         value += terms.value(w)
         if value > least:
-            return near
-        near, fell, least = w, least - value, value
+            return found_near
+        found_near, fell, least = w, least - value, value
         if fell <= MIN_GAIN * value:
-            return near
+            return found_near
         tilted = WeightTerms(pull, part.objective_and_gradient(w)[1] - slope, w)
-        result = run_rounds(part, tilted, w, solve, from_clipping=False, until=until)
+        result = run_rounds(part, tilted, w, solve, from_clipping=False, until=tolerance)
         step, w = relative_change(result.equations, w, result.weights), result.weights
         if step > MAX_STEP_RATIO * before:
-            return near
+            return found_near
         if step <= MIN_STEP:
             return w
-        before, until = step, STEP_RATIO * min(step, FIRST_STEP)
+        before, tolerance = step, STEP_RATIO * min(step, FIRST_STEP)
     return w
 
 
@@ -89,8 +89,11 @@ def sample_pixels(lit: LitPixels, power: Doubles, size: int) -> LitPixels:
     power: (n, 3), Σ D Φ², of the lights. One pixel is drawn, in order, for each `size`-th part of
     the total information on the lights; pixels with more than that are certain.
     """
-    said = _information(lit, power)
-    chance = size * ((1 - EVEN_SHARE) * said / max(said.sum(), 1e-300) + EVEN_SHARE / said.size)
+    information = _information(lit, power)
+    chance = size * (
+        (1 - EVEN_SHARE) * information / max(information.sum(), 1e-300)
+        + EVEN_SHARE / information.size
+    )
     # The others share the size that certain pixels leave.
     for _ in range(4):
         certain = chance >= 1
@@ -109,9 +112,9 @@ def _information(lit: LitPixels, power: Doubles) -> Doubles:
     """Return the information on lights in each pixel, (p,): Σ D Φ² / power over the lights."""
     part = np.where(power > 0, 1 / np.where(power > 0, power, 1), 0).astype(np.float32)
 
-    def its(where: slice, pixels: PixelLoss) -> Doubles:
-        squares = np.square(lit.planes.pixels(where))
-        said = sum(part[:, c] @ squares[..., c] for c in range(3))
-        return np.asarray(said * pixels.importance)
+    def strip_information(strip: slice, pixels: PixelLoss) -> Doubles:
+        squares = np.square(lit.planes.pixels(strip))
+        information = sum(part[:, c] @ squares[..., c] for c in range(3))
+        return np.asarray(information * pixels.importance)
 
-    return np.concatenate(lit.pixels.map_strips(its))
+    return np.concatenate(lit.pixels.map_strips(strip_information))

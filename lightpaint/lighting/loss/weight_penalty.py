@@ -55,9 +55,9 @@ def dimming_factors(present: Doubles, weights: Doubles) -> Doubles:
     The pull to a light's colour goes with light squared, and would vanish with the light.
     Multiplied by this factor it goes with the light itself.
     """
-    now, then = (np.asarray(luminance(x), np.float64) for x in (present, weights))
+    now, after = (np.asarray(luminance(x), np.float64) for x in (present, weights))
     least = np.where(now > 0, now / MAX_DIMMING, 1)
-    return np.clip(now / np.maximum(then, least), 1, MAX_DIMMING)
+    return np.clip(now / np.maximum(after, least), 1, MAX_DIMMING)
 
 
 def pull_to_present(power: Doubles, present: Doubles) -> NormalEquations:

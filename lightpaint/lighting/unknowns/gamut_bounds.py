@@ -27,24 +27,26 @@ def solve_near_sides(
     start: (n, 3). Return the reduction with the sides that lights came to, and the weights (n, 3).
     """
     reduction = reduction.confined_to_sides(_repainted_sides(reduction))
-    found = solve_reduced(equations, reduction, start, method=method)
+    optimum = solve_reduced(equations, reduction, start, method=method)
     for _ in range(MAX_TURNS):
-        sides = _sides_outside(reduction, found.weights) | _next_sides(equations, reduction, found)
+        sides = _sides_outside(reduction, optimum.weights) | _next_sides(
+            equations, reduction, optimum
+        )
         if not sides:
             break
         reduction = reduction.confined_to_sides(sides)
-        found = solve_reduced(equations, reduction, found.weights, method=method)
-    return reduction, found.weights
+        optimum = solve_reduced(equations, reduction, optimum.weights, method=method)
+    return reduction, optimum.weights
 
 
 def _repainted_sides(reduction: Reduction) -> dict[int, int]:
     """Return places of the knobs whose gamuts the painting has changed, and their sides of now."""
     sides, gamuts = {}, reduction.gamuts
     for k in reduction.confined_knobs:
-        its, side, light = _confined_gamut(reduction, k)
+        gamut, side, light = _confined_gamut(reduction, k)
         assert gamuts is not None
-        if gamuts[light] is not its:
-            sides[k] = gamuts[light].side_towards(its.fan(side)[1:].sum(axis=0))
+        if gamuts[light] is not gamut:
+            sides[k] = gamuts[light].side_towards(gamut.fan(side)[1:].sum(axis=0))
     return sides
 
 
@@ -59,7 +61,7 @@ def _sides_outside(reduction: Reduction, weights: Doubles) -> dict[int, int]:
 
 
 def _next_sides(
-    equations: NormalEquations, reduction: Reduction, found: ReducedOptimum
+    equations: NormalEquations, reduction: Reduction, optimum: ReducedOptimum
 ) -> dict[int, int]:
     """Return places of the knobs that would gain beyond the ends of their sides, and the next
     sides.
@@ -71,13 +73,13 @@ def _next_sides(
     sides: dict[int, int] = {}
     if not reduction.confined_knobs:
         return sides
-    gradient = equations.gradient(found.weights)
+    gradient = equations.gradient(optimum.weights)
     for k in reduction.confined_knobs:
-        its, side, light = _confined_gamut(reduction, k)
-        x = found.x[list(reduction.places[k])]
+        gamut, side, light = _confined_gamut(reduction, k)
+        x = optimum.x[list(reduction.places[k])]
         if x[1] and x[2]:
             continue
-        slopes = its.primaries @ gradient[light]
+        slopes = gamut.primaries @ gradient[light]
         best, count = int(np.argmin(slopes)), len(slopes)
         first, last = side % count, (side + 1) % count
         if slopes[best] >= min(slopes[first], slopes[last], 0.0):

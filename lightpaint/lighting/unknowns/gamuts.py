@@ -83,19 +83,23 @@ class PaintedLight:
     ) -> "PaintedLight":
         """Sample the painted pixels of views, evenly spread.
 
-        views: of each the basis, the painting (h, w, 3), linear, and its importance (h, w). most:
-        pixels, about.
+        views: of each the basis, the painting (h, w, 3), linear, and its importance (h, w).
+        max_pixels: about how many are sampled.
         """
-        its = [_painted_pixels(importance, max_pixels) for _, _, importance in views]
-        step = max(1, sum(x.size for x in its) // max_pixels)
+        painted_pixels = [_painted_pixels(importance, max_pixels) for _, _, importance in views]
+        step = max(1, sum(x.size for x in painted_pixels) // max_pixels)
         rows, image, weight, albedo = [], [], [], []
-        for (basis, painting, importance), where in zip(views, its, strict=True):
-            some = where[::step]
-            rows.append(basis.planes.pixels(some))
-            image.append(painting.reshape(-1, 3)[some])
-            weight.append(importance.ravel()[some])
-            known = None if basis.features is None else basis.features.albedo.reshape(-1, 3)[some]
-            albedo.append(np.ones((some.size, 3), np.float32) if known is None else known)
+        for (basis, painting, importance), pixels in zip(views, painted_pixels, strict=True):
+            chosen = pixels[::step]
+            rows.append(basis.planes.pixels(chosen))
+            image.append(painting.reshape(-1, 3)[chosen])
+            weight.append(importance.ravel()[chosen])
+            albedo_of_view = (
+                None if basis.features is None else basis.features.albedo.reshape(-1, 3)[chosen]
+            )
+            albedo.append(
+                np.ones((chosen.size, 3), np.float32) if albedo_of_view is None else albedo_of_view
+            )
         return cls(
             np.concatenate(rows, axis=1),
             np.concatenate(image),
@@ -106,10 +110,10 @@ class PaintedLight:
 
 def _painted_pixels(importance: Floats, max_pixels: int) -> Indices:
     """Return places of painted pixels, (p,): every few pixels, where these give enough."""
-    every = importance.ravel()
-    thin = max(1, every.size // (SEARCH_FACTOR * max_pixels)) | 1
-    found = np.flatnonzero(every[::thin]) * thin
-    return found if thin == 1 or found.size >= max_pixels // 4 else np.flatnonzero(every)
+    flat = importance.ravel()
+    thin = max(1, flat.size // (SEARCH_FACTOR * max_pixels)) | 1
+    pixels = np.flatnonzero(flat[::thin]) * thin
+    return pixels if thin == 1 or pixels.size >= max_pixels // 4 else np.flatnonzero(flat)
 
 
 class Gamuts:
@@ -126,14 +130,14 @@ class Gamuts:
         self._light, self._power, self._present = light, power, present
         self._own = np.where(luminance(present)[:, None] > 0, present, 1.0)
         # Its own colour is within its gamut, and not at the edge of it.
-        own = chromaticity(self._own) @ DIRECTIONS.T
-        lamps, every = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
-        self._reach = np.maximum(own + 2 * REACH_STEP, lamps + WHITE_MARGIN)
-        self._whites = every
+        own_reach = chromaticity(self._own) @ DIRECTIONS.T
+        lamps, whites = (reach_of(white_range(*k).colors) for k in (LAMP_KELVINS, ALL_KELVINS))
+        self._reach = np.maximum(own_reach + 2 * REACH_STEP, lamps + WHITE_MARGIN)
+        self._whites = whites
         # Off-white lamps lie beside whites, and so does what they shine on; coloured ones are none.
-        self._off_white = np.maximum(own - every, 0).max(axis=1)
-        near = self._off_white <= PAINTED_MARGIN
-        self._tolerance = float(self._off_white[near].max(initial=0.0))
+        self._off_white = np.maximum(own_reach - whites, 0).max(axis=1)
+        is_near_white = self._off_white <= PAINTED_MARGIN
+        self._tolerance = float(self._off_white[is_near_white].max(initial=0.0))
         self._sides = sides_of(self._reach - REACH_STEP)
         self._needed: _NeededLight | None = None
         self._gamuts: dict[int, ColorHull] = {}
@@ -143,24 +147,22 @@ class Gamuts:
         if light not in self._gamuts:
             if self._needed is None:
                 self._needed = _NeededLight.of(self._light(), self._power, self._present)
-            own, wanted = self._reach[light], self._needed.reach(light)
-            beside = np.clip(2 * (wanted - own + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
-            reach = np.maximum(own, wanted + beside)
+            own_reach, needed = self._reach[light], self._needed.reach(light)
+            margin = np.clip(2 * (needed - own_reach + WHITE_MARGIN), WHITE_MARGIN, PAINTED_MARGIN)
+            reach = np.maximum(own_reach, needed + margin)
             # Paint that is cooler or warmer asks for other whites, and for none that is greener.
-            off = max(self._off_white[light], WHITE_MARGIN)
-            painted = np.maximum(wanted - self._whites - self._tolerance, 0)
-            whites = np.maximum(own, self._whites + off)
-            reach = np.minimum(reach, whites + PAINTED_FACTOR * painted)
+            off_white = max(self._off_white[light], WHITE_MARGIN)
+            beyond_whites = np.maximum(needed - self._whites - self._tolerance, 0)
+            whites = np.maximum(own_reach, self._whites + off_white)
+            reach = np.minimum(reach, whites + PAINTED_FACTOR * beyond_whites)
             reach = np.round(reach / REACH_STEP) * REACH_STEP
-            found, before = ColorHull(reach, self._own[light]), self._former_gamuts.get(light)
+            gamut, before = ColorHull(reach, self._own[light]), self._former_gamuts.get(light)
             is_same = before is not None and np.array_equal(before.reach, reach)
-            self._gamuts[light] = before if before is not None and is_same else found
+            self._gamuts[light] = before if before is not None and is_same else gamut
         return self._gamuts[light]
 
     def refresh(self) -> None:
-        """Forget what the painting needed before, and keep the objects of gamuts that stay the
-        same. What comes out the same is the same object.
-        """
+        """Forget what the painting needed. Gamuts that stay the same stay the same objects."""
         self._former_gamuts |= self._gamuts
         self._gamuts, self._needed = {}, None
 
@@ -168,10 +170,10 @@ class Gamuts:
         """Return those of some lights, (m,), whose colours in weights (n, 3) are outside their
         gamuts.
         """
-        its = weights[lights]
-        room = np.einsum("mkc,mc->mk", self._sides[lights], its)
-        known = (room >= -ROUND_OFF * its.sum(axis=1, keepdims=True)).all(axis=1)
-        return [k for k in lights[~known].tolist() if not self[k].has(weights[k])]
+        colors = weights[lights]
+        room = np.einsum("mkc,mc->mk", self._sides[lights], colors)
+        is_inside = (room >= -ROUND_OFF * colors.sum(axis=1, keepdims=True)).all(axis=1)
+        return [k for k in lights[~is_inside].tolist() if not self[k].has(weights[k])]
 
 
 @dataclass(frozen=True)
@@ -194,20 +196,20 @@ class _NeededLight:
         faint = FAINT_BRIGHTNESS * (now * size).mean() / np.where(size > 0, size, np.inf)
         lamps = np.where(now[:, None] > 0, present / np.where(now > 0, now, 1)[:, None], 1.0)
         lit = (np.maximum(now, faint)[:, None] * lamps)[:, None] * light.rows
-        look, painted = lit.sum(axis=0), np.asarray(luminance(light.image))
+        look, brightness = lit.sum(axis=0), np.asarray(luminance(light.image))
         dark = DARK_SHARE * np.percentile(luminance(look), 95) if len(look) else 0.0
-        counts = (look.min(axis=1) > 0) & (light.image.min(axis=1) >= 0) & (painted > dark)
+        counts = (look.min(axis=1) > 0) & (light.image.min(axis=1) >= 0) & (brightness > dark)
         share = np.asarray(luminance(lit[:, counts]) / luminance(look[counts]), np.float64)
-        wanted = light.image[counts] / look[counts] * (share.T @ lamps)
+        needed = light.image[counts] / look[counts] * (share.T @ lamps)
         # Errors of dim light show more: display values are near the root of light.
-        weight = light.weight[counts] * np.sqrt(painted[counts])
-        along = chromaticity(wanted) @ DIRECTIONS.T
+        weight = light.weight[counts] * np.sqrt(brightness[counts])
+        along = chromaticity(needed) @ DIRECTIONS.T
         # Light that makes up for coloured surfaces was not painted: the paint itself is no greener
         # than that.
         albedo = light.albedo[counts]
-        known = albedo.min(axis=1) > BLACK_ALBEDO
-        itself = light.image[counts][known] / albedo[known]
-        along[known] = np.minimum(along[known], chromaticity(itself) @ DIRECTIONS.T)
+        has_albedo = albedo.min(axis=1) > BLACK_ALBEDO
+        illumination = light.image[counts][has_albedo] / albedo[has_albedo]
+        along[has_albedo] = np.minimum(along[has_albedo], chromaticity(illumination) @ DIRECTIONS.T)
         return cls(along, share * weight)
 
     @cached_property

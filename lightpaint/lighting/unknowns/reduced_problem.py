@@ -36,10 +36,10 @@ class ReducedProblem:
     upper: Doubles
     caps: tuple[Cap, ...]
 
-    def restricted(self, here: Indices) -> "ReducedProblem":
+    def restricted(self, kept: Indices) -> "ReducedProblem":
         """Return the problem of some of its unknowns, (k,) places among them, with the others at
         0."""
-        place = {int(k): j for j, k in enumerate(here)}
+        place = {int(k): j for j, k in enumerate(kept)}
         caps = tuple(
             replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
             for cap in self.caps
@@ -47,11 +47,11 @@ class ReducedProblem:
         )
         return ReducedProblem(
             self.channels,
-            self.unknowns[here],
-            self.M[np.ix_(here, here)],
-            self.b[here],
-            self.lower[here],
-            self.upper[here],
+            self.unknowns[kept],
+            self.M[np.ix_(kept, kept)],
+            self.b[kept],
+            self.lower[kept],
+            self.upper[kept],
             caps,
         )
 
@@ -156,7 +156,7 @@ def _move_fixed_to_right(
 def _block_problems(
     left: tuple[Doubles, Doubles], across: Doubles | None, reduction: Reduction
 ) -> list[ReducedProblem]:
-    made = []
+    problems = []
     for block in reduction.blocks:
         lower, upper = reduction.lower[block.unknowns], reduction.upper[block.unknowns]
         M, b = _block_equations(*left, block)
@@ -165,8 +165,10 @@ def _block_problems(
             np.add.at(
                 M, (p.column, p.other_column), p.value * across[p.light, p.channel, p.other_channel]
             )
-        made.append(ReducedProblem(block.channels, block.unknowns, M, b, lower, upper, block.caps))
-    return made
+        problems.append(
+            ReducedProblem(block.channels, block.unknowns, M, b, lower, upper, block.caps)
+        )
+    return problems
 
 
 def _block_equations(M: Doubles, b: Doubles, block: Block) -> tuple[Doubles, Doubles]:

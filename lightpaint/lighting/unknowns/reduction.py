@@ -116,16 +116,16 @@ class Reduction:
     @cached_property
     def is_free(self) -> Bools:
         """(n,), which lights may have any colour, or any of a gamut."""
-        its = (knob for knob in self.knobs if knob.is_free or knob.gamut is not None)
-        free = {light for knob in its for light in knob.lights}
+        free_knobs = (knob for knob in self.knobs if knob.is_free or knob.gamut is not None)
+        free = {light for knob in free_knobs for light in knob.lights}
         return np.array([k in free for k in range(len(self.labels))], dtype=bool)
 
     @cached_property
     def caps(self) -> tuple[Cap, ...]:
         """Limits on sums of x."""
         return tuple(
-            Cap(its, *knob.limit)
-            for its, knob in zip(self.places, self.knobs, strict=True)
+            Cap(members, *knob.limit)
+            for members, knob in zip(self.places, self.knobs, strict=True)
             if knob.limit is not None
         )
 
@@ -160,36 +160,36 @@ class Reduction:
     @cached_property
     def knob_groups(self) -> tuple[KnobGroup, ...]:
         """The knobs, grouped by their numbers of unknowns and lights."""
-        found: dict[tuple[int, int], list[int]] = {}
+        by_size: dict[tuple[int, int], list[int]] = {}
         for k, knob in enumerate(self.knobs):
-            found.setdefault((len(knob.unknowns), len(knob.lights)), []).append(k)
+            by_size.setdefault((len(knob.unknowns), len(knob.lights)), []).append(k)
         return tuple(
-            KnobGroup.of([self.knobs[k] for k in its], [self.places[k] for k in its])
-            for its in found.values()
+            KnobGroup.of([self.knobs[k] for k in numbers], [self.places[k] for k in numbers])
+            for numbers in by_size.values()
         )
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
         """A block for every set of channels that the unknowns couple."""
         unknown, light, rgb = self.columns
-        made = []
+        blocks = []
         for channels in self.channel_groups:
-            its = np.unique(unknown[(rgb[:, channels] != 0).any(axis=1)])
+            members = np.unique(unknown[(rgb[:, channels] != 0).any(axis=1)])
             place = np.zeros(len(self.unknowns), dtype=np.intp)
-            place[its] = np.arange(its.size)
+            place[members] = np.arange(members.size)
             entries = []
             for c in channels:
-                there = rgb[:, c] != 0
-                here, first = np.unique(place[unknown[there]], return_index=True)
-                entries.append(Entries(here, light[there], rgb[there, c], first))
-            within = set(its.tolist())
-            cap_indices = [k for k, cap in enumerate(self.caps) if cap.unknowns[0] in within]
+                is_entry = rgb[:, c] != 0
+                columns, first = np.unique(place[unknown[is_entry]], return_index=True)
+                entries.append(Entries(columns, light[is_entry], rgb[is_entry, c], first))
+            in_block = set(members.tolist())
+            cap_indices = [k for k, cap in enumerate(self.caps) if cap.unknowns[0] in in_block]
             caps = tuple(
                 replace(cap, unknowns=tuple(int(place[i]) for i in cap.unknowns))
                 for cap in (self.caps[k] for k in cap_indices)
             )
-            made.append(Block(channels, its, tuple(entries), caps, cap_indices))
-        return tuple(made)
+            blocks.append(Block(channels, members, tuple(entries), caps, cap_indices))
+        return tuple(blocks)
 
     @cached_property
     def alike_blocks(self) -> AlikeBlocks | None:
@@ -199,9 +199,11 @@ class Reduction:
         first, *others = (block.entries[0].lights for block in self.blocks)
         if not all(np.array_equal(first, lights) for lights in others):
             return None
-        its = np.stack([block.unknowns for block in self.blocks])
-        every = np.array_equal(first, np.arange(len(self.fixed_weights)))
-        return AlikeBlocks(None if every else first, its, self.lower[its], self.upper[its])
+        unknowns = np.stack([block.unknowns for block in self.blocks])
+        is_all_lights = np.array_equal(first, np.arange(len(self.fixed_weights)))
+        return AlikeBlocks(
+            None if is_all_lights else first, unknowns, self.lower[unknowns], self.upper[unknowns]
+        )
 
     @cached_property
     def has_fixed_light(self) -> bool:
@@ -223,14 +225,14 @@ class Reduction:
         one of its lights determines all of them; fixed lights are determined already.
         """
         unknown, light, rgb = self.columns
-        moves, felt = rgb != 0, np.zeros(len(self.unknowns), dtype=bool)
-        np.logical_or.at(felt, unknown, (moves & lit[light]).any(axis=1))
-        moved, told = np.zeros_like(lit), np.zeros_like(lit)
-        np.logical_or.at(moved, light, moves)
-        np.logical_or.at(told, light, moves & felt[unknown, None])
+        moves, has_effect = rgb != 0, np.zeros(len(self.unknowns), dtype=bool)
+        np.logical_or.at(has_effect, unknown, (moves & lit[light]).any(axis=1))
+        is_moved, is_determined = np.zeros_like(lit), np.zeros_like(lit)
+        np.logical_or.at(is_moved, light, moves)
+        np.logical_or.at(is_determined, light, moves & has_effect[unknown, None])
         # The brightness of a colour without blue determines its blue, too.
-        either = told.any(axis=1, keepdims=True) | ~moved.any(axis=1, keepdims=True)
-        return np.asarray(told | (~moved & either))
+        either = is_determined.any(axis=1, keepdims=True) | ~is_moved.any(axis=1, keepdims=True)
+        return np.asarray(is_determined | (~is_moved & either))
 
     @cached_property
     def weight_ranges(self) -> tuple[Doubles, Doubles]:
@@ -239,8 +241,8 @@ class Reduction:
         low, high = self.fixed_weights.copy(), self.fixed_weights.copy()
         for end, bounds in ((low, self.lower), (high, self.upper)):
             most = np.broadcast_to(bounds[unknown, None], rgb.shape)
-            its = np.multiply(most, rgb, out=np.zeros(rgb.shape), where=rgb != 0)
-            np.add.at(end, light, its)
+            products = np.multiply(most, rgb, out=np.zeros(rgb.shape), where=rgb != 0)
+            np.add.at(end, light, products)
         return low, high
 
     @cached_property
@@ -271,7 +273,7 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
     by_light = constraints_by_light(constraints, lights)
     labels = ["" if constraint is None else constraint.label for constraint in by_light]
     tied, fixed, knobs = tied_lights(constraints, lights), np.zeros((len(lights), 3)), []
-    for k, (light, one) in enumerate(zip(lights, by_light, strict=True)):
+    for k, (light, constraint) in enumerate(zip(lights, by_light, strict=True)):
         if light.is_fixed:
             fixed[k] = 1
         elif k in tied:
@@ -280,20 +282,30 @@ def reduce_to(constraints: Constraints, lights: Sequence[BasisLight]) -> Reducti
             labels[k] = ", ".join(filter(None, [f"tied ({names})", labels[k]]))
             if k == members[0]:
                 knob = tied_knob(tie, members, names, lights, by_light)
-                if any(its.is_fixed for its in (by_light[i] for i in members) if its is not None):
+                if any(
+                    member_constraint.is_fixed
+                    for member_constraint in (by_light[i] for i in members)
+                    if member_constraint is not None
+                ):
                     [level] = knob.unknowns
                     for i, rgb in level.columns:
                         fixed[i] = level.lower * rgb
                 else:
                     knobs.append(knob)
-        elif one is not None and one.is_fixed:
-            fixed[k] = 0 if one.lock is None else locked_emission(light, one.lock, one.where)
-        elif one is None:
+        elif constraint is not None and constraint.is_fixed:
+            fixed[k] = (
+                0
+                if constraint.lock is None
+                else locked_emission(light, constraint.lock, constraint.where)
+            )
+        elif constraint is None:
             knobs.append(Knob.of_any_colour(k, is_scalar=light.is_scalar))
-        elif light.is_scalar or (one.primaries is not None and len(one.primaries) == 1):
-            knobs.append(dimmer_knob(k, light, one))
+        elif light.is_scalar or (
+            constraint.primaries is not None and len(constraint.primaries) == 1
+        ):
+            knobs.append(dimmer_knob(k, light, constraint))
         else:
-            knobs.append(mixing_knob(k, light, one))
+            knobs.append(mixing_knob(k, light, constraint))
     return Reduction(fixed, tuple(labels), tuple(knobs))
 
 

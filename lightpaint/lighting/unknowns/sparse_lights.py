@@ -42,13 +42,13 @@ class _Trials:
         rest = [k for k in range(len(self.places)) if k not in chosen]
         return chosen | {min(rest, key=lambda k: self.value(chosen | {k}))}
 
-    def after_exchanges(self, chosen: frozenset[int], kept: Collection[int]) -> frozenset[int]:
+    def after_exchanges(self, chosen: frozenset[int], always_on: Collection[int]) -> frozenset[int]:
         """Return `chosen` after all one-for-one exchanges that help."""
         while True:
             now = self.value(chosen)
             trials = [
                 chosen - {old} | {new}
-                for old in chosen.difference(kept)
+                for old in chosen.difference(always_on)
                 for new in range(len(self.places))
                 if new not in chosen
             ]
@@ -66,16 +66,17 @@ def choose_knobs(
     Several lights on one dimmer count as one. Knobs with a lower limit above 0 are always on.
     Raises ConstraintError if these are more.
     """
-    kept = frozenset(k for k, knob in enumerate(reduction.knobs) if _is_on(knob))
-    if len(kept) > count:
+    always_on = frozenset(k for k, knob in enumerate(reduction.knobs) if _is_on(knob))
+    if len(always_on) > count:
         raise ConstraintError(
-            f"sparse is {count}, but {len(kept)} lights have a lower limit above 0: allow as many"
+            f"sparse is {count}, but {len(always_on)} lights have a lower limit above 0: allow as "
+            "many"
         )
-    trials, chosen, path = _Trials(problems, reduction), kept, [kept] if kept else []
+    trials, chosen, path = _Trials(problems, reduction), always_on, [always_on] if always_on else []
     while len(chosen) < len(reduction.knobs) and len(chosen) < count + EXTRA_SIZES:
         chosen = trials.with_best(chosen)
         if len(chosen) == count:
-            chosen = trials.after_exchanges(chosen, kept)
+            chosen = trials.after_exchanges(chosen, always_on)
         path.append(chosen)
     return path
 
@@ -87,7 +88,9 @@ def _is_on(knob: Knob) -> bool:
 
 def _least_objective(problem: ReducedProblem, on: Collection[int]) -> float:
     """Return min xᵀM x − 2 bᵀx over the unknowns that are on."""
-    here = np.array([k for k, i in enumerate(problem.unknowns.tolist()) if i in on], dtype=np.intp)
-    p = problem.restricted(here)
+    active = np.array(
+        [k for k, i in enumerate(problem.unknowns.tolist()) if i in on], dtype=np.intp
+    )
+    p = problem.restricted(active)
     x = minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps).x
     return float(x @ p.M @ x - 2 * p.b @ x)

@@ -29,35 +29,37 @@ def nearest_unknowns(reduction: Reduction, start: Doubles, reached: Bools) -> Do
         if kind.is_free:
             x[kind.places] = np.minimum(np.maximum(present, low), high)
             continue
-        wanted = np.einsum("kue,ke->ku", kind.columns, present)
+        right_side = np.einsum("kue,ke->ku", kind.columns, present)
         if kind.is_orthogonal:
-            its = wanted / np.square(kind.columns).sum(axis=2)
+            values = right_side / np.square(kind.columns).sum(axis=2)
         else:
             squares = np.matmul(kind.columns, kind.columns.swapaxes(1, 2))
-            its = _solve_mixes(kind.columns, present)
-            out = np.flatnonzero(~((its >= low) & (its <= high)).all(axis=1))
-            if out.size:
-                low_out, high_out = low[out], high[out]
-                found = minimise_each(
-                    squares[out],
-                    wanted[out],
+            values = _solve_mixes(kind.columns, present)
+            violated = np.flatnonzero(~((values >= low) & (values <= high)).all(axis=1))
+            if violated.size:
+                low_out, high_out = low[violated], high[violated]
+                optima = minimise_each(
+                    squares[violated],
+                    right_side[violated],
                     lower=low_out,
                     upper=high_out,
                     start=np.clip(0, low_out, high_out),
                 )
-                its[out] = np.stack([optimum.x for optimum in found])
-        x[kind.places] = _snap_to_bounds(its, low, high)
+                values[violated] = np.stack([optimum.x for optimum in optima])
+        x[kind.places] = _snap_to_bounds(values, low, high)
     for stack in reduction.limited_knobs:
-        a, its, now = (
+        a, values, now = (
             stack.coefficients,
             stack.unknowns,
             (stack.coefficients * x[stack.unknowns]).sum(axis=1),
         )
-        wanted = np.minimum(np.maximum(now, stack.lower), stack.upper)
-        out = now != wanted
-        low, high = reduction.lower[its[out]], reduction.upper[its[out]]
-        x[its[out]] = clip_to_sums(a[out], x[its[out]], low, high, wanted[out])
-        for k in stack.knobs[out]:
+        right_side = np.minimum(np.maximum(now, stack.lower), stack.upper)
+        violated = now != right_side
+        low, high = reduction.lower[values[violated]], reduction.upper[values[violated]]
+        x[values[violated]] = clip_to_sums(
+            a[violated], x[values[violated]], low, high, right_side[violated]
+        )
+        for k in stack.knobs[violated]:
             knob = reduction.knobs[k]
             if not (knob.is_free or reached[knob.lights[0]]):
                 x[list(reduction.places[k])] = _nearest_limited(knob, start)
@@ -96,6 +98,6 @@ def _snap_to_bounds(x: Doubles, lower: Doubles, upper: Doubles) -> Doubles:
 
     Only unknowns exactly at a bound have multipliers.
     """
-    near = BOUND_ROUND_OFF * np.abs(x).max(axis=-1, keepdims=True, initial=0)
-    x = np.where(np.abs(x - lower) <= near, lower, np.maximum(x, lower))
-    return np.asarray(np.where(np.abs(x - upper) <= near, upper, np.minimum(x, upper)))
+    tolerance = BOUND_ROUND_OFF * np.abs(x).max(axis=-1, keepdims=True, initial=0)
+    x = np.where(np.abs(x - lower) <= tolerance, lower, np.maximum(x, lower))
+    return np.asarray(np.where(np.abs(x - upper) <= tolerance, upper, np.minimum(x, upper)))

@@ -81,13 +81,13 @@ class Block:
                 strict=True,
             )
         )
-        found = []
+        pairs = []
         by_light = np.argsort(light, kind="stable")
-        for its in np.split(by_light, np.flatnonzero(np.diff(light[by_light])) + 1):
-            a, b = (x.ravel() for x in np.meshgrid(its, its, indexing="ij"))
-            apart = channel[a] != channel[b]
-            found.append(np.stack([a[apart], b[apart]]))
-        a, b = np.concatenate(found, axis=1)
+        for members in np.split(by_light, np.flatnonzero(np.diff(light[by_light])) + 1):
+            a, b = (x.ravel() for x in np.meshgrid(members, members, indexing="ij"))
+            differ = channel[a] != channel[b]
+            pairs.append(np.stack([a[differ], b[differ]]))
+        a, b = np.concatenate(pairs, axis=1)
         return Pairs(column[a], column[b], value[a] * value[b], light[a], channel[a], channel[b])
 
     @cached_property

@@ -63,7 +63,7 @@ def solve_on_locus(
 
     start: (n, 3). A reduction whose lights still mix the ends of their ranges is solved like that
     first; another one goes on from the whites nearest to the start. steps: the most steps between
-    neighbours. how: options of `solve_reduced`.
+    neighbours. options: of `solve_reduced`.
     """
     if not reduction.white_knobs:
         return next_whites(equations, reduction, start, steps=steps, **options)
@@ -93,15 +93,15 @@ def next_whites(
     `solve_on_locus`.
     """
     groups = _groups(reduction, only)
-    found = solve_reduced(equations, reduction, _snap(groups, start), **options)
+    optimum = solve_reduced(equations, reduction, _snap(groups, start), **options)
     for _ in range(steps):
-        beyond = knobs_outside_gamuts(reduction, found.weights)
-        windows = {} if beyond else _better_windows(equations, reduction, groups, found)
+        beyond = knobs_outside_gamuts(reduction, optimum.weights)
+        windows = {} if beyond else _better_windows(equations, reduction, groups, optimum)
         if not (windows or beyond):
             break
         reduction = reduction.with_windows(windows).confined(beyond)
-        found = solve_reduced(equations, reduction, _snap(groups, found.weights), **options)
-    return reduction, found
+        optimum = solve_reduced(equations, reduction, _snap(groups, optimum.weights), **options)
+    return reduction, optimum
 
 
 def center_windows(reduction: Reduction, weights: Doubles, width: int = 1) -> Reduction:
@@ -126,24 +126,24 @@ def knobs_outside_gamuts(reduction: Reduction, weights: Doubles) -> list[int]:
     Lights first may have any colour: if all colours then lie in their gamuts, the answer is the
     best under gamuts, too, and has fewer unknowns.
     """
-    if not (its := reduction.gamut_knobs):
+    if not (free_knobs := reduction.gamut_knobs):
         return []
     assert reduction.gamuts is not None
-    lights = [reduction.knobs[k].lights[0] for k in its]
+    lights = [reduction.knobs[k].lights[0] for k in free_knobs]
     beyond = reduction.gamuts.lights_outside(weights, np.array(lights))
-    return [k for k, light in zip(its, lights, strict=True) if light in beyond]
+    return [k for k, light in zip(free_knobs, lights, strict=True) if light in beyond]
 
 
 def clip_to_gamuts(reduction: Reduction, weights: Doubles) -> Doubles:
     """Return weights (n, 3) with the nearest colour of its gamut for lights that keep to one."""
-    its, gamuts = reduction.gamut_knobs + reduction.confined_knobs, reduction.gamuts
-    if gamuts is None or not its:
+    knobs, gamuts = reduction.gamut_knobs + reduction.confined_knobs, reduction.gamuts
+    if gamuts is None or not knobs:
         return weights
-    moved = weights.copy()
-    lights = np.array([reduction.knobs[k].lights[0] for k in its])
+    clipped = weights.copy()
+    lights = np.array([reduction.knobs[k].lights[0] for k in knobs])
     for light in gamuts.lights_outside(weights, lights):
-        moved[light] = gamuts[light].nearest(weights[light])
-    return moved
+        clipped[light] = gamuts[light].nearest(weights[light])
+    return clipped
 
 
 def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_WhiteLights]:
@@ -153,10 +153,10 @@ def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_
         whites = reduction.knobs[k].whites
         assert whites is not None
         by_range.setdefault(whites, []).append(k)
-    made = []
+    groups = []
     for whites, places in by_range.items():
         limits = [reduction.knobs[k].limit for k in places]
-        made.append(
+        groups.append(
             _WhiteLights(
                 whites,
                 np.array(places, dtype=np.intp),
@@ -165,7 +165,7 @@ def _groups(reduction: Reduction, only: Collection[int] | None = None) -> list[_
                 np.array([np.inf if limit is None else limit[2] for limit in limits]),
             )
         )
-    return made
+    return groups
 
 
 def _is_whole(reduction: Reduction, k: int) -> bool:
@@ -176,62 +176,62 @@ def _is_whole(reduction: Reduction, k: int) -> bool:
 
 def _windows_about(groups: Sequence[_WhiteLights], weights: Doubles, width: int) -> Windows:
     windows = {}
-    for its in groups:
-        places = its.whites.places(weights[its.lights])
-        for k, place in zip(its.knobs.tolist(), places.tolist(), strict=True):
-            windows[k] = its.whites.window(place, width)
+    for group in groups:
+        places = group.whites.places(weights[group.lights])
+        for k, place in zip(group.knobs.tolist(), places.tolist(), strict=True):
+            windows[k] = group.whites.window(place, width)
     return windows
 
 
 def _snap(groups: Sequence[_WhiteLights], weights: Doubles) -> Doubles:
-    moved = weights.copy()
-    for its in groups:
-        moved[its.lights] = its.whites.nearest(weights[its.lights])
-    return moved
+    snapped = weights.copy()
+    for group in groups:
+        snapped[group.lights] = group.whites.nearest(weights[group.lights])
+    return snapped
 
 
 def _better_windows(
     equations: NormalEquations,
     reduction: Reduction,
     groups: Sequence[_WhiteLights],
-    found: ReducedOptimum,
+    optimum: ReducedOptimum,
 ) -> Windows:
     """Return windows of the lights that would gain by other whites; none where no light would.
 
     First all that move to the next white, none of which has to give up its present mix; only
     then the one light that gains most by a jump.
     """
-    gradient = equations.gradient(found.weights)
+    gradient = equations.gradient(optimum.weights)
     power = np.einsum("cii->ic", equations.M)
     # The slope of a light that is round-off, in units of its own picture.
     root = np.sqrt(power.sum(axis=1))
     size = np.abs(equations.b.T / np.sqrt(np.where(power > 0, power, 1))).max(initial=0)
-    little = ROUND_OFF * root * size
+    tolerances = ROUND_OFF * root * size
     windows: dict[int, tuple[int, int]] = {}
-    for its in groups:
-        slopes = gradient[its.lights] @ its.whites.colors.T
-        for j, k in enumerate(its.knobs.tolist()):
+    for group in groups:
+        slopes = gradient[group.lights] @ group.whites.colors.T
+        for j, k in enumerate(group.knobs.tolist()):
             window = reduction.knobs[k].window
-            x = found.x[list(reduction.places[k])]
-            to = _next_window(slopes[j], window, x, float(little[its.lights[j]]))
-            if to != window:
-                windows[k] = to
-    return windows or _distant_window(equations, reduction, groups, found, gradient)
+            x = optimum.x[list(reduction.places[k])]
+            next_window = _next_window(slopes[j], window, x, float(tolerances[group.lights[j]]))
+            if next_window != window:
+                windows[k] = next_window
+    return windows or _distant_window(equations, reduction, groups, optimum, gradient)
 
 
 def _next_window(
-    slopes: Doubles, window: tuple[int, int], x: Doubles, little: float
+    slopes: Doubles, window: tuple[int, int], x: Doubles, tolerance: float
 ) -> tuple[int, int]:
     """Return the window that a light of mix x, (2,), goes on to. slopes: (k,), of all whites."""
     first, last = window
     if not x.any():
         best = int(np.argmin(slopes))
-        if slopes[best] >= -little or first <= best <= last:
+        if slopes[best] >= -tolerance or first <= best <= last:
             return window
         return (best, best + 1) if best < len(slopes) - 1 else (best - 1, best)
-    if x[1] == 0 and first > 0 and slopes[first - 1] < slopes[first] - little:
+    if x[1] == 0 and first > 0 and slopes[first - 1] < slopes[first] - tolerance:
         return first - 1, first
-    if x[0] == 0 and last < len(slopes) - 1 and slopes[last + 1] < slopes[last] - little:
+    if x[0] == 0 and last < len(slopes) - 1 and slopes[last + 1] < slopes[last] - tolerance:
         return last, last + 1
     return window
 
@@ -240,30 +240,30 @@ def _distant_window(
     equations: NormalEquations,
     reduction: Reduction,
     groups: Sequence[_WhiteLights],
-    found: ReducedOptimum,
+    optimum: ReducedOptimum,
     gradient: Doubles,
 ) -> Windows:
     """Return the window of the one light that, moved alone, gains most by a white elsewhere."""
     best, windows = ROUND_OFF * float(np.abs(equations.target_norm2).sum()), {}
-    for its in groups:
-        colors, w = its.whites.colors, found.weights[its.lights]
-        own = np.einsum("cii,cd->icd", equations.M, np.eye(3))[its.lights]
+    for group in groups:
+        colors, w = group.whites.colors, optimum.weights[group.lights]
+        own_matrix = np.einsum("cii,cd->icd", equations.M, np.eye(3))[group.lights]
         if equations.coupling is not None:
-            own = own + equations.coupling[its.lights]
-        right = np.einsum("icd,id->ic", own, w) - gradient[its.lights]
-        now = np.einsum("ic,icd,id->i", w, own, w) - 2 * (w * right).sum(axis=1)
-        q, r = np.einsum("kc,icd,kd->ik", colors, own, colors), right @ colors.T
+            own_matrix = own_matrix + equations.coupling[group.lights]
+        right = np.einsum("icd,id->ic", own_matrix, w) - gradient[group.lights]
+        now = np.einsum("ic,icd,id->i", w, own_matrix, w) - 2 * (w * right).sum(axis=1)
+        q, r = np.einsum("kc,icd,kd->ik", colors, own_matrix, colors), right @ colors.T
         lit = q > 0
         Y = np.clip(
-            np.where(lit, r / np.where(lit, q, 1), 0), its.least[:, None], its.most[:, None]
+            np.where(lit, r / np.where(lit, q, 1), 0), group.least[:, None], group.most[:, None]
         )
         gains = np.where(lit, now[:, None] - (np.square(Y) * q - 2 * Y * r), 0)
         j, k = np.unravel_index(int(np.argmax(gains)), gains.shape)
-        knob, white = int(its.knobs[j]), int(k)
+        knob, white = int(group.knobs[j]), int(k)
         first, last = reduction.knobs[knob].window
         if gains[j, k] > best and not first <= white <= last:
             best = float(gains[j, k])
-            windows = {knob: its.whites.window(float(white), 1)}
+            windows = {knob: group.whites.window(float(white), 1)}
     return windows
 
 

@@ -84,7 +84,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
             kernel.
         folder: Receives what is exported.
         height: Of the painter, in pixels of the screen, at least 240.
-        layout: As of every widget: the room that it takes beside others.
+        layout: As for every widget: the room that it takes beside others.
         settings: Fields of `lp.Settings`, by name.
 
     Attributes:

@@ -95,7 +95,7 @@ class HistoryInfo:
 
 @dataclass(frozen=True)
 class ResolvedFit:
-    """The values in effect for settings that nobody has set, as of `lightpaint.Fit`."""
+    """The values in effect for settings that nobody has set, as in `lightpaint.Fit`."""
 
     space: str | None
     hold: float | None

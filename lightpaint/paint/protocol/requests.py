@@ -83,7 +83,7 @@ class Ask(Message, kind="ask"):
 
 @dataclass(frozen=True)
 class AskAll(Message, kind="ask_all"):
-    """The constraints on several lights from now on, by name, as of `Ask`: one step. Answered by
+    """The constraints on several lights from now on, by name, as in `Ask`: one step. Answered by
     `answer`.
     """
 
@@ -99,7 +99,7 @@ class TieLights(Message, kind="tie"):
 
 @dataclass(frozen=True)
 class Set(Message, kind="set"):
-    """Settings of the answer, as of `Fit`. Answered by `answer`.
+    """Settings of the answer, as in `Fit`. Answered by `answer`.
 
     values: of hold, space, colors, literal, prefer_current, sparse; null for the default that
     follows from the painting.

@@ -104,8 +104,8 @@ def page_app(
 class Server:
     """The server of one session.
 
-    host, port: as of `listen`; a host other than the loopback is for those who know why. listening:
-    the result of `listen`, which `close` closes. say: as of `Connections`. Raises PaintError where
+    host, port: as in `listen`; a host other than the loopback is for those who know why. listening:
+    the result of `listen`, which `close` closes. say: as in `Connections`. Raises PaintError where
     it cannot listen.
 
     Attributes:

@@ -11,7 +11,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.colour.photometry import photometry
 from lightpaint.lighting.analysis.analysis import Analysis
-from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Seen
+from lightpaint.lighting.analysis.appearance.appearance import INVISIBLE, Appearance
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.analysis.appearance.unpainted_change import UnpaintedChange
 from lightpaint.lighting.analysis.diagnosis import error_shares
@@ -69,7 +69,7 @@ CONSTRAINED_MISS_TEXTS = {"forbidden": "would need colours or levels that the li
 
 
 def light_info(light: BasisLight, scale: float) -> LightInfo:
-    """Return what does not change of a light. scale: as of `LightInfo`."""
+    """Return what does not change of a light. scale: as in `LightInfo`."""
     members = tuple(light.members)
     return LightInfo(
         name=light.name,
@@ -129,7 +129,7 @@ class Judgement:
     """The analysis of an answer, for the page.
 
     worst: of the view that is missed most. of_views: of each view; None for one that is not
-    painted. lights: `error`, `held` and `unreached` of each, as of `LightAnswer`.
+    painted. lights: `error`, `held` and `unreached` of each, as in `LightAnswer`.
     """
 
     worst: Closeness
@@ -191,41 +191,41 @@ def unpainted_text(*, is_asked: bool, is_white: bool) -> str:
     return f"Nothing is painted: {stay}."
 
 
-def sketch_headline(seen: Seen) -> str:
+def sketch_headline(appearance: Appearance) -> str:
     """Say how far a painting in progress has come, and what would bring it further: no judgement.
 
     A sketch begins with a stroke, of which little can come about before more is said. What it does
     to what is not painted is part of it.
     """
-    if seen.is_close:
-        return headline(seen)
-    phrase = _progress_phrase(seen)
-    if seen.place is None:
+    if appearance.is_close:
+        return headline(appearance)
+    phrase = _progress_phrase(appearance)
+    if appearance.place is None:
         return f"{phrase}. Paint what matters most, or give it more importance."
     # One reason at a time: the next one is told when that has been seen to.
-    first = replace(seen, reasons=seen.causes[:1])
-    missing = spoken_missing(seen)
+    first = replace(appearance, reasons=appearance.causes[:1])
+    missing = spoken_missing(appearance)
     text = f"{phrase}. {missing[0].upper()}{missing[1:]} is missing: {spoken_reason(first)}."
-    cause = removable_reason(seen)
+    cause = removable_reason(appearance)
     if cause is None or cause.kind not in ADVICE_TEXTS:
         return text
     return f"{text} {ADVICE_TEXTS[cause.kind]}"
 
 
-def _progress_phrase(seen: Seen) -> str:
+def _progress_phrase(appearance: Appearance) -> str:
     """Return `About half way (50 %), and changes the annex by ΔE 12`.
 
     The phrase praises nothing where the rest has changed by more than the paint has come closer.
     """
-    rest = seen.elsewhere if seen.changes_elsewhere else None
-    if seen.share_met < 0.005:  # which would be said as 0 %
-        phrase = WORSE_TEXT if seen.is_worse else NO_CLOSER_TEXT
-    elif rest is not None and seen.is_at_cost:
+    rest = appearance.unpainted_change if appearance.changes_unpainted else None
+    if appearance.share_met < 0.005:  # which would be said as 0 %
+        phrase = WORSE_TEXT if appearance.is_worse else NO_CLOSER_TEXT
+    elif rest is not None and appearance.is_at_cost:
         cost = f"{spoken_part(rest)} (ΔE {spoken_amount(rest.worst)})"
-        return f"{spoken_percent(seen.share_met)} of the way, at the cost of {cost}"
+        return f"{spoken_percent(appearance.share_met)} of the way, at the cost of {cost}"
     else:
-        far = next(words for least, words in PROGRESS_PHRASES if seen.share_met >= least)
-        phrase = f"{far} ({spoken_percent(seen.share_met)})"
+        far = next(words for least, words in PROGRESS_PHRASES if appearance.share_met >= least)
+        phrase = f"{far} ({spoken_percent(appearance.share_met)})"
     return phrase if rest is None else f"{phrase}, and changes {spoken_changed(rest)}"
 
 
@@ -234,33 +234,33 @@ def why_not_closer(analysis: Analysis) -> list[str]:
 
     Where it is missed most stands in `sketch_headline`, below the pictures.
     """
-    seen, diagnosis = analysis.seen, analysis.diagnosis
+    appearance, diagnosis = analysis.appearance, analysis.diagnosis
     if not (parts := error_shares(diagnosis)):
         return [NO_ERROR]
     problem = analysis.solution.problem
     words = MISS_TEXTS | (
         CONSTRAINED_MISS_TEXTS if problem.is_constrained or problem.fit.colors != "free" else {}
     )
-    words |= {"unreachable": MISS_TEXTS["unreachable"] + hold_clause(seen)}
+    words |= {"unreachable": MISS_TEXTS["unreachable"] + hold_clause(appearance)}
     percents = spoken_percents(parts.values())
     shares = [f"{share} {words[part]}" for part, share in zip(parts, percents, strict=True)]
     sentences = [f"Of the difference (large errors count most), {', '.join(shares)}."]
-    if seen.place is None and diagnosis.place is not None:
+    if appearance.place is None and diagnosis.place is not None:
         sentences.append(spoken_place(diagnosis.place))
-    return sentences + bound_sentences(diagnosis, seen, any_color=ANY_COLOR_TEXT)
+    return sentences + bound_sentences(diagnosis, appearance, any_color=ANY_COLOR_TEXT)
 
 
-def removable_reason(seen: Seen) -> Reason | None:
+def removable_reason(appearance: Appearance) -> Reason | None:
     """Return the reason in `sketch_headline`, where a person can remove it."""
-    if seen.is_close or seen.place is None or not seen.causes:
+    if appearance.is_close or appearance.place is None or not appearance.causes:
         return None
-    first = seen.causes[0]
+    first = appearance.causes[0]
     return None if first.kind == "views" else first
 
 
-def advice(seen: Seen) -> Advice | None:
+def advice(appearance: Appearance) -> Advice | None:
     """Return the same for a page, whose button it is: what to let go of, and what that brings."""
-    if (cause := removable_reason(seen)) is None:
+    if (cause := removable_reason(appearance)) is None:
         return None
     kind, names = cause.kind, tuple(cause.names)
     if kind != "hold":
@@ -273,15 +273,15 @@ def advice(seen: Seen) -> Advice | None:
 
 def _closeness(analysis: Analysis) -> Closeness:
     """Return how close one view is, and why not closer."""
-    seen = analysis.seen
+    appearance = analysis.appearance
     return Closeness(
-        headline=sketch_headline(seen),
-        help=advice(seen),
-        delta_e=seen.delta_e,
-        delta_e_asked=seen.asked,
+        headline=sketch_headline(appearance),
+        help=advice(appearance),
+        delta_e=appearance.delta_e,
+        delta_e_asked=appearance.requested_change,
         sentences=()
-        if seen.is_close
-        else tuple(bound_sentences(analysis.diagnosis, seen, any_color=ANY_COLOR_TEXT)),
+        if appearance.is_close
+        else tuple(bound_sentences(analysis.diagnosis, appearance, any_color=ANY_COLOR_TEXT)),
     )
 
 

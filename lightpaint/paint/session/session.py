@@ -208,7 +208,7 @@ class Session:
         raise PaintError(f"a session has no answer to {type(message).__name__}")
 
     def answer_update(self, **fields_of_answer: Any) -> AnswerUpdate:
-        """Return the weights as they are, while the brush is down. more: further fields."""
+        """Return the weights as they are, with further fields, while the brush is down."""
         fields = {"stroke": self._stroke, "exact": False, "version": self.version}
         mode, weights = self.live_answer.mode, self.weights
         return AnswerUpdate(**{**fields, "mode": mode, "weights": weights, **fields_of_answer})

@@ -15,7 +15,7 @@ class Pixels(NamedTuple):
     """Paint in a region.
 
     image: (rows, columns, 3) float32, linear. importance: (rows, columns) float32. at_least: (rows,
-    columns, 3), where brighter is as good, as of `Target`; None for nowhere.
+    columns, 3), where brighter is as good, as in `Target`; None for nowhere.
     """
 
     image: npt.NDArray[np.float32]

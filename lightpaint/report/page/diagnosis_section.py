@@ -10,7 +10,7 @@ from lightpaint.colour.color import luminance
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import by_bands
-from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.active_bound import Bound
@@ -98,12 +98,12 @@ def missed_section(
     current: Floats,
     *,
     transform: ViewTransform,
-    seen: Seen | None = None,
+    appearance: Appearance | None = None,
 ) -> str:
     """Return the section on the error: sentences, shares, maps and bounds."""
     if diagnosis is None:
         return ""
-    sentences = "".join(f"<p>{escape(text)}</p>" for text in error_sentences(diagnosis, seen))
+    sentences = "".join(f"<p>{escape(text)}</p>" for text in error_sentences(diagnosis, appearance))
     return (
         f'<section><h2>The difference</h2><div class="explained"><div>{sentences}</div>'
         f"{_shares(diagnosis)}</div>"

@@ -23,7 +23,7 @@ from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.images.pixel_blocks import covered, enlarged
-from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.verification import Verification
@@ -130,7 +130,7 @@ def look_html(
     predicted: Estimate,
     verification: Verification | None,
     *,
-    seen: Seen | None = None,
+    appearance: Appearance | None = None,
 ) -> str:
     """Return painting, prediction and render side by side, the verdict, and the lights."""
     images = [_on_grey(target.image, target.importance), predicted.image]
@@ -139,7 +139,7 @@ def look_html(
         images.append(covered(verification.verified.image, predicted.size))
         names.append("verified")
     transform = report_transform(target, solution.basis, predicted.image)
-    said = verdict(solution, predicted, verification, seen=seen)
+    said = verdict(solution, predicted, verification, appearance=appearance)
     return (
         _picture(", ".join(names), images, transform, paintings=1)
         + f"<p>{', '.join(names)}</p><p>{escape(said)}</p>{solution_html(solution)}"

@@ -19,7 +19,7 @@ from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import in_turns
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import covered
-from lightpaint.lighting.analysis.appearance.appearance import Seen
+from lightpaint.lighting.analysis.appearance.appearance import Appearance
 from lightpaint.lighting.analysis.appearance.color_choices import Choices
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
@@ -60,7 +60,7 @@ def report_page(
     diagnosis: Diagnosis | None = None,
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
-    seen: Seen | None = None,
+    appearance: Appearance | None = None,
     looks: CleanLooks | None = None,
     color_choices: Choices = (),
     missed: Residual | None = None,
@@ -70,9 +70,9 @@ def report_page(
     verification: None without a render that checks the prediction.
     command: the shell command that made the result.
     uncertainty, diagnosis, unconstrained, suggestions: without them the page has no such section.
-    seen: the result of `what_is_seen`, if known. looks: the pictures without their grain, which a
-    switch then shows. color_choices: the answers of other colours, if known. missed: the result of
-    `residual_of`.
+    appearance: the result of `compare_appearance`, if known. looks: the pictures without their
+    grain, which a switch then shows. color_choices: the answers of other colours, if known.
+    missed: the result of `residual_of`.
 
     Raises SizeError if target and basis differ in size.
     """
@@ -96,7 +96,7 @@ def report_page(
         ),
         "wipe": partial(_wipe, target, solution, looks, raw, transform=transform),
         "missed": partial(
-            missed_section, solution, diagnosis, current, transform=transform, seen=seen
+            missed_section, solution, diagnosis, current, transform=transform, appearance=appearance
         ),
         "constraints": partial(
             constraints_section, basis, solution, unconstrained, transform=transform, looks=looks
@@ -110,7 +110,7 @@ def report_page(
     template = resources.files("lightpaint.report.page").joinpath("page.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
         **drawn,
-        **_texts(basis, target, solution, predicted, verification, seen),
+        **_texts(basis, target, solution, predicted, verification, appearance),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
         suggestions=suggestion_section(
             suggestions,
@@ -129,14 +129,14 @@ def _texts(
     solution: Solution,
     predicted: Estimate,
     verification: Verification | None,
-    seen: Seen | None,
+    appearance: Appearance | None,
 ) -> dict[str, str]:
     """Return the parts of the page without a picture, by their marks in it."""
     return {
         "title": escape(f"{target.name} · {basis.origin.scene}"),
         "target": escape(target.name),
         "scene": escape(f"{basis.origin.scene}, sensor {basis.origin.sensor}"),
-        "verdict": escape(verdict(solution, predicted, verification, seen=seen)),
+        "verdict": escape(verdict(solution, predicted, verification, appearance=appearance)),
         "meant": escape(fit_sentence(solution)),
         "banner": _banner(verification) + _notes(emitter_remarks(target, solution, predicted)),
         "fit": fit_table(solution),

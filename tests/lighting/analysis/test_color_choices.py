@@ -5,7 +5,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from lightpaint.lighting.analysis.appearance.appearance import what_is_seen
+from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
 from lightpaint.lighting.analysis.appearance.color_choices import MIN_SAMPLE, color_choices
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Colors
@@ -33,7 +33,7 @@ def _target(size: tuple[int, int] = SIZE) -> Target:
 
 
 def _choices(solution: Any) -> Any:
-    [found] = color_choices(solution, [what_is_seen(solution).delta_e])
+    [found] = color_choices(solution, [compare_appearance(solution).delta_e])
     return found
 
 
@@ -47,7 +47,7 @@ def test_choices_are_what_solving_with_them_gives(make_basis: Any, colors: Color
     for choice in found:
         other = solve(basis, target, colors=choice.colors)
         np.testing.assert_allclose(choice.weights, other.weights, rtol=1e-9, atol=1e-12)
-        assert choice.delta_e == pytest.approx(what_is_seen(other).delta_e, rel=1e-4)
+        assert choice.delta_e == pytest.approx(compare_appearance(other).delta_e, rel=1e-4)
 
 
 @pytest.mark.parametrize("colors", get_args(Colors))
@@ -58,7 +58,7 @@ def test_on_a_display_a_sample_of_the_pixels_says_nearly_the_same(make_basis: An
     assert size[0] * size[1] > 2 * MIN_SAMPLE
     found = _choices(solve(basis, target, colors=colors, space="display"))
     for choice in found:
-        other = what_is_seen(solve(basis, target, colors=choice.colors, space="display"))
+        other = compare_appearance(solve(basis, target, colors=choice.colors, space="display"))
         assert choice.delta_e == pytest.approx(other.delta_e, abs=0.1)
 
 
@@ -106,7 +106,7 @@ def test_several_views_have_one_lighting_and_a_look_each(make_basis: Any):
     basis, target = _basis(make_basis), _target()
     plain = Target.of(np.full((*SIZE, 3), 0.3, np.float32), name="plain")
     solution = solve([basis, basis], [target, plain])
-    each = [what_is_seen(view).delta_e for view in solution.views]
+    each = [compare_appearance(view).delta_e for view in solution.views]
     found = color_choices(solution, each)
     assert [[x.delta_e for x in its if x.is_chosen] for its in found] == [[each[0]], [each[1]]]
     for one, other in zip(*found, strict=True):

@@ -61,43 +61,44 @@ FIXING_KINDS: tuple[ConstraintKind, ...] = ("off", "lock")
 
 @keywords()
 @dataclass(frozen=True)
-class Seen:
-    """The visible difference between an answer and its painting: mean CIEDE2000 over the paint.
+class Appearance:
+    """The comparison of an answer with its painting, as people see both: mean CIEDE2000.
 
     Attributes:
         delta_e: Of the prediction, with its noise.
         noise: The part of it that noise explains; 0 for unknown noise.
-        asked: Of the present scene: the change that the painting asks for.
+        requested_change: Of the present scene: the change that the painting asks for.
         place: The place with most of the error, and its object; None without error, and of several
             views.
         is_spot: Whether the error in that place is visible at a glance.
-        there: Lights that reach that place, the strongest first; if it is too bright, the lights
-            that make it so.
-        does_much: Whether one of them contributes much there.
-        kept_there: Those of them that constraints hold back.
+        local_lights: Lights that reach that place, the strongest first; if it is too bright, the
+            lights that make it so.
+        has_strong_light: Whether one of them contributes much there.
+        held_lights: Those of them that constraints hold back.
         reasons: Constraints, holds and other views that keep the lights from the painting, the
             most important first, with the share of the error that vanishes without them.
-        parts: Shares of the error of the fit that no light can change: `unreachable`, `forbidden`,
-            `noise`, `painting_noise`, and `compromise` of several views. Empty if not computed.
-        elsewhere: The change of the rest, for a painting over the present look.
+        error_shares: Shares of the error of the fit that no light can change: `unreachable`,
+            `forbidden`, `noise`, `painting_noise`, and `compromise` of several views. Empty if not
+            computed.
+        unpainted_change: The change of the rest, for a painting over the present look.
 
     Examples:
-        >>> seen = lp.what_is_seen(lp.solve(basis, target))
-        >>> seen.is_close, round(seen.missed, 1)
+        >>> appearance = lp.compare_appearance(lp.solve(basis, target))
+        >>> appearance.is_close, round(appearance.error, 1)
         (True, 0.0)
     """
 
     delta_e: float
     noise: float
-    asked: float
+    requested_change: float
     place: Place | None = None
     is_spot: bool = False
-    there: tuple[str, ...] = ()
-    does_much: bool = True
-    kept_there: tuple[str, ...] = ()
+    local_lights: tuple[str, ...] = ()
+    has_strong_light: bool = True
+    held_lights: tuple[str, ...] = ()
     reasons: tuple[Reason, ...] = ()
-    parts: Mapping[str, float] = field(default_factory=dict)
-    elsewhere: UnpaintedChange | None = None
+    error_shares: Mapping[str, float] = field(default_factory=dict)
+    unpainted_change: UnpaintedChange | None = None
 
     __repr__ = short_repr
 
@@ -120,59 +121,64 @@ class Seen:
         return tuple(name for x in self.causes if x.kind == "views" for name in x.names)
 
     @property
-    def is_beyond(self) -> bool:
+    def is_out_of_reach(self) -> bool:
         """True if a third of the error is out of reach of the lights, whatever the constraints."""
-        if not self.parts:
+        if not self.error_shares:
             return True
-        return self.parts.get("unreachable", 0) + self.parts.get("forbidden", 0) >= HEADLINE_SHARE
+        return (
+            self.error_shares.get("unreachable", 0) + self.error_shares.get("forbidden", 0)
+            >= HEADLINE_SHARE
+        )
 
     @property
-    def noise_that_counts(self) -> str:
+    def main_noise(self) -> str:
         """`noise` or `painting_noise`, if a third of the error is that; else ""."""
-        its = {part: self.parts.get(part, 0.0) for part in ("noise", "painting_noise")}
-        part = max(its, key=its.__getitem__)
-        return part if its[part] >= HEADLINE_SHARE else ""
+        noise_shares = {
+            part: self.error_shares.get(part, 0.0) for part in ("noise", "painting_noise")
+        }
+        part = max(noise_shares, key=noise_shares.__getitem__)
+        return part if noise_shares[part] >= HEADLINE_SHARE else ""
 
     @property
     def is_at_cost(self) -> bool:
         """True if unpainted pixels have changed by more than painted ones have come closer."""
-        rest = self.elsewhere
-        if rest is None or not self.changes_elsewhere:
+        rest = self.unpainted_change
+        if rest is None or not self.changes_unpainted:
             return False
-        return rest.delta_e > max(self.asked - self.missed, 0)
+        return rest.delta_e > max(self.requested_change - self.error, 0)
 
     @property
-    def changes_elsewhere(self) -> bool:
+    def changes_unpainted(self) -> bool:
         """True if an unpainted place looks different at a glance."""
-        return self.elsewhere is not None and self.elsewhere.worst > NOTICED
+        return self.unpainted_change is not None and self.unpainted_change.worst > NOTICED
 
     @property
-    def missed(self) -> float:
+    def error(self) -> float:
         """The error of the lighting itself, without noise."""
         return self.delta_e - self.noise
 
     @property
     def is_worse(self) -> bool:
         """True if the present scene is closer to the paint, in the numbers that people are told."""
-        return round(self.delta_e, 1) > round(self.asked, 1)
+        return round(self.delta_e, 1) > round(self.requested_change, 1)
 
     @property
     def share_met(self) -> float:
         """Share of the requested change that has come about: 1 − `delta_e` / `asked`, at least
         0."""
-        if self.asked > 0:
-            return max(1 - self.delta_e / self.asked, 0.0)
+        if self.requested_change > 0:
+            return max(1 - self.delta_e / self.requested_change, 0.0)
         return float(self.delta_e == 0)
 
     @property
     def is_in_vain(self) -> bool:
         """True if hardly any of the requested change has come about."""
-        return self.missed > max(INVISIBLE, (1 - MIN_CHANGE) * self.asked)
+        return self.error > max(INVISIBLE, (1 - MIN_CHANGE) * self.requested_change)
 
     @property
     def is_close(self) -> bool:
         """True if the two look alike; not if little was asked and less has come about."""
-        return self.missed <= CLOSE and not self.is_in_vain
+        return self.error <= CLOSE and not self.is_in_vain
 
     @property
     def is_far(self) -> bool:
@@ -180,14 +186,14 @@ class Seen:
 
         Not if more than half of the requested change has come about.
         """
-        is_another = self.missed > FAR and self.missed > FAR_SHARE * self.asked
+        is_another = self.error > FAR and self.error > FAR_SHARE * self.requested_change
         return is_another or self.is_in_vain
 
 
 @keywords()
-def what_is_seen(
+def compare_appearance(
     solution: Solution, predicted: Estimate | None = None, *, diagnosis: Diagnosis | None = None
-) -> Seen:
+) -> Appearance:
     """Measure the visible difference of `solution` from its painting, with place and reasons.
 
     Args:
@@ -196,7 +202,7 @@ def what_is_seen(
         diagnosis: The result of `diagnose`, if known.
 
     Examples:
-        >>> lp.what_is_seen(lp.solve(basis, target)).delta_e < 0.1
+        >>> lp.compare_appearance(lp.solve(basis, target)).delta_e < 0.1
         True
     """
     problem = solution.problem
@@ -206,35 +212,41 @@ def what_is_seen(
     now = look.pixels(problem.basis.present_look)
     with_noise, missed = block_differences(look, light, grain)
     delta_e, left = (float(np.average(x, weights=look.block_weights)) for x in (with_noise, missed))
-    seen = Seen(delta_e, max(delta_e - left, 0.0), look.mean(look.difference(now)))
+    appearance = Appearance(delta_e, max(delta_e - left, 0.0), look.mean(look.difference(now)))
     if len(problem.views) > 1:
-        return seen
-    seen = replace(seen, elsewhere=_unpainted_change(solution, look, predicted))
+        return appearance
+    appearance = replace(appearance, unpainted_change=_unpainted_change(solution, look, predicted))
     if not missed.any():
-        return seen
+        return appearance
     place, share = place_with_most_error(look, missed, light, grain)
-    seen = replace(seen, place=place, is_spot=share >= SPOT)
-    if seen.is_close and not seen.is_spot:
-        return seen
-    there, does_much = lights_at(solution, place)
+    appearance = replace(appearance, place=place, is_spot=share >= SPOT)
+    if appearance.is_close and not appearance.is_spot:
+        return appearance
+    local_lights, has_strong_light = lights_at(solution, place)
     if (objects := solution.basis.objects) is not None:
-        seen = replace(
-            seen, place=replace(place, object=object_with_most_error(look, objects, missed, light))
+        appearance = replace(
+            appearance,
+            place=replace(place, object=object_with_most_error(look, objects, missed, light)),
         )
     # Without the constraint to be white, which applies to all.
     by_light = constraints_by_light(problem.constraints, solution.basis.lights)
     tied = tied_lights(problem.constraints, solution.basis.lights)
-    kept = {
+    held = {
         light.name
         for k, light in enumerate(solution.lighting.lights)
         if light.is_active and (by_light[k] is not None or k in tied)
     }
-    kept_there = tuple(name for name in there if name in kept)
-    seen = replace(seen, there=there, does_much=does_much, kept_there=kept_there)
+    held_lights = tuple(name for name in local_lights if name in held)
+    appearance = replace(
+        appearance,
+        local_lights=local_lights,
+        has_strong_light=has_strong_light,
+        held_lights=held_lights,
+    )
     return replace(
-        seen,
+        appearance,
         reasons=reasons_of(solution),
-        parts=error_shares(diagnosis or diagnose(solution)),
+        error_shares=error_shares(diagnosis or diagnose(solution)),
     )
 
 
@@ -252,8 +264,8 @@ def _unpainted_change(
     kinds = ConstraintsByLight.of(solution.problem.constraints, basis.lights).kinds()
     before = basis.present_weights.copy()
     for kind in FIXING_KINDS:
-        its = list(kinds.get(kind, ()))
-        before[its] = solution.weights[its]
+        fixed_lights = list(kinds.get(kind, ()))
+        before[fixed_lights] = solution.weights[fixed_lights]
     is_present = np.array_equal(before, basis.present_weights)
     now = basis.present_look if is_present else basis.mix(before)
     return unpainted_change(look, basis, target.importance > 0, now, predicted.image)

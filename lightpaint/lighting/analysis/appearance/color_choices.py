@@ -54,7 +54,7 @@ class ColorChoice:
     Attributes:
         colors: The choice.
         is_chosen: Whether it is the answer's own choice.
-        delta_e: Mean CIEDE2000 over the paint, as in `Seen`, with noise.
+        delta_e: Mean CIEDE2000 over the paint, as in `Appearance`, with noise.
         light: The light whose hue differs most from the answer's, as far as the picture shows it;
             "" if none does, and for the answer itself.
         before, color: The emission of that light in the answer, or at present if it is off, and
@@ -94,7 +94,8 @@ def color_choices(
     if not best:
         return tuple(() for _ in solution.views)
     return tuple(
-        _view_choices(view, its, best) for view, its in zip(solution.views, delta_e, strict=True)
+        _view_choices(view, error, best)
+        for view, error in zip(solution.views, delta_e, strict=True)
     )
 
 
@@ -102,43 +103,43 @@ def best_by_colors(solution: Solution) -> dict[Colors, Doubles]:
     """Solve with each choice of `colors`; return weights, (n, 3), none if there is no choice."""
     problem = solution.problem
     is_grey = problem.equations.reached.any(axis=0).sum() < 2
-    found: dict[Colors, Doubles] = {}
+    best: dict[Colors, Doubles] = {}
     if is_grey or not _with_colors(problem, "free").keeps_color.any():
-        return found
-    best = _solver(solution)
+        return best
+    solve_problem = _solver(solution)
     for colors in get_args(Colors):
         with suppress(ConstraintError):  # another constraint may exclude white
-            found[colors] = best(_with_colors(problem, colors))
-    return found
+            best[colors] = solve_problem(_with_colors(problem, colors))
+    return best
 
 
 def _solver(solution: Solution) -> Callable[[Problem], Doubles]:
     """Return a function that solves the problem with other colours for its weights (n, 3)."""
-    once = _single_solver(solution)
+    single_solver = _single_solver(solution)
 
     def best(problem: Problem) -> Doubles:
-        weights = once(problem)
+        weights = single_solver(problem)
         if problem.fit.colors != "gentle" or problem.dimming is not None:
             return weights
         dimming = dimming_factors(problem.basis.present_weights, weights)
-        return once(replace(problem, dimming=dimming))
+        return single_solver(replace(problem, dimming=dimming))
 
     return best
 
 
 def _single_solver(solution: Solution) -> Callable[[Problem], Doubles]:
     """Return the same function with the pull to colours that a problem has."""
-    loss, at, solved = solution.problem.loss, solution.weights, solution.problem.solved
+    loss, weights, solved = solution.problem.loss, solution.weights, solution.problem.solved
 
     def squares(problem: Problem) -> tuple[Problem, Doubles]:
-        asked = problem.with_pull(solved)
-        reduction, found = solve_on_locus(asked, problem.reduction, at)
-        return problem.with_whites(reduction), found.weights
+        equations = problem.with_pull(solved)
+        reduction, optimum = solve_on_locus(equations, problem.reduction, weights)
+        return problem.with_whites(reduction), optimum.weights
 
     if solution.problem.is_linear:
         return lambda problem: squares(problem)[1]
     lit = LitPixels.of(solution.basis, loss)
-    size = max(MIN_SAMPLE, PIXELS_PER_LIGHT * len(at))
+    size = max(MIN_SAMPLE, PIXELS_PER_LIGHT * len(weights))
     part = lit
     if np.count_nonzero(loss.importance) > size:
         part = sample_pixels(lit, np.einsum("cii->ic", solution.equations.M), size)
@@ -147,21 +148,21 @@ def _single_solver(solution: Solution) -> Callable[[Problem], Doubles]:
         def solve(equations: NormalEquations, begin: Doubles) -> Doubles:
             return solve_reduced(problem.with_pull(equations), problem.reduction, begin).weights
 
-        asked = WeightTerms(problem.pull)
-        return run_rounds(part, asked, begin, solve, from_clipping=False, until=LAST_STEP)
+        terms = WeightTerms(problem.pull)
+        return run_rounds(part, terms, begin, solve, from_clipping=False, until=LAST_STEP)
 
     def best(problem: Problem) -> Doubles:
         problem, begin = squares(problem)
-        found = led(problem, begin)
-        its = problem.reduction
-        for _ in range(MAX_WHITE_STEPS if its.white_knobs or its.gamut_knobs else 0):
-            asked = problem.with_pull(found.equations)
-            reduction, near = next_whites(asked, problem.reduction, found.weights)
-            if relative_change(found.equations, found.weights, near.weights) <= LAST_STEP:
+        descent = led(problem, begin)
+        is_bounded = problem.reduction.white_knobs or problem.reduction.gamut_knobs
+        for _ in range(MAX_WHITE_STEPS if is_bounded else 0):
+            equations = problem.with_pull(descent.equations)
+            reduction, optimum = next_whites(equations, problem.reduction, descent.weights)
+            if relative_change(descent.equations, descent.weights, optimum.weights) <= LAST_STEP:
                 break
             problem = problem.with_whites(reduction)
-            found = led(problem, near.weights)
-        return found.weights
+            descent = led(problem, optimum.weights)
+        return descent.weights
 
     return best
 

@@ -38,25 +38,25 @@ class ConstraintsByLight:
     def of(constraints: Constraints, lights: Sequence[BasisLight]) -> "ConstraintsByLight":
         """Resolve `constraints` on these lights."""
         tables = [
-            {key: value for key, value in its.items() if value is not False}
-            for its, _ in tables_by_light(constraints, lights)
+            {key: value for key, value in table.items() if value is not False}
+            for table, _ in tables_by_light(constraints, lights)
         ]
         return ConstraintsByLight(lights, tables, constraints)
 
     def kinds(self) -> dict[ConstraintKind, tuple[int, ...]]:
         """Return the kinds of constraints that there are, and places of the lights under each."""
         tied = tied_lights(self.constraints, self.lights)
-        found: dict[ConstraintKind, tuple[int, ...]] = {
+        by_kind: dict[ConstraintKind, tuple[int, ...]] = {
             kind: tuple(
-                k for k, its in enumerate(self.tables) if set(KEYS_BY_KIND[kind]) & set(its)
+                k for k, table in enumerate(self.tables) if set(KEYS_BY_KIND[kind]) & set(table)
             )
             for kind in SINGLE_LIGHT_KINDS
         }
-        found["tie"] = tuple(sorted(tied))
-        every = tuple(k for k, light in enumerate(self.lights) if not light.is_fixed)
-        found["sparse"] = every if self.constraints.sparse is not None else ()
-        found["prefer_current"] = every if self.constraints.prefer_current else ()
-        return {kind: its for kind, its in found.items() if its}
+        by_kind["tie"] = tuple(sorted(tied))
+        all_lights = tuple(k for k, light in enumerate(self.lights) if not light.is_fixed)
+        by_kind["sparse"] = all_lights if self.constraints.sparse is not None else ()
+        by_kind["prefer_current"] = all_lights if self.constraints.prefer_current else ()
+        return {kind: table for kind, table in by_kind.items() if table}
 
     def without(self, kind: ConstraintKind, lights: Collection[int]) -> Constraints:
         """Return the constraints without one kind, for lights at these places."""
@@ -66,20 +66,20 @@ class ConstraintsByLight:
             return replace(self.constraints, prefer_current=0.0)
         if kind == "tie":
             tied = tied_lights(self.constraints, self.lights)
-            gone = {id(tied[k][0]) for k in lights}
-            kept = tuple(tie for tie in self.constraints.ties if id(tie) not in gone)
-            return replace(self.constraints, ties=kept)
+            removed = {id(tied[k][0]) for k in lights}
+            ties = tuple(tie for tie in self.constraints.ties if id(tie) not in removed)
+            return replace(self.constraints, ties=ties)
         left = [
             {
                 key: value
-                for key, value in its.items()
+                for key, value in table.items()
                 if k not in lights or key not in KEYS_BY_KIND[kind]
             }
-            for k, its in enumerate(self.tables)
+            for k, table in enumerate(self.tables)
         ]
-        each = tuple(
-            (light.name, its, f"light.{light.name}")
-            for light, its in zip(self.lights, left, strict=True)
-            if its
+        remaining = tuple(
+            (light.name, table, f"light.{light.name}")
+            for light, table in zip(self.lights, left, strict=True)
+            if table
         )
-        return replace(self.constraints, lights=each)
+        return replace(self.constraints, lights=remaining)

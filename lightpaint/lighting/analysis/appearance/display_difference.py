@@ -38,18 +38,18 @@ class PaintComparison:
 
     @staticmethod
     def of_problem(problem: Problem, *, max_pixels: int = MAX_COMPARED_PIXELS) -> "PaintComparison":
-        """Choose pixels of the painting of a problem, in all its views. most: pixels, about."""
+        """Choose pixels of the painting of a problem, in all its views, about `max_pixels`."""
         views = problem.views
         weight = views.join([target.importance for target in views.targets])
         step = max(int(np.sqrt((weight > 0).sum() / max_pixels)), 1)
         if not weight[::step, ::step].any():
             step = 1
-        every = (slice(None, None, step), slice(None, None, step))
+        compared = (slice(None, None, step), slice(None, None, step))
         return PaintComparison(
             # Copies, which do not keep the whole pictures.
-            target_light(views)[every].astype(np.float64),
-            at_least_mask(views)[every].copy(),
-            weight[every].astype(np.float64),
+            target_light(views)[compared].astype(np.float64),
+            at_least_mask(views)[compared].copy(),
+            weight[compared].astype(np.float64),
             step,
             display_transform(problem),
             problem.loss.transform,
@@ -160,9 +160,9 @@ class PaintComparison:
 def display_transform(problem: Problem) -> ViewTransform:
     """Return the view of the painting or, if it holds light, sRGB at a fitting exposure."""
     target = problem.views.targets[0]
-    known = problem.fit.transform or target.transform
-    if known is not None:
-        return known
+    chosen = problem.fit.transform or target.transform
+    if chosen is not None:
+        return chosen
     return ViewTransform("srgb", choose_exposure(target.image[target.importance > 0][None]))
 
 

@@ -54,15 +54,15 @@ def place_with_most_error(
     if not amount.any():
         amount = weights * missed
     region = np.zeros((REGIONS, REGIONS))
-    at = [REGIONS * np.arange(length) // length for length in amount.shape]
-    np.add.at(region, np.ix_(*at), amount)
+    regions_of = [REGIONS * np.arange(length) // length for length in amount.shape]
+    np.add.at(region, np.ix_(*regions_of), amount)
     worst = np.unravel_index(int(np.argmax(region)), region.shape)
-    inside = (at[0] == worst[0])[:, None] & (at[1] == worst[1])
+    inside = (regions_of[0] == worst[0])[:, None] & (regions_of[1] == worst[1])
     row, column = np.unravel_index(int(np.argmax(np.where(inside, amount, -1))), amount.shape)
     # Paint and answer there, weighted by the error.
-    its = np.where(inside, amount, 0)
+    error_weights = np.where(inside, amount, 0)
     painted, reached = (
-        np.average(look.in_blocks(x).reshape(-1, 3), axis=0, weights=its.ravel())
+        np.average(look.in_blocks(x).reshape(-1, 3), axis=0, weights=error_weights.ravel())
         for x in (look.painted[look.counts].astype(np.float64), light)
     )
     place = Place(
@@ -83,9 +83,9 @@ def _block_errors(look: PaintComparison, light: Doubles, grain: Doubles) -> Doub
     whole = look.in_blocks(look.fit_errors(light))
     if not grain.any():
         return whole
-    shown, meant = look.compare(light), look.compare(look.goal(light))
-    of_means = np.square(look.in_blocks(meant) - look.in_blocks(shown)).sum(axis=-1)
-    noise = look.in_blocks(np.square(look.compare(light + grain) - shown).sum(axis=-1))
+    values, goal_values = look.compare(light), look.compare(look.goal(light))
+    of_means = np.square(look.in_blocks(goal_values) - look.in_blocks(values)).sum(axis=-1)
+    noise = look.in_blocks(np.square(look.compare(light + grain) - values).sum(axis=-1))
     return np.asarray(whole - np.minimum(noise, np.maximum(whole - of_means, 0)))
 
 
@@ -94,8 +94,8 @@ def object_with_most_error(
 ) -> str:
     """Return the object with most of the visible error; "" if there is no single one."""
     noticed = missed > NOTICED
-    told = look.spread_blocks(noticed if noticed.any() else missed > 0)
-    amount = told * look.fit_errors(light) * look.weight[look.counts]
+    is_counted = look.spread_blocks(noticed if noticed.any() else missed > 0)
+    amount = is_counted * look.fit_errors(light) * look.weight[look.counts]
     return object_with_most(
         objects, look.pixels(objects.index.astype(np.float32)).astype(np.intp), amount
     )
@@ -109,15 +109,17 @@ def lights_at(solution: Solution, place: Place) -> tuple[tuple[str, ...], bool]:
     """
     basis = solution.basis
     top, left, bottom, right = place.box
-    there = basis.planes.rows(top, bottom)[:, :, left:right].mean(axis=(1, 2), dtype=np.float64)
+    local_light = basis.planes.rows(top, bottom)[:, :, left:right].mean(
+        axis=(1, 2), dtype=np.float64
+    )
     if luminance(np.array(place.painted)) < luminance(np.array(place.reached)):
-        part, enough = luminance(there * solution.weights), DOES_MUCH
+        part, enough = luminance(local_light * solution.weights), DOES_MUCH
         whole = np.full(len(part), part.sum())
     else:
-        part, enough = np.where(basis.is_fixed, 0, luminance(there)), GETS_THERE
+        part, enough = np.where(basis.is_fixed, 0, luminance(local_light)), GETS_THERE
         # One light at a time: the brightness of all would be as much as half of their pictures.
-        every = (luminance(x[::STEP, ::STEP]) for x in basis.planes)
-        whole = np.array([np.percentile(x, 99) for x in every])
+        brightness = (luminance(x[::STEP, ::STEP]) for x in basis.planes)
+        whole = np.array([np.percentile(x, 99) for x in brightness])
     share = np.where(whole > 0, part / np.where(whole > 0, whole, 1), 0)
     names = (basis.names[k] for k in np.argsort(-share, kind="stable") if share[k] > enough)
     return tuple(names), bool(share.max() > DOES_MUCH)

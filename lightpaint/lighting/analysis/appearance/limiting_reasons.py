@@ -52,12 +52,12 @@ class Loosening:
     Attributes:
         hold: Its strength; 0 if no weaker one does.
         share: The share of the error over the paint that it removes, measured with all pixels.
-        elsewhere: Its change of unpainted pixels, compared with the present answer.
+        unpainted_change: Its change of unpainted pixels, compared with the present answer.
     """
 
     hold: float
     share: float
-    elsewhere: UnpaintedChange | None
+    unpainted_change: UnpaintedChange | None
 
 
 @dataclass(frozen=True)
@@ -98,8 +98,7 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     first.
 
     Constraints by a person go before reasons that tie with them. If no single reason has half of
-    the
-    gain of all, they are joint: first the one without which the others gain least.
+    the gain of all, they are joint: first the one without which the others gain least.
     """
     sample = PixelSample.of(solution)
     if not sample.groups or sample.now <= 0:
@@ -107,17 +106,17 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     everything = sample.share(sample.groups)
     if everything < MIN_SHARE:
         return ()
-    found: list[Reason] = []
+    reasons: list[Reason] = []
     for kind in sample.groups:
         if kind == "constraints":
-            found += _constraint_reasons(sample)
+            reasons += _constraint_reasons(sample)
         else:
-            found.append(Reason(kind, sample.limiting_views(kind), sample.share([kind])))
-    found = _sort_reasons([reason for reason in found if reason.share >= MIN_SHARE])
-    if (not found or found[0].share < SINGLE_SHARE * everything) and len(sample.groups) > 1:
+            reasons.append(Reason(kind, sample.limiting_views(kind), sample.share([kind])))
+    reasons = _sort_reasons([reason for reason in reasons if reason.share >= MIN_SHARE])
+    if (not reasons or reasons[0].share < SINGLE_SHARE * everything) and len(sample.groups) > 1:
         return _joint_reasons(sample, everything)
     measured = [
-        x if k and x.kind != "hold" else _measure(solution, sample, x) for k, x in enumerate(found)
+        x if k and x.kind != "hold" else _measure(solution, sample, x) for k, x in enumerate(reasons)
     ]
     return tuple(x for x in measured if x is not None)
 
@@ -139,8 +138,8 @@ def _measure(solution: Solution, sample: PixelSample, reason: Reason) -> Reason 
         weights = released_weights(solution, fit=replace(problem.fit, colors="free"))
     else:
         names = [light.name for light in sample.by_light.lights]
-        its = [names.index(name) for name in reason.names]
-        released = sample.by_light.without(reason.kind, its)
+        places = [names.index(name) for name in reason.names]
+        released = sample.by_light.without(reason.kind, places)
         weights = released_weights(solution, constraints=released)
     share = _share_removed(solution, weights)
     return None if share < MIN_SHARE else replace(reason, share=share)
@@ -167,27 +166,27 @@ def _constraint_reasons(sample: PixelSample) -> list[Reason]:
     """Return constraints by a person, by kind, with the fewest lights that have nearly the whole
     gain.
     """
-    by_light, found = sample.by_light, []
+    by_light, reasons = sample.by_light, []
     for kind, lights in by_light.kinds().items():
         whole = sample.share_without(kind, lights)
         if whole < MIN_SHARE:
             continue
         if kind in ("sparse", "prefer_current"):
-            found.append(Reason(kind, (), whole))
+            reasons.append(Reason(kind, (), whole))
             continue
         chosen, gained = lights, whole
         likely = sorted(lights, key=lambda k: -sample.pull[k])
         # One by one, beginning with those of the largest effect.
         alone = [(sample.share_without(kind, [k]), k) for k in likely[: 2 * MAX_FEW_LIGHTS]]
-        best = [k for _, k in sorted(alone, key=lambda its: -its[0])]
+        best = [k for _, k in sorted(alone, key=lambda gain: -gain[0])]
         for count in range(1, min(MAX_FEW_LIGHTS, len(lights) - 1) + 1):
-            some = sorted(best[:count])
-            part = max(alone)[0] if count == 1 else sample.share_without(kind, some)
+            few = sorted(best[:count])
+            part = max(alone)[0] if count == 1 else sample.share_without(kind, few)
             if part >= FEW_LIGHTS_SHARE * whole:
-                chosen, gained = tuple(some), part
+                chosen, gained = tuple(few), part
                 break
-        found.append(Reason(kind, tuple(by_light.lights[k].name for k in chosen), gained))
-    return found
+        reasons.append(Reason(kind, tuple(by_light.lights[k].name for k in chosen), gained))
+    return reasons
 
 
 def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]:
@@ -195,10 +194,10 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
     order = sorted(
         sample.groups, key=lambda kind: sample.share([x for x in sample.groups if x != kind])
     )
-    found: list[Reason] = []
+    reasons: list[Reason] = []
     for kind in order:
         if kind == "constraints":
-            found += [
+            reasons += [
                 Reason(
                     constraint, sample.light_names(constraint, lights), everything, is_joint=True
                 )
@@ -206,8 +205,8 @@ def _joint_reasons(sample: PixelSample, everything: float) -> tuple[Reason, ...]
             ]
         else:
             names = sample.limiting_views(kind)
-            found.append(Reason(kind, names, everything, is_joint=True))
-    return tuple(found)
+            reasons.append(Reason(kind, names, everything, is_joint=True))
+    return tuple(reasons)
 
 
 def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -> Loosening:
@@ -220,8 +219,8 @@ def _find_loosening(solution: Solution, sample: PixelSample, full_gain: float) -
     basis = solution.basis
     before, after = basis.mix(solution.weights), basis.mix(weights)
     look = PaintComparison.of_problem(solution.problem)
-    changed = unpainted_change(look, basis, target.importance > 0, before, after)
-    return Loosening(hold, look.share_removed(before, after), changed)
+    change = unpainted_change(look, basis, target.importance > 0, before, after)
+    return Loosening(hold, look.share_removed(before, after), change)
 
 
 def _weaker_hold(sample: PixelSample, gain: float) -> float:
@@ -231,18 +230,18 @@ def _weaker_hold(sample: PixelSample, gain: float) -> float:
     def is_enough(hold: float) -> bool:
         return sample.share_of(sample.solve((), sample.others, hold=hold)) >= gain
 
-    # Bisection of logarithms between a hold with too little gain and one with enough.
-    little, enough = hold, hold * NO_HOLD
+    # Bisection of logarithms between a hold with too too_strong gain and one with enough.
+    too_strong, enough = hold, hold * NO_HOLD
     if not is_enough(enough):
         return 0.0
     for _ in range(HOLD_STEPS):
-        between = round_down(float(np.sqrt(little * enough)))
-        if not enough < between < little:
+        between = round_down(float(np.sqrt(too_strong * enough)))
+        if not enough < between < too_strong:
             break
         if is_enough(between):
             enough = between
         else:
-            little = between
+            too_strong = between
     return enough
 
 

@@ -28,16 +28,16 @@ def object_with_most(objects: Objects, index: Indices, missed: Doubles) -> str:
     on_each = np.bincount(index + 1, weights=missed, minlength=len(objects.names) + 1)[1:]
     size = np.bincount(objects.index.ravel() + 1, minlength=len(objects.names) + 1)[1:]
     total, pixels = float(missed.sum()), objects.index.size
-    for called in (str, _first_word):
+    for name_of in (str, _first_word):
         on: Counter[str] = Counter()
-        of: Counter[str] = Counter()
-        for name, its, large in zip(objects.names, on_each, size, strict=True):
-            on[called(name)] += its
-            of[called(name)] += large
+        by_name: Counter[str] = Counter()
+        for name, amount_on, large in zip(objects.names, on_each, size, strict=True):
+            on[name_of(name)] += amount_on
+            by_name[name_of(name)] += large
         name, most = max(on.items(), key=lambda item: item[1], default=("", 0.0))
         if (
             most >= MIN_ERROR_SHARE * total > 0
-            and of[name] <= MAX_PICTURE_SHARE * pixels
+            and by_name[name] <= MAX_PICTURE_SHARE * pixels
             and not NO_NAME.fullmatch(name)
         ):
             return name

@@ -143,8 +143,8 @@ class PixelSample:
 
     def share_without(self, kind: ConstraintKind, lights: Collection[int]) -> float:
         """Return that share without one kind of constraint on some lights, by their places."""
-        asked = self.by_light.without(kind, lights)
-        return self.share_of(self.solve((), self.others, constraints=asked))
+        constraints = self.by_light.without(kind, lights)
+        return self.share_of(self.solve((), self.others, constraints=constraints))
 
     def light_names(self, kind: ConstraintKind, lights: Collection[int]) -> tuple[str, ...]:
         """Return names of lights under one kind of constraint; none for kinds that apply to all."""
@@ -156,11 +156,11 @@ class PixelSample:
         """Return names of the views that hold the lights, for the group `views`."""
         if kind != "views":
             return ()
-        its = self.others
-        if len(its) > 1:
+        views = self.others
+        if len(views) > 1:
             part = self.share(["views"]) / 2
-            its = [k for k in its if self.share(["views"], views=[k]) > part] or its
-        return tuple(self.names[k] for k in its)
+            views = [k for k in views if self.share(["views"], views=[k]) > part] or views
+        return tuple(self.names[k] for k in views)
 
     def solve(
         self,
@@ -175,19 +175,19 @@ class PixelSample:
         views: those to release with the group `views`. constraints, hold: instead of the present
         ones.
         """
-        gone = set(views) if "views" in without else set()
-        left = [k for k in range(len(self.bases)) if k not in gone]
+        released = set(views) if "views" in without else set()
+        left = [k for k in range(len(self.bases)) if k not in released]
         fit = self.problem.fit if hold is None else replace(self.problem.fit, hold=hold)
         change: dict[str, Any] = {"hold": 0.0, "unpainted": 0.0}
         if "hold" not in without:
             change["unpainted"] = self._unpainted_weight(fit, left)
         if "colors" in without:
             change["colors"] = "free"
-        asked = self.problem.constraints if constraints is None else constraints
+        in_force = self.problem.constraints if constraints is None else constraints
         problem = Problem.of(
             [self.bases[k] for k in left],
             [self.targets[k] for k in left],
-            constraints=Constraints() if "constraints" in without else asked,
+            constraints=Constraints() if "constraints" in without else in_force,
             fit=replace(fit, **change),
         )
         begin = replace(problem, start=self.problem.start)
@@ -220,7 +220,7 @@ def _average_blocks(views: Views, side: int) -> Views:
         return views
     bases, targets = [], []
     for basis, target, (height, width) in zip(views.bases, views.targets, sizes, strict=True):
-        its = target.cropped(height, width).reduced(side)
+        averaged = target.cropped(height, width).reduced(side)
         unseen = ~basis.emitters_seen[:height, :width]
         total = block_sums(unseen.astype(np.float64), side)
         counts, safe = unseen[..., None], np.where(total > 0, total, 1)[..., None]
@@ -229,7 +229,7 @@ def _average_blocks(views: Views, side: int) -> Views:
             for mean, image in zip(means, planes, strict=True):
                 mean[...] = block_sums(image[:height, :width] * counts, side) / safe
         bases.append(basis.on_pixels(images, halves, total == 0))
-        targets.append(its)
+        targets.append(averaged)
     return Views(tuple(bases), tuple(targets))
 
 
@@ -242,10 +242,10 @@ def _pixel_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tu
     row = basis.with_requests(type(basis.requests)()).on_pixels(
         basis.planes.picked(chosen), basis.noise.picked(chosen), cut(basis.emitters_seen)
     )
-    its = replace(
+    target_row = replace(
         target,
         image=cut(target.image),
         importance=cut(target.importance),
         at_least=None if target.at_least is None else cut(target.at_least),
     )
-    return row, its
+    return row, target_row

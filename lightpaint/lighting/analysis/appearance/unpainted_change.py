@@ -41,35 +41,37 @@ def unpainted_change(
 
     look: at the painting. painted: (h, w). before, after: (h, w, 3) linear, the two pictures.
     """
-    every = (slice(None, None, look.step), slice(None, None, look.step))
-    rest = ~painted[every]
+    compared = (slice(None, None, look.step), slice(None, None, look.step))
+    rest = ~painted[compared]
     if not rest.any():
         return None
-    labs = (look.lab(x[every][rest].astype(np.float64)) for x in (before, after))
-    changed = ciede2000(*labs)
-    worst, name, region = _worst(basis, every, rest, changed)
-    return UnpaintedChange(float(changed.mean()), worst, name, region)
+    labs = (look.lab(x[compared][rest].astype(np.float64)) for x in (before, after))
+    difference = ciede2000(*labs)
+    worst, name, region = _worst(basis, compared, rest, difference)
+    return UnpaintedChange(float(difference.mean()), worst, name, region)
 
 
 def _worst(
-    basis: Basis, every: tuple[slice, slice], rest: Bools, changed: Doubles
+    basis: Basis, compared: tuple[slice, slice], rest: Bools, difference: Doubles
 ) -> tuple[float, str, tuple[int, int]]:
-    """Return the largest mean of `changed` over one place: its ΔE, object and region."""
+    """Return the largest mean of `difference` over one place: its ΔE, object and region."""
     rows, columns = (REGIONS * np.arange(n) // n for n in rest.shape)
     ninth = (REGIONS * rows[:, None] + columns[None, :])[rest]
     enough = MIN_PLACE * rest.size
-    at, most = _largest_mean(ninth, changed, REGIONS**2, enough)
-    region = (at // REGIONS, at % REGIONS)
+    worst_region, most = _largest_mean(ninth, difference, REGIONS**2, enough)
+    region = (worst_region // REGIONS, worst_region % REGIONS)
     objects = basis.objects
     if objects is None:
         return most, "", region
-    named = np.array([not NO_NAME.fullmatch(name) for name in objects.names], dtype=bool)
-    index = objects.index[every][rest].astype(np.int64)
-    known = index >= 0
-    if not (known.any() and named.any()):
+    has_name = np.array([not NO_NAME.fullmatch(name) for name in objects.names], dtype=bool)
+    index = objects.index[compared][rest].astype(np.int64)
+    has_object = index >= 0
+    if not (has_object.any() and has_name.any()):
         return most, "", region
-    its, mean = _largest_mean(index[known], changed[known], len(named), enough, named)
-    return (mean, objects.names[its], region) if mean > 0 else (most, "", region)
+    worst_object, mean = _largest_mean(
+        index[has_object], difference[has_object], len(has_name), enough, has_name
+    )
+    return (mean, objects.names[worst_object], region) if mean > 0 else (most, "", region)
 
 
 def _largest_mean(
@@ -83,5 +85,5 @@ def _largest_mean(
     sizes = np.bincount(index, minlength=count)
     means = np.bincount(index, weights=values, minlength=count) / np.maximum(sizes, 1)
     means = np.where((sizes >= enough) & (True if among is None else among), means, 0)
-    at = int(np.argmax(means))
-    return at, float(means[at])
+    best = int(np.argmax(means))
+    return best, float(means[best])

@@ -35,21 +35,21 @@ class ActiveLimits:
     @property
     def own_exits(self) -> Doubles:
         """(k, h), the effects of the directions on their own unknowns."""
-        its = np.zeros(self.exits.shape, dtype=bool)
-        its[self.bound_unknowns, np.arange(self.bound_unknowns.size)] = True
-        its[:, self.bound_unknowns.size :] = self.sums.T != 0
-        return np.where(its, self.exits, 0)
+        is_own = np.zeros(self.exits.shape, dtype=bool)
+        is_own[self.bound_unknowns, np.arange(self.bound_unknowns.size)] = True
+        is_own[:, self.bound_unknowns.size :] = self.sums.T != 0
+        return np.where(is_own, self.exits, 0)
 
     def constrained(self, covariance: Doubles) -> Doubles:
         """Return a covariance of the unknowns, (k, k), under the active bounds and caps."""
-        kept = covariance.copy()
-        kept[self.bound_unknowns], kept[:, self.bound_unknowns] = 0, 0
+        constrained = covariance.copy()
+        constrained[self.bound_unknowns], constrained[:, self.bound_unknowns] = 0, 0
         for row in self.sums:
-            its = np.flatnonzero(row)
-            along = kept[np.ix_(its, its)] @ row[its]
-            if (variance := float(row[its] @ along)) > 0:
-                kept[np.ix_(its, its)] -= np.outer(along, along) / variance
-        return kept
+            members = np.flatnonzero(row)
+            along = constrained[np.ix_(members, members)] @ row[members]
+            if (variance := float(row[members] @ along)) > 0:
+                constrained[np.ix_(members, members)] -= np.outer(along, along) / variance
+        return constrained
 
 
 @dataclass(frozen=True)
@@ -67,26 +67,27 @@ class BlockFreedom:
 
 
 def block_freedoms(solution: Solution, equations: NormalEquations) -> Iterator[BlockFreedom]:
-    """Yield the freedom of each set of channels that the unknowns couple. equations: of the solve.
-    equations: what is solved.
+    """Yield the freedom of each set of channels that the unknowns couple.
+
+    equations: of the solve.
     """
     reduction, lit = solution.problem.local_reduction, solution.equations.reached
     x = solve_reduced(equations, reduction, solution.weights).x
     rows, left = _active_caps(reduction, x)
     for block in reduction.blocks:
-        its = block.unknowns
-        columns = _columns(reduction, its, lit)
-        lower, upper = reduction.lower[its], reduction.upper[its]
+        unknowns = block.unknowns
+        columns = _columns(reduction, unknowns, lit)
+        lower, upper = reduction.lower[unknowns], reduction.upper[unknowns]
         may = (lower < upper) & columns.any(axis=0)
-        at = np.where(x[its] <= lower, 1, np.where(x[its] >= upper, -1, 0)) * may
-        inside, bound = np.flatnonzero(may & (at == 0)), np.flatnonzero(at)
-        mine = rows[:, its].any(axis=1)
-        sums = rows[mine][:, its]
-        free, back = _keep_sums(sums, inside)
-        held = _active_limits(
-            sums, back, bound, at, np.concatenate([(upper - lower)[bound], left[mine]])
+        side = np.where(x[unknowns] <= lower, 1, np.where(x[unknowns] >= upper, -1, 0)) * may
+        inside, bound = np.flatnonzero(may & (side == 0)), np.flatnonzero(side)
+        caps_here = rows[:, unknowns].any(axis=1)
+        sums = rows[caps_here][:, unknowns]
+        free, lowering = _keep_sums(sums, inside)
+        limits = _active_limits(
+            sums, lowering, bound, side, np.concatenate([(upper - lower)[bound], left[caps_here]])
         )
-        yield BlockFreedom(columns, _columns(reduction, its, np.ones_like(lit)), free, held)
+        yield BlockFreedom(columns, _columns(reduction, unknowns, np.ones_like(lit)), free, limits)
 
 
 def free_directions(solution: Solution) -> list[Doubles]:
@@ -98,8 +99,8 @@ def free_directions(solution: Solution) -> list[Doubles]:
 def solve_for(solution: Solution, equations: NormalEquations) -> Doubles:
     """Solve `equations` for weights (n, 3) under the same constraints as the answer."""
     problem = solution.problem
-    asked = problem.with_pull(equations)
-    return solve_reduced(asked, problem.local_reduction, solution.weights).weights
+    pulled = problem.with_pull(equations)
+    return solve_reduced(pulled, problem.local_reduction, solution.weights).weights
 
 
 def all_columns(solution: Solution) -> Iterator[Doubles]:
@@ -122,16 +123,16 @@ def all_columns(solution: Solution) -> Iterator[Doubles]:
         yield from (flat[:, c] for c in range(3))
 
 
-def _columns(reduction: Reduction, its: Indices, lit: Bools) -> Doubles:
+def _columns(reduction: Reduction, unknowns: Indices, lit: Bools) -> Doubles:
     """Return C of these unknowns, (3 n, k), 0 where a light reaches nothing."""
     place = np.full(len(reduction.unknowns), -1)
-    place[its] = np.arange(its.size)
+    place[unknowns] = np.arange(unknowns.size)
     unknown, light, rgb = reduction.columns
-    within = place[unknown] >= 0
-    made = np.zeros((3, len(lit), its.size))
+    is_chosen = place[unknown] >= 0
+    columns = np.zeros((3, len(lit), unknowns.size))
     for c in range(3):
-        made[c, light[within], place[unknown[within]]] = rgb[within, c]
-    return (made * lit.T[:, :, None]).reshape(3 * len(lit), its.size)
+        columns[c, light[is_chosen], place[unknown[is_chosen]]] = rgb[is_chosen, c]
+    return (columns * lit.T[:, :, None]).reshape(3 * len(lit), unknowns.size)
 
 
 def _active_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:
@@ -141,11 +142,11 @@ def _active_caps(reduction: Reduction, x: Doubles) -> tuple[Doubles, Doubles]:
     """
     rows, room = [], []
     for cap in reduction.caps:
-        its, coefficients = list(cap.unknowns), np.asarray(cap.coefficients)
-        total = coefficients @ x[its]
+        members, coefficients = list(cap.unknowns), np.asarray(cap.coefficients)
+        total = coefficients @ x[members]
         if not cap.lower * (1 + AT_LIMIT) < total < cap.upper * (1 - AT_LIMIT):
             row = np.zeros(x.size)
-            row[its] = coefficients if total >= cap.upper * (1 - AT_LIMIT) else -coefficients
+            row[members] = coefficients if total >= cap.upper * (1 - AT_LIMIT) else -coefficients
             rows.append(row)
             room.append(cap.upper - cap.lower)
     return np.array(rows).reshape(len(rows), x.size), np.array(room)
@@ -164,26 +165,26 @@ def _keep_sums(rows: Doubles, inside: Indices) -> tuple[Doubles, Doubles]:
     rank = int((sizes > AT_LIMIT * sizes.max(initial=0)).sum())
     inverse = right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
     lost = np.abs(rows[:, inside] @ inverse - np.eye(len(rows))).max(axis=0) > AT_LIMIT
-    back = np.where(lost, np.nan, -free @ inverse)
-    return np.asarray(free @ right[rank:].T), np.asarray(back)
+    lowering = np.where(lost, np.nan, -free @ inverse)
+    return np.asarray(free @ right[rank:].T), np.asarray(lowering)
 
 
 def _active_limits(
-    rows: Doubles, back: Doubles, bound: Indices, at: Indices, room: Doubles
+    rows: Doubles, lowering: Doubles, bound: Indices, side: Indices, room: Doubles
 ) -> ActiveLimits:
     """Return the bounds and caps of a block that can be left one by one.
 
-    rows, back: of the sums, (j, k) and (k, j), see `_keep_sums`. bound: (b,), unknowns at a bound.
-    at: (k,), 1 at the lower, -1 at the upper one. room: (b + j,).
+    rows, lowering: of the sums, (j, k) and (k, j), see `_keep_sums`. bound: (b,), unknowns at a
+    bound. side: (k,), 1 at the lower, -1 at the upper one. room: (b + j,).
     """
-    ways = np.eye(len(at))[:, bound] * at[bound]
+    ways = np.eye(len(side))[:, bound] * side[bound]
     pushed = rows @ ways
     for j, b in np.argwhere(pushed != 0):
         # Unknowns inside their bounds compensate the effect on the sum.
-        ways[:, b] += back[:, j] * pushed[j, b]
-    can_leave = np.isfinite(ways).all(axis=0), np.isfinite(back).all(axis=0)
+        ways[:, b] += lowering[:, j] * pushed[j, b]
+    can_leave = np.isfinite(ways).all(axis=0), np.isfinite(lowering).all(axis=0)
     return ActiveLimits(
-        np.hstack([ways[:, can_leave[0]], back[:, can_leave[1]]]),
+        np.hstack([ways[:, can_leave[0]], lowering[:, can_leave[1]]]),
         room[np.concatenate(can_leave)],
         bound[can_leave[0]],
         rows[can_leave[1]],

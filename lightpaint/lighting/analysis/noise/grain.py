@@ -27,7 +27,7 @@ _Kind = TypeVar("_Kind", bound=np.generic)
 POWER = 36.0
 
 #: Pixels along the sides of blocks, and blocks on either side, over which products are averaged.
-BLOCK, AROUND = 8, 2
+BLOCK, BLOCKS_AROUND = 8, 2
 
 #: Largest ⟨a²⟩ / ⟨|a|⟩² of noise: π/2 if it is normal, more with fireflies. A painted lamp of a few
 #: pixels, alone on dark ground, is far beyond.
@@ -48,11 +48,11 @@ def grain(residual: Floats, counted: Bools) -> Doubles:
 
 
 def channel_grain(residual: Floats, counted: Bools) -> Doubles:
-    """Return the variance of the noise of one channel, (h, w). Arguments: as of `grain`, (h, w)."""
-    near, far = (_tap_variance(residual, counted, step) for step in (1, 2))
-    if far[counted].sum() > MAX_RATIO * near[counted].sum():
-        return near
-    return np.where(far <= MAX_BLOCK_RATIO * near, far, near)
+    """Return the variance of the noise of one channel, (h, w). Arguments: as in `grain`, (h, w)."""
+    at_one, at_two = (_tap_variance(residual, counted, step) for step in (1, 2))
+    if at_two[counted].sum() > MAX_RATIO * at_one[counted].sum():
+        return at_one
+    return np.where(at_two <= MAX_BLOCK_RATIO * at_one, at_two, at_one)
 
 
 def _tap_variance(residual: Floats, counted: Bools, step: int) -> Doubles:
@@ -67,14 +67,14 @@ def _tap_variance(residual: Floats, counted: Bools, step: int) -> Doubles:
         whole = np.logical_and.reduce(_taps(whole, step, axis))
     a *= whole
     products = np.square(a)
-    for here, there in _distant_windows(3 * step):
-        pairs = a[here] * a[there]
+    for window, shifted in _distant_windows(3 * step):
+        pairs = a[window] * a[shifted]
         pairs /= 2
-        products[here] -= pairs
-        products[there] -= pairs
-    seen = np.maximum(_neighbourhood_means(whole.astype(np.float64)), 1e-12)
-    power = _neighbourhood_means(products) / seen
-    size = _neighbourhood_means(np.abs(a, out=products)) / seen
+        products[window] -= pairs
+        products[shifted] -= pairs
+    share = np.maximum(_neighbourhood_means(whole.astype(np.float64)), 1e-12)
+    power = _neighbourhood_means(products) / share
+    size = _neighbourhood_means(np.abs(a, out=products)) / share
     variance = np.clip(power, 0, MAX_PEAK * np.square(size)) / POWER
     variance = enlarged(variance, BLOCK)[: a.shape[0], : a.shape[1]]
     # The border gets the values beside it.
@@ -101,4 +101,4 @@ def _neighbourhood_means(image: Doubles) -> Doubles:
     """Return the mean over each block and those around it; the last block may be cut."""
     rows, columns = (np.arange(0, length, BLOCK) for length in image.shape)
     sums = np.add.reduceat(np.add.reduceat(image, rows, axis=0), columns, axis=1)
-    return np.asarray(box_mean(sums, AROUND), np.float64)
+    return np.asarray(box_mean(sums, BLOCKS_AROUND), np.float64)

@@ -38,7 +38,8 @@ class Noise:
 
     power: (3, n, n), N_ij = Σ D h_i h_j, the part of M that is noise. target_noise: (3, n), the
     part of b that is noise of the current look, where this is a goal.
-    gradient: (3, n, 3, n), covariance of the gradient. objective: as in `Uncertainty`.
+    gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
+    `Uncertainty`.
     hidden: (3, n), variance of a light that few pixels may have and do not show (peaks.py).
     """
 
@@ -57,13 +58,13 @@ class Noise:
     @property
     def full_covariance(self) -> Doubles:
         """(3, n, 3, n), covariance of the gradient including the hidden part."""
-        made, lights = self.gradient.copy(), np.arange(self.hidden.shape[1])
+        covariance, lights = self.gradient.copy(), np.arange(self.hidden.shape[1])
         deviation = np.sqrt(self.hidden)
         # Where channels are coupled, one path carries all three.
-        coupled = made.any(axis=(1, 3))
+        coupled = covariance.any(axis=(1, 3))
         for c, d in zip(*np.nonzero(coupled), strict=True):
-            made[c, lights, d, lights] += deviation[c] * deviation[d]
-        return made
+            covariance[c, lights, d, lights] += deviation[c] * deviation[d]
+        return covariance
 
 
 def noise_sums(solution: Solution) -> Noise:
@@ -92,16 +93,16 @@ def noise_sums(solution: Solution) -> Noise:
     length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
     sums = [_Sums.zeros(len(weights))] + (
-        parallel_map(lambda its: pixels.sums(its, weights, pulled, is_coupled=is_coupled), parts)
+        parallel_map(lambda part: pixels.sums(part, weights, pulled, is_coupled=is_coupled), parts)
         if len(weights) <= FEW_LIGHTS
-        else [pixels.sums(its, weights, pulled, is_coupled=is_coupled) for its in parts]
+        else [pixels.sums(part, weights, pulled, is_coupled=is_coupled) for part in parts]
     )
     error, noise = np.zeros((2, 3))
     for start in range(0, len(weight), BLOCK_PIXELS):
-        its = slice(start, start + BLOCK_PIXELS)
-        mixed = residuals.noise(its)
-        error += np.square(weight[its] * residuals.residual(its) * mixed).sum(axis=0)
-        noise += (weight[its] * np.square(mixed)).sum(axis=0)
+        part = slice(start, start + BLOCK_PIXELS)
+        mixed = residuals.noise(part)
+        error += np.square(weight[part] * residuals.residual(part) * mixed).sum(axis=0)
+        noise += (weight[part] * np.square(mixed)).sum(axis=0)
     return Noise(
         power=np.asarray(sum(x.power for x in sums)),
         target_noise=np.asarray(sum(x.target_noise for x in sums)),
@@ -114,7 +115,7 @@ def noise_sums(solution: Solution) -> Noise:
 
 @dataclass(frozen=True)
 class _Sums:
-    """Sums over some pixels. power, drawn, gradient: as in `Noise`. peaks: of each channel."""
+    """Sums over some pixels, as in `Noise`. peaks: of each channel."""
 
     power: Doubles
     target_noise: Doubles
@@ -148,49 +149,49 @@ class _Pixels:
         """Sum over some pixels. pulled: (n, 3), the effect of noise on the pull. pulled: (n, 3), by
         how much noise moves the pull.
         """
-        made = _Sums.zeros(len(weights))
+        sums = _Sums.zeros(len(weights))
         for start in range(0, counted.size, BLOCK_PIXELS):
             pixels = as_slice(counted[start : start + BLOCK_PIXELS])
-            both = self.noise.pixels(pixels), self.planes.pixels(pixels)
+            arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
             missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
-            rows = [self._rows(made, pixels, both, missed, c, weights, pulled) for c in range(3)]
+            rows = [self._rows(sums, pixels, arrays, missed, c, weights, pulled) for c in range(3)]
             for c in range(3):
-                made.gradient[c, :, c] += rows[c] @ rows[c].T
+                sums.gradient[c, :, c] += rows[c] @ rows[c].T
             if is_coupled:
                 # One path carries all three channels, so their noise goes together.
                 for c, d in ((0, 1), (0, 2), (1, 2)):
                     product = rows[c] @ rows[d].T
-                    made.gradient[c, :, d] += product
-                    made.gradient[d, :, c] += product.T
-        return made
+                    sums.gradient[c, :, d] += product
+                    sums.gradient[d, :, c] += product.T
+        return sums
 
     def _rows(
         self,
-        made: _Sums,
+        sums: _Sums,
         pixels: slice | Indices,
-        both: tuple[Floats, Floats],
+        arrays: tuple[Floats, Floats],
         missed: tuple[Doubles, Doubles],
         c: int,
         weights: Doubles,
         pulled: Doubles,
     ) -> Doubles:
-        """Return the noise in the gradient of a channel, (n, pixels); add all else to `made`.
+        """Return the noise in the gradient of a channel, (n, pixels); add all else to `sums`.
 
-        both: (n, pixels, 3), noise and planes there. missed: (pixels, 3), residual and the noise of
-        the prediction.
+        arrays: (n, pixels, 3), noise and planes there. missed: (pixels, 3), residual and the noise
+        of the prediction.
         """
         D = self.weight[pixels, c % self.weight.shape[1]].astype(np.float64)
-        h, lit = (x[..., c].astype(np.float64) for x in both)
+        h, lit = (x[..., c].astype(np.float64) for x in arrays)
         residual, mixed = (x[:, c] for x in missed)
         rows = D * (h * residual - lit * mixed)
         size = np.abs(residual) + weights[:, c, None] * lit
-        made.peaks[c].add(D * lit * size, rows)
+        sums.peaks[c].add(D * lit * size, rows)
         if pulled.any():
             rows += pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
-        made.power[c] += (D * h) @ h.T
+        sums.power[c] += (D * h) @ h.T
         if self.residuals.present is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]
-            made.target_noise[c] += h @ (shared * self.residuals.present[pixels, c])
+            sums.target_noise[c] += h @ (shared * self.residuals.present[pixels, c])
         return np.asarray(rows)
 
 
@@ -216,13 +217,13 @@ def denoised_matrix(
 
     power: (3, n, n), N. The result is M − N, but in no direction less than 1 − `max_share` of M.
     """
-    made = np.empty_like(equations.M)
+    denoised = np.empty_like(equations.M)
     for c in range(3):
         root, inverse = _roots(equations.M[c])
         values, vectors = eigh(inverse @ power[c] @ inverse.T)
         values = np.clip(values, 0, max_share)
-        made[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
-    return made
+        denoised[c] = equations.M[c] - root @ ((vectors * values) @ vectors.T) @ root.T
+    return denoised
 
 
 def eigh(M: Doubles) -> tuple[Doubles, Doubles]:
@@ -245,7 +246,7 @@ def _roots(M: Doubles) -> tuple[Doubles, Doubles]:
     scale = np.sqrt(np.diag(M))
     safe = np.where(scale > 0, scale, 1)
     values, vectors = eigh(M / safe[:, None] / safe)
-    seen = values > NULL_EIGENVALUE * values.max(initial=0)
-    root = np.sqrt(values[seen])
-    inverse = (vectors[:, seen] / root).T / safe
-    return np.asarray(safe[:, None] * vectors[:, seen] * root), np.asarray(inverse)
+    is_regular = values > NULL_EIGENVALUE * values.max(initial=0)
+    root = np.sqrt(values[is_regular])
+    inverse = (vectors[:, is_regular] / root).T / safe
+    return np.asarray(safe[:, None] * vectors[:, is_regular] * root), np.asarray(inverse)

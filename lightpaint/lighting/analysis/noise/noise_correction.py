@@ -65,23 +65,25 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
     if share is None:
         share = _best_share(solution, noise, least)
     while True:
-        corrected = NormalEquations(
+        equations = NormalEquations(
             (1 - share) * e.M + share * least, e.b - share * noise.target_noise, e.target_norm2
         )
-        problem = replace(solution.problem, corrected=corrected, noise_removed=share)
-        found = solve_again(solution, problem)
-        taken = NormalEquations(share * (e.M - least), share * noise.target_noise, np.zeros(3))
-        if problem.is_linear or share == 0 or _loss(found, taken) <= _loss(solution, taken):
-            return found
+        problem = replace(solution.problem, corrected=equations, noise_removed=share)
+        corrected = solve_again(solution, problem)
+        removed = NormalEquations(share * (e.M - least), share * noise.target_noise, np.zeros(3))
+        if problem.is_linear or share == 0 or _loss(corrected, removed) <= _loss(solution, removed):
+            return corrected
         share = share / 2 if share > 1 / SHARE_STEPS else 0.0
 
 
-def _loss(solution: Solution, taken: NormalEquations) -> float:
+def _loss(solution: Solution, removed: NormalEquations) -> float:
     """Return the error of a solution with its pull, less the removed noise."""
     pull, weights = solution.problem.pull, solution.weights
     pulled = 0.0 if pull is None else float(pull.objective(weights).sum())
     # As `NormalEquations.objective`, which does not allow squares below zero.
-    noise = np.einsum("ic,cij,jc->", weights, taken.M, weights) - 2 * (taken.b.T * weights).sum()
+    noise = (
+        np.einsum("ic,cij,jc->", weights, removed.M, weights) - 2 * (removed.b.T * weights).sum()
+    )
     return sum(solution.certificate.objective) + pulled - float(noise)
 
 
@@ -102,9 +104,11 @@ def _best_share(solution: Solution, noise: Noise, least: Doubles) -> float:
     # A pull keeps the weights from moving, and is no part of the error.
     pull = solution.problem.pull
     stiffness = np.zeros((3 * n, 3 * n)) if pull is None else pull.full_matrix
-    for to in free_directions(solution):
-        M, left, stiff = (to.T @ x @ to for x in (e.full_matrix, block_diagonal(least), stiffness))
-        C = to.T @ noise.gradient.reshape(3 * n, 3 * n) @ to
+    for directions in free_directions(solution):
+        M, left, stiff = (
+            directions.T @ x @ directions for x in (e.full_matrix, block_diagonal(least), stiffness)
+        )
+        C = directions.T @ noise.gradient.reshape(3 * n, 3 * n) @ directions
         for k, s in enumerate(shares):
             inverse = pseudo_inverse((1 - s) * M + s * left + stiff)
             cost[k] += np.einsum("ij,ji->", M, inverse @ C @ inverse)

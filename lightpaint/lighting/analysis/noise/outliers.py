@@ -33,8 +33,8 @@ def noise_doubts(solution: Solution, power: Doubles) -> Doubles:
     for c, M in enumerate(solution.equations.M):
         shares[:, c] = np.diag(power[c]) * np.diag(pseudo_inverse(M))
     low, high = DOUBT_RANGE
-    told = solution.reached & ~solution.basis.is_fixed[:, None]
-    return np.where(told, np.clip((shares - low) / (high - low), 0, 1), 0)
+    is_determined = solution.reached & ~solution.basis.is_fixed[:, None]
+    return np.where(is_determined, np.clip((shares - low) / (high - low), 0, 1), 0)
 
 
 def weakest_matrix(
@@ -47,20 +47,20 @@ def weakest_matrix(
     """
     basis, M = solution.basis, solution.equations.M
     weight = solution.problem.squares.weight
-    made = corrected.copy()
+    weakest = corrected.copy()
     for k, c in np.argwhere(doubts > 0):
         D = weight[..., c % weight.shape[2]].ravel()
         image, half = (x.plane(k)[..., c].ravel() for x in (basis.planes, basis.noise))
         smooth, error = _least_power(image, half, D)
         # Only the part that no other light can replace may shrink.
-        noisy, alone = (1 / float(pseudo_inverse(x[c])[k, k]) for x in (M, made))
+        noisy, alone = (1 / float(pseudo_inverse(x[c])[k, k]) for x in (M, weakest))
         least = max(
             noisy - float(power[c, k, k]) - SAFE_ERRORS * error,
-            alone - float(made[c, k, k]) + smooth,
+            alone - float(weakest[c, k, k]) + smooth,
             MIN_LEFT * float(M[c, k, k]),
         )
-        made[c, k, k] -= doubts[k, c] * max(alone - least, 0)
-    return made
+        weakest[c, k, k] -= doubts[k, c] * max(alone - least, 0)
+    return weakest
 
 
 def _least_power(image: Floats, half: Floats, D: Floats) -> tuple[float, float]:
@@ -70,8 +70,8 @@ def _least_power(image: Floats, half: Floats, D: Floats) -> tuple[float, float]:
     """
     squares = light = lights = total = 0.0
     for start in range(0, image.size, BLOCK_PIXELS):
-        its = slice(start, start + BLOCK_PIXELS)
-        d, f, h = (x[its].astype(np.float64) for x in (D, image, half))
+        pixels = slice(start, start + BLOCK_PIXELS)
+        d, f, h = (x[pixels].astype(np.float64) for x in (D, image, half))
         squares += float(np.square(d * h * h).sum())
         light, lights = light + float(d @ f), lights + float(np.square(d * f).sum())
         total += float(d.sum())

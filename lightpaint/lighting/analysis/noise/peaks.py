@@ -33,7 +33,7 @@ class Peaks:
     """The pixels that could push one light most, collected block by block; of one channel.
 
     total, pushed: (n,), sums of u² and z² so far; u is the push of a pixel if all of it were noise,
-    z the push by its half difference. found: lights, u² and z² of single pixels.
+    z the push by its half difference. candidates: lights, u² and z² of single pixels.
     """
 
     total: Doubles
@@ -71,20 +71,22 @@ class Peaks:
         For pixels with PEAK_SHARE of Σ u² or more: the variance relative to u², as they or the
         others show it, times the width of Student's t for so few, and at most TWO_PATHS.
         """
-        made = np.zeros(self.total.size)
+        hidden = np.zeros(self.total.size)
         if not self.candidates:
-            return made
+            return hidden
         lights, u2, z2 = (np.concatenate(x) for x in zip(*self.candidates, strict=True))
-        its = u2 > PEAK_SHARE * self.total[lights]
-        for k in np.unique(lights[its]):
-            mine = its & (lights == k)
-            could, said = float(u2[mine].sum()), float(z2[mine].sum())
+        is_peak = u2 > PEAK_SHARE * self.total[lights]
+        for k in np.unique(lights[is_peak]):
+            own_peaks = is_peak & (lights == k)
+            could, observed = float(u2[own_peaks].sum()), float(z2[own_peaks].sum())
             rest = float(self.total[k]) - could
-            others = float(self.pushed[k] - said) / rest if rest > 1e-9 * could else 0.0
-            wider = _t_ratio(could**2 / float(np.square(u2[mine]).sum()))
-            variance = max(said / could * wider**2, MAX_UNLIKE * others)
-            made[k] = max(min(variance, TWO_PATHS) * could - said, 0)
-        return made
+            share_of_others = (
+                float(self.pushed[k] - observed) / rest if rest > 1e-9 * could else 0.0
+            )
+            wider = _t_ratio(could**2 / float(np.square(u2[own_peaks]).sum()))
+            variance = max(observed / could * wider**2, MAX_UNLIKE * share_of_others)
+            hidden[k] = max(min(variance, TWO_PATHS) * could - observed, 0)
+        return hidden
 
 
 def _t_ratio(pixels: float) -> float:

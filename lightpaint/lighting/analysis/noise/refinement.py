@@ -67,7 +67,7 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     missed = solution.image.astype(np.float64) - mixed.image
     _, rendered, _ = basis.planes.sums(solution.weight, missed)
     M = problem.solved.M
-    known = problem.solved.b - np.einsum("cij,jc->ci", M, w)
+    basis_residual = problem.solved.b - np.einsum("cij,jc->ci", M, w)
 
     sums = noise_sums(solution)
     before, lacking = gradient_bias(solution, sums)
@@ -78,7 +78,7 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     # The render does not change the noise of a painting that is the current look.
     t = _render_share(solution, lacking, noise, mixed.half_difference.astype(np.float64))
 
-    gradient = t * rendered + (1 - t) * known
+    gradient = t * rendered + (1 - t) * basis_residual
     refinement = Refinement(
         before=w,
         noise=t * mixed.half_difference + (1 - t) * noise,
@@ -90,7 +90,9 @@ def refine(solution: Solution, mixed: Estimate) -> Solution:
     return solve_again(solution, replace(problem, corrected=corrected, refinement=refinement))
 
 
-def _render_share(solution: Solution, lacking: Doubles, known: Floats, rendered: Floats) -> float:
+def _render_share(
+    solution: Solution, lacking: Doubles, from_basis: Floats, rendered: Floats
+) -> float:
     """Return the t that minimises the expected excess (1 − t)² (B + K) + t² R: (B + K) / (B + K +
     R).
 
@@ -99,29 +101,32 @@ def _render_share(solution: Solution, lacking: Doubles, known: Floats, rendered:
     """
     bias, spread = 0.0, np.zeros(2)
     M = solution.problem.with_pull(solution.problem.solved).full_matrix
-    for to in free_directions(solution):
-        inverse = pseudo_inverse(to.T @ M @ to)
-        lacks = to.T @ lacking.ravel()
+    for directions in free_directions(solution):
+        inverse = pseudo_inverse(directions.T @ M @ directions)
+        lacks = directions.T @ lacking.ravel()
         bias += float(lacks @ inverse @ lacks)
-        for k, noise in enumerate((known, rendered)):
-            C = _push_covariance(solution, noise, to)
+        for k, noise in enumerate((from_basis, rendered)):
+            C = _push_covariance(solution, noise, directions)
             spread[k] += np.einsum("ij,ij->", inverse, C)
     total = bias + spread.sum()
     return float((bias + spread[0]) / total) if total > 0 else 1.0
 
 
-def _push_covariance(solution: Solution, noise: Floats, to: Doubles) -> Doubles:
-    """Return the covariance (k, k) of the push by a prediction's noise along `to`, (3 n, k)."""
+def _push_covariance(solution: Solution, noise: Floats, directions: Doubles) -> Doubles:
+    """Return the covariance (k, k) of the push by a prediction's noise.
+
+    directions: (3 n, k), along which it pushes.
+    """
     basis = solution.basis
     n = len(basis.lights)
-    along = to.reshape(3, n, -1)
+    along = directions.reshape(3, n, -1)
     noise = noise.reshape(-1, 3)
     weight = solution.weight.reshape(len(noise), -1)
-    covariance = np.zeros((to.shape[1], to.shape[1]))
+    covariance = np.zeros((directions.shape[1], directions.shape[1]))
     counted = np.flatnonzero(solution.importance)
     for start in range(0, counted.size, BLOCK_PIXELS):
         pixels = counted[start : start + BLOCK_PIXELS]
-        lit, push = basis.planes.pixels(pixels), np.zeros((to.shape[1], pixels.size))
+        lit, push = basis.planes.pixels(pixels), np.zeros((directions.shape[1], pixels.size))
         for c in np.flatnonzero(along.any(axis=(1, 2))):
             pulls = weight[pixels, c % weight.shape[1]] * noise[pixels, c]
             push += along[c].T @ (lit[..., c] * pulls)

@@ -140,18 +140,18 @@ def error_bars(solution: Solution) -> Uncertainty | None:
         # A step from a render of the mix depends on M alone.
         if problem.refinement is not None:
             right = np.einsum("cij,jc->ci", weak, before) + step
-        few = NormalEquations(weak, right, equations.target_norm2)
-        far = solve_for(solution, few)
-        *sides, _ = _scatter(solution, noise, few, few, far)
+        weak_equations = NormalEquations(weak, right, equations.target_norm2)
+        far = solve_for(solution, weak_equations)
+        *sides, _ = _scatter(solution, noise, weak_equations, weak_equations, far)
         sides = [np.hypot(side, far - weights - bias) for side in sides]
     by_channel = excess.reshape(3, -1).sum(axis=1)
     by_channel += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
-    told = np.where(solution.reached, 1, np.nan)
-    interval = _interval(solution, bias * told, sides)
+    is_determined = np.where(solution.reached, 1, np.nan)
+    interval = _interval(solution, bias * is_determined, sides)
     return Uncertainty(
         weights,
-        np.maximum(*sides) * told,
-        bias * told,
+        np.maximum(*sides) * is_determined,
+        bias * is_determined,
         interval,
         noise.objective_error,
         noise.objective_noise,
@@ -166,26 +166,28 @@ def _scatter(
     noise: Noise,
     scatters: NormalEquations,
     unbiased: NormalEquations,
-    at: Doubles,
+    weights: Doubles,
 ) -> tuple[Doubles, Doubles, Doubles]:
     """Return standard deviations below and above the weights, (n, 3) each, and the excess, (3 n,).
 
-    scatters: the equations by which the noise of the gradient moves the weights. unbiased, at: the
-    equations and weights, (n, 3), whose gradient tells how firmly bounds hold.
+    scatters: the equations by which the noise of the gradient moves the weights. unbiased,
+    weights: the equations and weights, (n, 3), whose gradient tells how firmly bounds hold.
     """
     problem = solution.problem
-    gradient = problem.with_pull(unbiased).gradient(at).T.ravel()
+    gradient = problem.with_pull(unbiased).gradient(weights).T.ravel()
     pulled, missed = problem.with_pull(scatters), problem.equations.full_matrix
     M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
     below, above, excess = (np.zeros(gradient.size) for _ in range(3))
     for room in block_freedoms(solution, pulled):
-        to, held = room.columns, room.active
-        steps, covariance = _propagate(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
-        excess += np.einsum("pq,qp->p", missed, to @ covariance @ to.T)
-        both = ((room.emitted @ held.constrained(covariance)) * room.emitted).sum(axis=1)
-        own = room.emitted @ (held.own_exits * steps)
-        below += both + np.square(np.minimum(own, 0)).sum(axis=1)
-        above += both + np.square(np.maximum(own, 0)).sum(axis=1)
+        columns, active = room.columns, room.active
+        steps, covariance = _propagate(
+            columns.T @ M @ columns, columns.T @ C @ columns, room, columns.T @ gradient
+        )
+        excess += np.einsum("pq,qp->p", missed, columns @ covariance @ columns.T)
+        variance = ((room.emitted @ active.constrained(covariance)) * room.emitted).sum(axis=1)
+        own_steps = room.emitted @ (active.own_exits * steps)
+        below += variance + np.square(np.minimum(own_steps, 0)).sum(axis=1)
+        above += variance + np.square(np.maximum(own_steps, 0)).sum(axis=1)
     down, up = (np.sqrt(np.maximum(side, 0)).reshape(3, -1).T for side in (below, above))
     return down, up, excess
 
@@ -205,8 +207,8 @@ def _is_wide(weights: Doubles, interval: tuple[Doubles, Doubles]) -> Bools:
     """Return, (n,), whether the interval of a light's luminance reaches farther than the luminance
     itself.
     """
-    known = np.isfinite(interval[0])
-    solved, low, high = (np.where(known, x, 0) @ LUMINANCE for x in (weights, *interval))
+    is_known = np.isfinite(interval[0])
+    solved, low, high = (np.where(is_known, x, 0) @ LUMINANCE for x in (weights, *interval))
     return np.asarray(np.maximum(solved - low, high - solved) > solved)
 
 

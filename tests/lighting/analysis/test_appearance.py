@@ -10,7 +10,7 @@ from lightpaint.colour.color_difference import delta_e
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.analysis import analyse
-from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Seen, what_is_seen
+from lightpaint.lighting.analysis.appearance.appearance import CLOSE, Appearance, compare_appearance
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import PixelSample
 from lightpaint.lighting.analysis.appearance.unpainted_change import unpainted_change
@@ -62,10 +62,10 @@ def test_the_mean_is_over_the_paint_weighted_and_against_the_paint(make_basis: A
         float(delta_e(np.array(painted), np.full(3, 0.2)))
         for painted in ((0.6, 0.6, 0.6), (0.5, 0.4, 0.3))
     )
-    seen = what_is_seen(solution)
-    assert seen.delta_e == pytest.approx((0.25 * upper + lower) / 1.25, rel=1e-5)
-    assert seen.asked == pytest.approx(seen.delta_e, rel=1e-5)
-    assert seen.noise == 0
+    appearance = compare_appearance(solution)
+    assert appearance.delta_e == pytest.approx((0.25 * upper + lower) / 1.25, rel=1e-5)
+    assert appearance.requested_change == pytest.approx(appearance.delta_e, rel=1e-5)
+    assert appearance.noise == 0
 
 
 def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis: Any):
@@ -76,25 +76,29 @@ def test_a_look_at_the_exposure_and_through_the_view_of_the_painting(make_basis:
     found = []
     for its, scale, view in ((basis, 1, ViewTransform()), (dark, 64, bright)):
         target = replace(_over(_look(its), where, 0.5 / scale), transform=view)
-        found.append(what_is_seen(solve(its, target, constraints=_locked())))
+        found.append(compare_appearance(solve(its, target, constraints=_locked())))
     assert found[0].delta_e > 1
     assert found[1].delta_e == pytest.approx(found[0].delta_e, rel=1e-3)
 
 
 def test_a_painting_that_is_made_is_close(make_basis: Any):
     basis = _left_and_right(make_basis)
-    seen = what_is_seen(solve(basis, _over(_look(basis), (slice(None), slice(0, 24)), 0.5)))
-    assert seen.is_close
-    assert not seen.is_far
-    assert seen.delta_e < 0.1 < 10 < seen.asked
-    assert seen.limit_groups == ()
+    appearance = compare_appearance(
+        solve(basis, _over(_look(basis), (slice(None), slice(0, 24)), 0.5))
+    )
+    assert appearance.is_close
+    assert not appearance.is_far
+    assert appearance.delta_e < 0.1 < 10 < appearance.requested_change
+    assert appearance.limit_groups == ()
 
 
 def test_an_untouched_picture_is_close(make_basis: Any):
     basis = _left_and_right(make_basis)
-    seen = what_is_seen(solve(basis, _over(_look(basis), (slice(None), slice(None)), 0.2)))
-    assert seen.is_close
-    assert seen.delta_e < 1e-3
+    appearance = compare_appearance(
+        solve(basis, _over(_look(basis), (slice(None), slice(None)), 0.2))
+    )
+    assert appearance.is_close
+    assert appearance.delta_e < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -110,9 +114,9 @@ def test_a_held_picture_never_meets_the_wish(make_basis: Any, asked: Any, held: 
     basis = _left_and_right(make_basis, spill=0.5)
     target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     limits = Constraints.of(asked.get("constraints", {}))
-    seen = what_is_seen(solve(basis, target, hold=asked["hold"], constraints=limits))
-    assert seen.is_close == (not held)
-    assert seen.limit_groups == held
+    appearance = compare_appearance(solve(basis, target, hold=asked["hold"], constraints=limits))
+    assert appearance.is_close == (not held)
+    assert appearance.limit_groups == held
 
 
 def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
@@ -120,8 +124,8 @@ def test_what_holds_whatever_else_is_let_go_comes_first(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.5)
     target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     locked = Constraints.of({"*": {"lock": True}})
-    assert what_is_seen(solve(basis, target, hold=50.0)).limit_groups == ("hold",)
-    both = what_is_seen(solve(basis, target, hold=50.0, constraints=locked)).limit_groups
+    assert compare_appearance(solve(basis, target, hold=50.0)).limit_groups == ("hold",)
+    both = compare_appearance(solve(basis, target, hold=50.0, constraints=locked)).limit_groups
     assert both[0] == "constraints"
     assert "hold" in both
 
@@ -142,15 +146,17 @@ def test_a_light_that_somebody_switched_off_goes_before_the_hold(make_basis: Any
     basis = _four(make_basis)
     target = _over(_look(basis), (slice(None), slice(12, 24)), 0.5)
     off = {name: {"off": True} for name in ("annex_window", "annex_lamp")}
-    seen = what_is_seen(solve(basis, target, hold=10.0, constraints=Constraints.of(off)))
-    first = seen.reasons[0]
+    appearance = compare_appearance(
+        solve(basis, target, hold=10.0, constraints=Constraints.of(off))
+    )
+    first = appearance.reasons[0]
     assert (first.kind, first.names) == ("off", ("annex_window",))
     assert first.share > 0.8
-    assert "annex_window is switched off" in headline(seen)
+    assert "annex_window is switched off" in headline(appearance)
     # What both are needed for is told of both, and of no other light that is locked.
     wide = _over(_look(basis), (slice(None), slice(12, 36)), 0.5)
     asked = Constraints.of(off | {"left": {"lock": True}})
-    first = what_is_seen(solve(basis, wide, hold=10.0, constraints=asked)).reasons[0]
+    first = compare_appearance(solve(basis, wide, hold=10.0, constraints=asked)).reasons[0]
     assert first.names == ("annex_window", "annex_lamp")
 
 
@@ -160,8 +166,8 @@ def test_the_share_of_a_reason_is_what_the_fit_misses_no_more(make_basis: Any):
     target = _over(_look(basis), (slice(None), slice(12, 24)), 0.5)
     off = Constraints.of({"annex_window": {"off": True}})
 
-    def missed(**how: Any) -> float:
-        solution = solve(basis, target, **how)
+    def missed(**options: Any) -> float:
+        solution = solve(basis, target, **options)
         loss = solution.problem.loss.residual(basis.mix(solution.weights))
         return float((target.importance[..., None] * np.square(loss)).sum())
 
@@ -169,7 +175,7 @@ def test_the_share_of_a_reason_is_what_the_fit_misses_no_more(make_basis: Any):
     on = missed(hold=3.0)
     shares = {
         reason.kind: reason.share
-        for reason in what_is_seen(solve(basis, target, constraints=off, hold=3.0)).reasons
+        for reason in compare_appearance(solve(basis, target, constraints=off, hold=3.0)).reasons
     }
     assert shares["off"] == pytest.approx(1 - on / now, abs=1e-3)  # of where its solve stops
     assert shares.get("hold", 0.0) == pytest.approx(1 - hold / now, abs=0.05)
@@ -201,7 +207,7 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     target = _over(look, (slice(None), slice(0, 24)), look[:, :24] * 2.0 ** stops[1])
     target.image[:, :12] = look[:, :12] * 2.0 ** stops[0]
     solution = solve(basis, target, hold=10.0)
-    hold = next(x for x in what_is_seen(solution).reasons if x.kind == "hold")
+    hold = next(x for x in compare_appearance(solution).reasons if x.kind == "hold")
     weaker = hold.loosening
     assert weaker is not None
     assert 0 < weaker.hold < 10
@@ -216,9 +222,9 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     none = basis.mix(solve(basis, target, hold=0.0).weights)
     harm = unpainted_change(look_at, basis, target.importance > 0, before, none)
     assert harm is not None
-    assert weaker.elsewhere is not None
-    assert weaker.elsewhere.object == harm.object == "annex"
-    assert weaker.elsewhere.worst < harm.worst
+    assert weaker.unpainted_change is not None
+    assert weaker.unpainted_change.object == harm.object == "annex"
+    assert weaker.unpainted_change.worst < harm.worst
 
 
 def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
@@ -226,19 +232,21 @@ def test_what_becomes_of_the_rest_is_seen(make_basis: Any):
     basis = _four(make_basis)
     where = (slice(None), slice(0, 12))
     locked = Constraints.of({"*": {"lock": True}, "annex_window": {"lock": 0.4}})
-    seen = what_is_seen(solve(basis, _over(_look(basis), where, 0.2), constraints=locked))
-    assert seen.elsewhere is not None
-    assert seen.elsewhere.worst < 1e-3
+    appearance = compare_appearance(
+        solve(basis, _over(_look(basis), where, 0.2), constraints=locked)
+    )
+    assert appearance.unpainted_change is not None
+    assert appearance.unpainted_change.worst < 1e-3
     target = _over(_look(basis), where, 0.5)
     solution = solve(basis, target, hold=0.0, constraints=Constraints.of({"left": {"off": True}}))
-    seen = what_is_seen(solution)
+    appearance = compare_appearance(solution)
     mixed = solution.basis.mix(solution.weights)
     start = basis.present_weights * np.array([0, 1, 1, 1])[:, None]
     before = basis.mix(start)
     worst = max(float(delta_e(mixed[0, x], before[0, x])) for x in (12, 24, 36))
-    assert seen.elsewhere is not None
-    assert seen.elsewhere.worst == pytest.approx(worst, rel=1e-4)
-    assert seen.elsewhere.delta_e == pytest.approx(
+    assert appearance.unpainted_change is not None
+    assert appearance.unpainted_change.worst == pytest.approx(worst, rel=1e-4)
+    assert appearance.unpainted_change.delta_e == pytest.approx(
         np.mean([delta_e(mixed[0, x], before[0, x]) for x in (12, 24, 36)]), rel=1e-4
     )
 
@@ -247,31 +255,31 @@ def test_lights_that_are_held_back_are_known(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.5)
     target = _over(_look(basis), (slice(8, 16), slice(4, 12)), 0.6)
     limits = Constraints.of({"left": {"limits": {"max": 0.21}}})
-    seen = what_is_seen(solve(basis, target, constraints=limits))
-    assert seen.kept_there == ("left",)
-    assert {"left"} < set(seen.there)
-    assert what_is_seen(solve(basis, target)).kept_there == ()
+    appearance = compare_appearance(solve(basis, target, constraints=limits))
+    assert appearance.held_lights == ("left",)
+    assert {"left"} < set(appearance.local_lights)
+    assert compare_appearance(solve(basis, target)).held_lights == ()
     # That lamps are white is asked of none of them.
-    assert what_is_seen(solve(basis, target, colors="white")).kept_there == ()
+    assert compare_appearance(solve(basis, target, colors="white")).held_lights == ()
 
 
 def test_a_small_wish_that_is_swallowed_is_not_close(make_basis: Any):
     basis = _left_and_right(make_basis, spill=0.9)
     target = _over(_look(basis), (slice(8, 12), slice(4, 8)), 0.415)
-    seen = what_is_seen(solve(basis, target, hold=100.0))
-    assert seen.missed < CLOSE
-    assert seen.is_far
-    assert not seen.is_close
+    appearance = compare_appearance(solve(basis, target, hold=100.0))
+    assert appearance.error < CLOSE
+    assert appearance.is_far
+    assert not appearance.is_close
 
 
 def test_colours_that_hold_are_told(make_basis: Any):
     """A white lamp cannot be green."""
     basis = _left_and_right(make_basis)
     target = _over(_look(basis), (slice(None), slice(0, 24)), (0.1, 0.6, 0.1))
-    seen = what_is_seen(solve(basis, target, colors="white"))
-    assert seen.is_far
-    assert seen.limit_groups == ("colors",)
-    assert what_is_seen(solve(basis, target, colors="free")).is_close
+    appearance = compare_appearance(solve(basis, target, colors="white"))
+    assert appearance.is_far
+    assert appearance.limit_groups == ("colors",)
+    assert compare_appearance(solve(basis, target, colors="free")).is_close
 
 
 def test_where_no_light_gets(make_basis: Any):
@@ -280,12 +288,14 @@ def test_where_no_light_gets(make_basis: Any):
     images[:, 16:, 32:] = 0
     basis = make_basis(images=images, names=["left", "right"], emission=[[0.2] * 3] * 2)
     image = np.full((*SIZE, 3), 0.4, np.float32)
-    seen = what_is_seen(solve(basis, Target.of(image, name="even"), hold=0.0, space="display"))
-    assert seen.place is not None
-    assert seen.place.region == (2, 2)
-    assert seen.is_spot
-    assert seen.there == ()
-    top, left, bottom, right = seen.place.box
+    appearance = compare_appearance(
+        solve(basis, Target.of(image, name="even"), hold=0.0, space="display")
+    )
+    assert appearance.place is not None
+    assert appearance.place.region == (2, 2)
+    assert appearance.is_spot
+    assert appearance.local_lights == ()
+    top, left, bottom, right = appearance.place.box
     assert 16 <= top < bottom <= 24
     assert 32 <= left < right <= 48
 
@@ -293,14 +303,14 @@ def test_where_no_light_gets(make_basis: Any):
 def test_noise_that_the_painting_does_not_share_is_told_from_a_miss(make_basis: Any):
     basis = _left_and_right(make_basis, noise=0.05)
     where = (slice(None), slice(0, 24))
-    seen = what_is_seen(solve(basis, _over(_look(basis), where, 0.5)))
-    assert seen.delta_e > 2
-    assert seen.missed < 0.4 * seen.delta_e
+    appearance = compare_appearance(solve(basis, _over(_look(basis), where, 0.5)))
+    assert appearance.delta_e > 2
+    assert appearance.error < 0.4 * appearance.delta_e
     # A painting over the same samples shares it: then what is missed is no noise.
     look = _look(basis)
     target = _over(look, where, 2.5 * look[where])
-    seen = what_is_seen(solve(basis, target, hold=0.0, constraints=_locked()))
-    assert seen.noise < 0.1 * seen.delta_e
+    appearance = compare_appearance(solve(basis, target, hold=0.0, constraints=_locked()))
+    assert appearance.noise < 0.1 * appearance.delta_e
 
 
 def test_what_is_missed_lies_on_an_object(make_basis: Any):
@@ -321,9 +331,9 @@ def test_what_is_missed_lies_on_an_object(make_basis: Any):
         (("room", "room", "room"), ""),
     ):
         its = replace(basis, objects=Objects(index, names))
-        seen = what_is_seen(solve(its, even))
-        assert seen.place is not None
-        assert seen.place.object == said
+        appearance = compare_appearance(solve(its, even))
+        assert appearance.place is not None
+        assert appearance.place.object == said
 
 
 def test_a_miss_that_is_spread_is_on_nothing(make_basis: Any):
@@ -335,9 +345,9 @@ def test_a_miss_that_is_spread_is_on_nothing(make_basis: Any):
     basis = make_basis(images=images, names=["left", "right"], emission=[[0.4] * 3] * 2)
     basis = replace(basis, objects=Objects(index, ("wall", "bench", "vase")))
     even = Target.of(np.full((*SIZE, 3), 0.4, np.float32), name="even")
-    seen = what_is_seen(solve(basis, even))
-    assert seen.place is not None
-    assert seen.place.object == ""
+    appearance = compare_appearance(solve(basis, even))
+    assert appearance.place is not None
+    assert appearance.place.object == ""
 
 
 @pytest.mark.parametrize("space", ["linear", "display"])
@@ -347,13 +357,13 @@ def test_another_view_that_holds_is_named(make_basis: Any, space: Any):
     paints = (0.8, 0.05, 0.8)
     targets = [_even(x) for x in paints]
     solution = solve(views, targets, space=space)
-    stalls, balcony, _ = (what_is_seen(view) for view in solution.views)
+    stalls, balcony, _ = (compare_appearance(view) for view in solution.views)
     assert stalls.limit_groups == balcony.limit_groups == ("views",)
     assert stalls.limiting_views == ("balcony",)
     assert balcony.limiting_views == ("stalls", "box")
     # Views of one sensor go by their paintings.
     same = solve([views[0]] * 3, targets, space=space)
-    assert what_is_seen(same.views[0]).limiting_views == ("0.05 painted",)
+    assert compare_appearance(same.views[0]).limiting_views == ("0.05 painted",)
 
 
 def test_what_holds_beside_other_views_is_told_apart(make_basis: Any):
@@ -362,11 +372,11 @@ def test_what_holds_beside_other_views_is_told_apart(make_basis: Any):
     targets = [_even(0.8)] * 2
     dim = Constraints.of({"lamp": {"limits": {"max": 0.1}}})
     for view in solve(views, targets, constraints=dim).views:
-        seen = what_is_seen(view)
-        assert seen.limit_groups == ("constraints",)
-        assert seen.limiting_views == ()
+        appearance = compare_appearance(view)
+        assert appearance.limit_groups == ("constraints",)
+        assert appearance.limiting_views == ()
     for view in solve(views, targets).views:
-        assert what_is_seen(view).limit_groups == ()
+        assert compare_appearance(view).limit_groups == ()
 
 
 def _of_view(make_basis: Any, sensor: str) -> Any:
@@ -397,10 +407,10 @@ def test_words_do_not_depend_on_how_finely_it_is_rendered(make_basis: Any):
         importance=np.kron(target.importance, np.ones((16, 16), np.float32)),
     )
     one, other = (
-        what_is_seen(solve(b, t, hold=3.0, space="linear"))
+        compare_appearance(solve(b, t, hold=3.0, space="linear"))
         for b, t in ((basis, target), (large, painted))
     )
-    assert isinstance(one, Seen)
+    assert isinstance(one, Appearance)
     assert other.delta_e == pytest.approx(one.delta_e, rel=1e-3)
 
 
