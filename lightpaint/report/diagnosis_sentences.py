@@ -73,8 +73,8 @@ def bound_sentences(
 ) -> list[str]:
     """Return at most two sentences on what holds the lights, the most important first.
 
-    appearance: the result of `compare_appearance`; its reasons come with their shares, and single bounds only
-    if there are none. any_color: how to let lights have any colour.
+    appearance: the result of `compare_appearance`; its reasons come with their shares, and single
+    bounds only if there are none. any_color: how to let lights have any colour.
     """
     if appearance is not None and appearance.reasons:
         told = [spoken_cause(reason, any_color=any_color) for reason in appearance.reasons]

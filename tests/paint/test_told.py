@@ -174,7 +174,7 @@ def test_why_it_is_not_closer_is_said_to_who_paints(make_basis: Any, colors: Any
     for word in ("energy", "basis", "renders have", "below zero", "Most of that"):
         assert word not in said
     # A page has settings, and no arguments of Python.
-    kept = replace(analysis, seen=replace(analysis.seen, reasons=(COLORS,)))
+    kept = replace(analysis, appearance=replace(analysis.appearance, reasons=(COLORS,)))
     assert "Lights keep their colours; any colour would remove 50 %" in why_not_closer(kept)[-1]
     # Where it is missed most is told once: of a whole, or of a place that is seen.
     unseen = replace(analysis, appearance=replace(analysis.appearance, place=None))
