@@ -41,7 +41,7 @@ PLACE = Place((1, 1), 0.9, (0, 0, 8, 8), (0.4, 0.4, 0.4), (0.1, 0.1, 0.1), "floo
         ),
         (
             10.0,
-            {"there": ("lamp",)},
+            {"local_lights": ("lamp",)},
             "About half way (50 %). Brighter light on the floor is missing: lamp would light "
             "too much else.",
         ),

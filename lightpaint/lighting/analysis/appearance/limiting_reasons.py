@@ -116,7 +116,8 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     if (not reasons or reasons[0].share < SINGLE_SHARE * everything) and len(sample.groups) > 1:
         return _joint_reasons(sample, everything)
     measured = [
-        x if k and x.kind != "hold" else _measure(solution, sample, x) for k, x in enumerate(reasons)
+        x if k and x.kind != "hold" else _measure(solution, sample, x)
+        for k, x in enumerate(reasons)
     ]
     return tuple(x for x in measured if x is not None)
 
