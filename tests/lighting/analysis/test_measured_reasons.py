@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.appearance.appearance import what_is_seen
+from lightpaint.lighting.analysis.appearance.appearance import compare_appearance
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
@@ -50,7 +50,7 @@ def _error(solution: Solution, target: Target) -> float:
 def test_a_weaker_hold_removes_the_share_that_is_said(studio: Any):
     basis, target = studio
     now = correct_noise(solve(basis, target, hold=30.0))
-    reason = next(x for x in what_is_seen(now).reasons if x.kind == "hold")
+    reason = next(x for x in compare_appearance(now).reasons if x.kind == "hold")
     assert reason.loosening is not None
     then = correct_noise(solve(basis, target, hold=reason.loosening.hold))
     gained = 1 - _error(then, target) / _error(now, target)
@@ -67,7 +67,7 @@ def test_the_first_reason_removes_the_share_that_is_said(studio: Any, kind: str)
         "colors": ({"colors": "white"}, {"colors": "free"}),
     }[kind]
     now = correct_noise(solve(basis, target, hold=0.01, **held))
-    reason = what_is_seen(now).reasons[0]
+    reason = compare_appearance(now).reasons[0]
     assert reason.kind == kind
     gained = 1 - _error(correct_noise(solve(basis, target, hold=0.01, **free)), target) / _error(
         now, target
