@@ -15,6 +15,8 @@ from lightpaint.images.estimate import box_mean
 
 #: Pixels on either side over which noise and what a denoiser changed are averaged.
 RADIUS = 3
+#: The same where noise is told from the picture alone, which takes more pixels.
+GRAIN_RADIUS = 5
 
 
 def denoise_mix(
@@ -70,6 +72,8 @@ def _denoise_parts(
     smooth = _without_grain(basis, indirect, quality)
     direct = np.maximum(total - indirect, 0)
     clean = _without_grain(basis, direct, quality)
+    if not basis.knows_noise:
+        return smooth + blend_by_grain(direct, clean)
     return smooth + blend_by_noise(direct, noise - indirect_noise, clean)
 
 
@@ -103,3 +107,27 @@ def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Float
     total = variance + lost
     share = np.divide(variance, total, out=np.zeros_like(total), where=total > 0)
     return share[..., None].astype(np.float32)
+
+
+def blend_by_grain(raw: Floats, clean: Floats) -> Floats:
+    """Return the mean of a picture of unknown noise and its denoised form, (h, w, 3) float32.
+
+    Noise differs from pixel to pixel, while along an edge neighbours lose alike. So of r = clean −
+    raw, in a window of pixels, what is shared with the pixels two away in the direction that shares
+    most is taken for what the denoised form has lost, and the rest for noise: t = V / ⟨r²⟩ as of
+    `share_of_clean`. Two pixels, since renderers that filter share noise between neighbours.
+    """
+    changed = (clean - raw).astype(np.float64)
+
+    def pooled(values: Doubles) -> Doubles:
+        return np.asarray(box_mean(values.mean(axis=-1), GRAIN_RADIUS), np.float64)
+
+    total = pooled(np.square(changed))
+    shared = np.zeros_like(total)
+    for step in ((0, 2), (2, 0), (2, 2), (2, -2)):
+        others = np.roll(changed, step, (0, 1)) + np.roll(changed, (-step[0], -step[1]), (0, 1))
+        np.maximum(shared, pooled(changed * others / 2), out=shared)
+    share = np.divide(
+        np.maximum(total - shared, 0), total, out=np.zeros_like(total), where=total > 0
+    )
+    return np.asarray(raw + share[..., None].astype(np.float32) * (clean - raw), np.float32)

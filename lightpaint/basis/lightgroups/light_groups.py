@@ -13,13 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import LIGHT_GROUPS, Basis, Origin, free_name
+from lightpaint.basis.basis import LIGHT_GROUPS, Basis, IndirectLight, Origin, free_name
 from lightpaint.basis.lightgroups.beauty_comparison import (
     NEGLIGIBLE_SHARE,
     describe_sum,
     missing_and_exceeding,
     share_text,
 )
+from lightpaint.basis.lightgroups.denoising_passes import DenoisingPasses, split_passes
 from lightpaint.basis.lightgroups.layer_choice import ONE_FILE_PER_LIGHT
 from lightpaint.basis.lightgroups.layer_roles import Roles, roles_of
 from lightpaint.basis.lightgroups.render_layers import RenderLayer, read_layers
@@ -118,7 +119,8 @@ def read_light_groups(
     """
     path = Path(path)
     layers, told = read_layers(path, leave_out=leave_out)
-    return _light_groups(path, roles_of(path, layers, pattern), told)
+    candidates, passes = split_passes(layers)
+    return _light_groups(path, roles_of(path, candidates, pattern), passes, told)
 
 
 def _check_light(
@@ -136,7 +138,9 @@ def _check_light(
             )
 
 
-def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
+def _light_groups(
+    path: Path, roles: Roles, passes: DenoisingPasses, told: Sequence[str]
+) -> LightGroups:
     """Return the light groups in these layers.
 
     told: sentences that come before those of the roles.
@@ -162,7 +166,8 @@ def _light_groups(path: Path, roles: Roles, told: Sequence[str]) -> LightGroups:
         )
     if holes.any():
         remarks.append(f"{int(holes.sum())} pixels hold NaN or Inf in a layer and count nothing")
-    basis = _basis(path, roles, missing.rest, holes)
+    basis = _basis(path, roles, passes, missing.rest, holes)
+    remarks += _remarks_on_passes(basis)
     without_pixels = np.empty((0, 0, 3))
     layers = [replace(x, image=without_pixels.astype(x.image.dtype)) for x in lights]
     return LightGroups(
@@ -221,7 +226,20 @@ def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) 
     ]
 
 
-def _basis(path: Path, roles: Roles, rest: Floats | None, holes: npt.NDArray[np.bool_]) -> Basis:
+def _remarks_on_passes(basis: Basis) -> list[str]:
+    """Return a sentence on what pictures are denoised by, if the file has anything for it."""
+    known = ["albedo and normals"] if basis.features is not None else []
+    known += ["direct and indirect light"] if basis.indirect is not None else []
+    return [f"pictures are denoised by {' and by '.join(known)} of the file"] if known else []
+
+
+def _basis(
+    path: Path,
+    roles: Roles,
+    passes: DenoisingPasses,
+    rest: Floats | None,
+    holes: npt.NDArray[np.bool_],
+) -> Basis:
     """Return the basis in linear Rec.709; `rest`, if there is one, is a light that is kept."""
     lights = roles.lights
     made = [_light(name, layer.name, "light group") for name, layer in lights.items()]
@@ -235,13 +253,33 @@ def _basis(path: Path, roles: Roles, rest: Floats | None, holes: npt.NDArray[np.
             _light(free_name(REST_NAME, lights), "beauty less the groups", "rest", is_fixed=True)
         )
         images[-1] = first.in_rec709(rest)
+    unknown = as_planes(np.zeros_like(images))
+    indirect = _indirect_planes(roles, passes, images, holes)
     return Basis(
         lights=Lights(tuple(made)),
         planes=as_planes(images),
-        noise=as_planes(np.zeros_like(images)),
+        noise=unknown,
         emitters_seen=np.zeros(holes.shape, dtype=bool),
         origin=_origin(path, roles, images, [*lights]),
+        features=passes.features(roles.view),
+        indirect=None if indirect is None else IndirectLight(as_planes(indirect), unknown),
     )
+
+
+def _indirect_planes(
+    roles: Roles, passes: DenoisingPasses, images: Floats, holes: npt.NDArray[np.bool_]
+) -> Floats | None:
+    """Return indirect light, (n, h, w, 3), all of an image whose parts are not known; None if none
+    is.
+    """
+    parts = [passes.indirect.get(layer.name) for layer in roles.lights.values()]
+    if all(part is None for part in parts):
+        return None
+    made = images.copy()
+    for plane, part, layer in zip(made, parts, roles.lights.values(), strict=False):
+        if part is not None:
+            plane[:] = layer.in_rec709(_without_holes(part, holes))
+    return made
 
 
 def _light(name: str, layer: str, plugin: str, *, is_fixed: bool = False) -> BasisLight:

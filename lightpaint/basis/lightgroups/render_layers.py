@@ -22,6 +22,7 @@ from lightpaint.images.formats.exr_layers import (
     channel_named,
     colour_channels,
     primaries_of,
+    vector_channels,
 )
 from lightpaint.screen import some_names
 
@@ -34,6 +35,7 @@ class RenderLayer:
     others: other names that a pattern may meet it by.
     image: (h, w, 3) in the display window, as stored: linear light, float16 or float32.
     alpha: (h, w), or None.
+    is_vector: whether its channels are X, Y and Z: it is no light then.
     primaries: of the image, CIE xy of red, green, blue and white; None for Rec.709's.
     """
 
@@ -45,6 +47,7 @@ class RenderLayer:
     image: Floats
     alpha: Floats | None = None
     primaries: tuple[float, ...] | None = None
+    is_vector: bool = False
 
     @property
     def is_half(self) -> bool:
@@ -66,8 +69,9 @@ class RenderLayer:
 def read_layers(
     path: Path, *, leave_out: Iterable[str | Path] = ()
 ) -> tuple[list[RenderLayer], list[str]]:
-    """Return the RGB layers of the file, or of the folder's files, at `path`, in their order.
+    """Return the layers of the file, or of the folder's files, at `path`, in their order.
 
+    They are of red, green and blue; or vectors, of the size of the others.
     In a folder a file of plain R, G, B is a layer of the file's name, without what all of these
     names share; `leave_out` and what else cannot be a light (folder.py) is passed by, which the
     sentences that come along say. Raises ImageError for files that cannot be read, BasisError if
@@ -80,10 +84,11 @@ def read_layers(
         layers = _of_files(files)
     else:
         layers = _of_file(path)
-    if not layers:
+    colours = [layer for layer in layers if not layer.is_vector]
+    if not colours:
         raise BasisError(f"{path} has no RGB layers: give the multi-layer EXR, or a folder of them")
-    first = layers[0]
-    for layer in layers[1:]:
+    first = colours[0]
+    for layer in colours[1:]:
         if layer.image.shape != first.image.shape:
             raise BasisError(
                 f"{layer.place} is {_size(layer)} but {first.place} is {_size(first)}: light "
@@ -94,13 +99,14 @@ def read_layers(
                 f"{layer.place} and {first.place} declare different primaries: light groups need "
                 "one colour space"
             )
-    names = [layer.name for layer in layers]
+    names = [layer.name for layer in colours]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise BasisError(
             f"{path} has the layers {some_names(name or 'R, G, B' for name in twice)} more than "
             "once: is it a sequence of frames, or several views? give one file of one view"
         )
-    return layers, remarks
+    vectors = [x for x in layers if x.is_vector and x.image.shape == first.image.shape]
+    return colours + vectors, remarks
 
 
 def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
@@ -126,7 +132,9 @@ def _of_file(path: Path) -> list[RenderLayer]:
     layers = []
     for part in parts:
         shown, primaries = part.in_display_window(), _primaries(path, part)
-        for prefix, channels in colour_channels(shown.channels).items():
+        colours = colour_channels(shown.channels)
+        vectors = vector_channels(shown.channels)
+        for prefix, channels in [*colours.items(), *vectors.items()]:
             image = _rgb(path, shown.channels, channels)
             alpha = channel_named(shown.channels, prefix, *ALPHA_NAMES)
             others = [part.name, f"{part.name}.{prefix}"]
@@ -142,6 +150,7 @@ def _of_file(path: Path) -> list[RenderLayer]:
                     image=image,
                     alpha=None if alpha is None else shown.channels[alpha],
                     primaries=primaries,
+                    is_vector=vectors.get(prefix) == channels,
                 )
             )
     return layers

@@ -63,6 +63,15 @@ def colour_channels(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
     return layers
 
 
+def vector_channels(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
+    """Return layer (prefix) → its x, y and z channels, for layers with all three."""
+    made = {}
+    for layer, channels in _by_layer(names).items():
+        if {"x", "y", "z"} <= channels.keys():
+            made[layer] = (channels["x"], channels["y"], channels["z"])
+    return made
+
+
 def channel_named(names: Iterable[str], layer: str, *lasts: str) -> str | None:
     """Return the channel of `layer`, a prefix, whose name ends in the first match of `lasts`."""
     channels = _by_layer(names).get(layer, {})

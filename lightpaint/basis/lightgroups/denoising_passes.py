@@ -1,0 +1,129 @@
+"""Passes beside light groups that pictures are denoised by: surfaces, and parts of a light.
+
+Names propose which layers these are. That a layer is the direct or indirect part of a light is
+believed if it is nowhere brighter than the light.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.lightgroups.beauty_comparison import rounding
+from lightpaint.basis.lightgroups.naming_conventions import SEPARATORS, is_known
+from lightpaint.basis.lightgroups.render_layers import RenderLayer
+from lightpaint.images.denoiser import Features
+
+#: Names in lower case, without the view layer, and with spaces for underscores; best first.
+ALBEDO_NAMES = (
+    "denoising albedo",
+    "denoise albedo",
+    "albedo",
+    "diffuse albedo",
+    "diffcol",
+    "diffuse color",
+)
+NORMAL_NAMES = (
+    *("denoising normal", "denoise normal", "normal", "n", "nn"),
+    *("avg shading normal", "shading normal"),
+)
+POSITION_NAMES = ("position", "p", "pworld")
+
+#: How the parts of a light are named: after the light's layer, or before its name.
+PART = re.compile(
+    r"(?P<owner>.+)[ ._-](?P<after>direct|indirect)"
+    r"|(?:.+\.)?(?P<before>direct|indirect)[ ._-](?P<name>.+)",
+    re.I,
+)
+
+#: Share of pixels in which a part may exceed its light: filters have negative lobes.
+MAX_EXCEEDING_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class DenoisingPasses:
+    """The passes of a file that are no lights.
+
+    surfaces: layers of albedo, normals and positions. indirect: the indirect part of a light, by
+    the name of the light's layer, (h, w, 3) as stored.
+    """
+
+    surfaces: tuple[RenderLayer, ...]
+    indirect: Mapping[str, Floats]
+
+    def features(self, view: str) -> Features | None:
+        """Return what the surfaces of a view layer tell; None without albedo or normals."""
+        albedo, normal, position = (
+            self._surface(names, view) for names in (ALBEDO_NAMES, NORMAL_NAMES, POSITION_NAMES)
+        )
+        if albedo is None or normal is None:
+            return None
+        length = np.linalg.norm(normal, axis=-1, keepdims=True)
+        unit = normal / np.where(length > 0, length, 1)
+        return Features(np.clip(albedo, 0, 1), unit, position)
+
+    def _surface(self, names: Sequence[str], view: str) -> Floats | None:
+        """Return the pixels of the best layer of these names, (h, w, 3) float32, all finite."""
+        of_view = [x for x in self.surfaces if not view or x.name.startswith(f"{view}.")]
+        for name in names:
+            for layer in of_view or self.surfaces:
+                if _plain_name(layer) == name:
+                    pixels = layer.image.astype(np.float32)
+                    return np.nan_to_num(pixels, nan=0, posinf=0, neginf=0)
+        return None
+
+
+def split_passes(layers: Sequence[RenderLayer]) -> tuple[list[RenderLayer], DenoisingPasses]:
+    """Return the layers that may be lights or the whole picture, and the passes among the others.
+
+    Normals in R, G, B are known by an albedo that comes with them: a light may have that name.
+    """
+    has_albedo = any(_plain_name(x) in ALBEDO_NAMES for x in layers)
+    of_surfaces = {*ALBEDO_NAMES, *(NORMAL_NAMES + POSITION_NAMES if has_albedo else ())}
+    surfaces: list[RenderLayer] = []
+    kept: list[RenderLayer] = []
+    for layer in layers:
+        is_surface = layer.is_vector or _plain_name(layer) in of_surfaces
+        (surfaces if is_surface else kept).append(layer)
+    by_name = {x.name: x for x in kept}
+    parts: dict[str, dict[str, RenderLayer]] = {}
+    for layer in kept:
+        found = PART.fullmatch(layer.name)
+        owner = None if found is None else _owner(found, by_name)
+        if found is not None and owner is not None and _is_part(layer, owner):
+            which = (found["after"] or found["before"]).casefold()
+            parts.setdefault(owner.name, {})[which] = layer
+    taken = [its.name for both in parts.values() for its in both.values()]
+    indirect = {
+        owner: both["indirect"].image.astype(np.float32)
+        if "indirect" in both
+        else by_name[owner].image.astype(np.float32) - both["direct"].image
+        for owner, both in parts.items()
+    }
+    left = [x for x in kept if x.name not in taken]
+    return left, DenoisingPasses(tuple(surfaces), indirect)
+
+
+def _plain_name(layer: RenderLayer) -> str:
+    return layer.name.rpartition(".")[2].casefold().replace("_", " ")
+
+
+def _owner(found: re.Match[str], layers: Mapping[str, RenderLayer]) -> RenderLayer | None:
+    """Return the light's layer that a part is named after; None where none or several may be it."""
+    if found["owner"]:
+        return layers.get(found["owner"])
+    name = found["name"]
+    if name in layers:
+        return layers[name]
+    ends = tuple(f"{joint}{name}" for joint in SEPARATORS)
+    owners = [x for x in layers if x != found[0] and x.endswith(ends) and is_known(x)]
+    return layers[owners[0]] if len(owners) == 1 else None
+
+
+def _is_part(part: RenderLayer, owner: RenderLayer) -> bool:
+    """Return True if a layer has light, and nowhere more than the light that it may be part of."""
+    beyond = part.image.astype(np.float64) - owner.image - 2 * rounding([part, owner])
+    exceeds = (np.nan_to_num(beyond, nan=0, posinf=0, neginf=0) > 0).any(axis=-1)
+    return bool(part.image.any()) and float(exceeds.mean()) <= MAX_EXCEEDING_SHARE

@@ -1,0 +1,233 @@
+"""Passes beside light groups: what pictures are denoised by is found, and is no light."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from light_groups import SIZE, channels, interleaved, pictures, write
+
+from lightpaint.basis.basis_file import read_basis, write_basis
+from lightpaint.basis.denoised_mixes import blend_by_grain, denoise_plane
+from lightpaint.basis.lightgroups.light_groups import read_light_groups
+from lightpaint.errors import BasisError
+from lightpaint.images.denoiser import denoised, oidn_is_installed
+
+Writer = Callable[..., Path]
+
+
+def surfaces(*, seed: int = 5) -> tuple[Any, Any, Any]:
+    """Albedo, normals of any length, and positions, (h, w, 3) float32."""
+    rng = np.random.default_rng(seed)
+    made = rng.random((*SIZE, 3)), rng.normal(size=(*SIZE, 3)), rng.normal(size=(*SIZE, 3))
+    return tuple(x.astype(np.float32) for x in made)
+
+
+def cycles(view: str, images: Any, *, seed: int = 5) -> dict[str, Any]:
+    """Channels of a view layer with denoising data and the pass of positions."""
+    albedo, normal, position = surfaces(seed=seed)
+    made = channels(f"{view}.Combined", images.sum(axis=0))
+    for name, image in zip("ab", images, strict=True):
+        made |= channels(f"{view}.Combined_{name}", image)
+    made |= channels(f"{view}.Denoising Albedo", albedo)
+    made |= channels(f"{view}.Denoising Normal", normal, names="XYZ")
+    made |= channels(f"{view}.Position", position, names="XYZ")
+    return made | {f"{view}.Denoising Depth.Z": position[..., 0]}
+
+
+def one_part(path: Path, held: dict[str, Any]) -> Path:
+    return write(path, ("", held))
+
+
+def a_part_each(path: Path, held: dict[str, Any]) -> Path:
+    layers: dict[str, dict[str, Any]] = {}
+    for name, plane in held.items():
+        layers.setdefault(name.rpartition(".")[0], {})[name] = plane
+    return write(path, *layers.items())
+
+
+@pytest.mark.parametrize("written", [one_part, a_part_each])
+def test_denoising_data_of_cycles(tmp_path: Path, written: Writer):
+    images = pictures(2)
+    groups = read_light_groups(written(tmp_path / "a.exr", cycles("ViewLayer", images)))
+    albedo, normal, position = surfaces()
+    features = groups.basis.features
+    assert groups.basis.names == ("a", "b")
+    assert features is not None
+    np.testing.assert_array_equal(features.albedo, albedo)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    np.testing.assert_allclose(features.normal, normal / length, rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(features.position, position)
+    assert groups.basis.indirect is None
+    assert "pictures are denoised by albedo and normals of the file" in groups.remarks
+
+
+def test_of_several_view_layers_the_surfaces_of_the_one_that_is_read(tmp_path: Path):
+    held = cycles("Far", pictures(2), seed=1) | cycles("Near", pictures(2), seed=2)
+    groups = read_light_groups(write(tmp_path / "a.exr", ("", held)))
+    features = groups.basis.features
+    assert groups.basis.origin.sensor == "Far"
+    assert features is not None
+    np.testing.assert_array_equal(features.albedo, surfaces(seed=1)[0])
+
+
+def test_without_normals_there_are_no_features(tmp_path: Path):
+    images = pictures(2)
+    held = {k: v for k, v in cycles("ViewLayer", images).items() if "Normal" not in k}
+    basis = read_light_groups(write(tmp_path / "a.exr", ("", held))).basis
+    assert basis.names == ("a", "b")
+    assert basis.features is None
+
+
+def folder_of(path: Path, layers: dict[str, Any]) -> Path:
+    path.mkdir()
+    for name, image in layers.items():
+        interleaved(path / f"shot_{name}_v1.exr", {"": image})
+    return path
+
+
+def test_files_of_surfaces_are_no_lights(tmp_path: Path):
+    images, (albedo, normal, _) = pictures(2), surfaces()
+    layers = {"key": images[0], "fill": images[1], "albedo": albedo, "normal": normal}
+    groups = read_light_groups(folder_of(tmp_path / "lights", layers))
+    assert set(groups.basis.names) == {"key", "fill"}
+    assert groups.basis.features is not None
+    np.testing.assert_array_equal(groups.basis.features.albedo, albedo)
+
+
+def test_a_light_may_be_called_normal(tmp_path: Path):
+    """Nothing but an albedo beside it says otherwise."""
+    images = pictures(3)
+    layers = dict(zip(("key", "fill", "normal"), images, strict=True))
+    groups = read_light_groups(folder_of(tmp_path / "lights", layers))
+    assert set(groups.basis.names) == {"key", "fill", "normal"}
+
+
+def split(n: int = 2) -> tuple[Any, Any]:
+    """Direct and indirect light of n lights."""
+    return pictures(n), pictures(n, seed=1)
+
+
+@pytest.mark.parametrize("given", [("direct", "indirect"), ("indirect",), ("direct",)])
+@pytest.mark.parametrize("named", ["{part}_{name}", "RGBA_{name}_{part}"])
+def test_parts_of_each_light(tmp_path: Path, given: tuple[str, ...], named: str):
+    direct, indirect = split()
+    layers = {"RGBA": (direct + indirect).sum(axis=0)}
+    for k, name in enumerate(("key", "back light")):
+        layers[f"RGBA_{name}"] = direct[k] + indirect[k]
+        its = {"direct": direct[k], "indirect": indirect[k]}
+        layers |= {named.format(part=part, name=name): its[part] for part in given}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    parts = groups.basis.indirect
+    assert groups.basis.names == ("back light", "key")  # in the order of the file's channels
+    assert groups.missing is not None
+    assert groups.missing < 1e-6
+    assert parts is not None
+    np.testing.assert_allclose(parts.planes.array(), indirect[::-1], atol=1e-5 * indirect.max())
+    assert not parts.noise.array().any()
+    assert any(x.endswith("by direct and indirect light of the file") for x in groups.remarks)
+
+
+def test_what_has_no_parts_counts_as_indirect(tmp_path: Path):
+    """All of it is denoised then, as it was before there were parts; and so is the rest."""
+    direct, indirect = split()
+    both = direct + indirect
+    layers = {
+        "RGBA": both.sum(axis=0) + 1,
+        "RGBA_a": both[0],
+        "RGBA_b": both[1],
+        "indirect_b": indirect[1],
+    }
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    parts = groups.basis.indirect
+    assert groups.basis.names == ("a", "b", "rest")
+    assert parts is not None
+    expected = [both[0], indirect[1], groups.basis.images[2]]
+    for plane, its in zip(parts.planes, expected, strict=True):
+        np.testing.assert_array_equal(plane, its)
+
+
+def test_a_light_may_be_named_like_a_part(tmp_path: Path):
+    """It is brighter somewhere than the light whose part it would be."""
+    images = pictures(2)
+    layers = {"RGBA": images.sum(axis=0), "RGBA_cove": images[0], "RGBA_cove_indirect": images[1]}
+    groups = read_light_groups(interleaved(tmp_path / "a.exr", layers))
+    assert groups.basis.names == ("cove", "cove_indirect")
+    assert groups.basis.indirect is None
+
+
+def test_passes_alone_are_no_light_groups(tmp_path: Path):
+    albedo, normal, _ = surfaces()
+    held = channels("albedo", albedo) | channels("N", normal, names="XYZ")
+    with pytest.raises(BasisError):
+        read_light_groups(write(tmp_path / "a.exr", ("", held)))
+    with pytest.raises(BasisError, match="has no RGB layers"):
+        read_light_groups(write(tmp_path / "b.exr", ("", channels("N", normal, names="XYZ"))))
+
+
+def test_normals_of_another_size_are_passed_by(tmp_path: Path):
+    images, (albedo, normal, _) = pictures(2), surfaces()
+    layers = {"key": images[0], "fill": images[1], "albedo": albedo}
+    folder = folder_of(tmp_path / "lights", layers)
+    small = channels("", normal[::2, ::2], names="XYZ")
+    write(folder / "shot_normal_v1.exr", ("", small))
+    basis = read_light_groups(folder).basis
+    assert set(basis.names) == {"key", "fill"}
+    assert basis.features is None
+
+
+def test_a_saved_basis_keeps_them(tmp_path: Path):
+    held = cycles("ViewLayer", pictures(2))
+    made = read_light_groups(write(tmp_path / "a.exr", ("", held))).basis
+    write_basis(tmp_path / "b.basis.exr", made)
+    again = read_basis(tmp_path / "b.basis.exr")
+    assert again.features is not None
+    assert made.features is not None
+    # Albedo and normals become half floats.
+    np.testing.assert_allclose(again.features.albedo, made.features.albedo, rtol=2**-11)
+    np.testing.assert_array_equal(again.features.position, made.features.position)
+
+
+def test_grain_is_taken_out_of_light_of_unknown_noise():
+    """Of white noise neighbours share nothing, and the share of the denoised form is 1."""
+    rng = np.random.default_rng(7)
+    truth = np.full((120, 160, 3), 2, np.float32)
+    raw = truth + rng.normal(size=truth.shape).astype(np.float32)
+    left = np.square(blend_by_grain(raw, truth) - truth).mean()
+    # A mean over 121 pixels of what differs by chance, the largest of four directions: some 0.1.
+    assert left < 0.03
+
+
+@pytest.mark.parametrize("step", [(0, 1), (1, 0), (1, 1)])
+def test_edges_stay_in_light_of_unknown_noise(step: tuple[int, int]):
+    """A denoised form that has blurred an edge differs alike along it."""
+    y, x = np.mgrid[:80, :100]
+    edge = ((step[1] * y - step[0] * x) % 24 < 12)[..., None] * np.ones(3, np.float32)
+    blurred = (np.roll(edge, 1, (0, 1)) + edge + np.roll(edge, -1, (0, 1))) / 3
+    if step == (1, 1):
+        blurred = (np.roll(edge, 1, 0) + edge + np.roll(edge, -1, 0)) / 3
+    inside = np.s_[14:-14, 14:-14]  # Beyond the border a picture goes on at its other end.
+    lost = np.square(blurred - edge)[inside].mean()
+    assert lost > 0.01
+    assert np.square(blend_by_grain(edge, blurred) - edge)[inside].mean() < 1e-6
+
+
+@pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
+def test_parts_and_surfaces_keep_what_a_denoiser_blurs(tmp_path: Path):
+    """A texture and pools of direct light, in noisy indirect light, against the picture alone."""
+    rng = np.random.default_rng(8)
+    y, x = np.mgrid[:96, :128]
+    albedo = np.where((x + y) % 4 < 2, np.float32(0.8), np.float32(0.2))[..., None]
+    albedo = albedo * np.ones(3, np.float32)
+    direct = ((x // 8 + y // 8) % 2).astype(np.float32)[..., None] * albedo
+    truth = direct + albedo
+    indirect = albedo * rng.exponential(size=(96, 128, 1)).astype(np.float32)
+    normal = np.broadcast_to(np.float32([0, 0, 1]), albedo.shape)
+    layers = {"RGBA": direct + indirect, "RGBA_key": direct + indirect, "indirect_key": indirect}
+    held = {k: v for name, image in layers.items() for k, v in channels(name, image).items()}
+    held |= channels("albedo", albedo) | channels("N", normal, names="XYZ")
+    basis = read_light_groups(write(tmp_path / "a.exr", ("", held))).basis
+    error = np.square(denoise_plane(basis, 0) - truth).mean()
+    alone = np.square(denoised(basis.planes.plane(0)) - truth).mean()
+    assert error < 0.2 * alone
