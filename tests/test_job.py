@@ -276,7 +276,7 @@ def test_the_lights_file_beside_a_scene_holds_and_is_replaced(room: Path, tmp_pa
     write_rgb(tmp_path / "p.exr", np.ones((20, 24, 3), np.float32))
     given = Constraints.of({"bulb": {"lock": True}})
     job = Job((SceneFile(str(room)),), (Painting(str(tmp_path / "p.exr")),), tmp_path, None, given)
-    assert [name for name, _, _ in job.asked.lights] == ["bulb", "bulb"]
+    assert [name for name, _, _ in job.all_constraints.lights] == ["bulb", "bulb"]
     assert job.constraints == given
     assert f"lights and groups as in {beside}" in job.remarks
 

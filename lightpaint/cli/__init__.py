@@ -31,6 +31,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         from lightpaint.cli.crash_report import report_fault
 
-        given = list(sys.argv[1:] if arguments is None else arguments)
-        code = report_fault("lightpaint", error, given)
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        code = report_fault("lightpaint", error, words)
     return 128 + received[0] if received and code == 130 else code

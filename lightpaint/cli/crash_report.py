@@ -22,28 +22,32 @@ FAULT = 70
 MAX_ERROR_LENGTH = 300
 
 
-def report_fault(command: str, error: BaseException, given: Sequence[str]) -> int:
+def report_fault(command: str, error: BaseException, arguments: Sequence[str]) -> int:
     """Print that an unexpected error occurred and where the details are; return the exit code.
 
-    command: its name, with the sub-command. given: the arguments after `lightpaint`.
+    command: its name, with the sub-command. arguments: the arguments after `lightpaint`.
     """
-    said = one_line(str(error), limit=MAX_ERROR_LENGTH)
-    what = f"{type(error).__name__}: {said}" if said else type(error).__name__
-    written = _write_details(_details(error, given))
-    where = f"the details are in {written}" if written else "the details could not be written"
-    lines.err(f"{command}: a bug in lightpaint: {what}; {where}")
+    message = one_line(str(error), limit=MAX_ERROR_LENGTH)
+    error_text = f"{type(error).__name__}: {message}" if message else type(error).__name__
+    written = _write_details(_details(error, arguments))
+    details_note = (
+        f"the details are in {written}" if written else "the details could not be written"
+    )
+    lines.err(f"{command}: a bug in lightpaint: {error_text}; {details_note}")
     return FAULT
 
 
-def _details(error: BaseException, given: Sequence[str]) -> str:
+def _details(error: BaseException, arguments: Sequence[str]) -> str:
     """Return all that helps to find the bug, without control characters from files."""
-    about = (
+    header = (
         f"lightpaint {__version__}, Python {platform.python_version()}, {platform.platform()}",
-        f"command: {visible(repr(['lightpaint', *given]))}",
+        f"command: {visible(repr(['lightpaint', *arguments]))}",
         *_libraries(),
     )
-    told = (line for text in traceback.format_exception(error) for line in text.splitlines())
-    return "\n".join([*about, "", *map(visible, told), ""])
+    lines_of_traceback = (
+        line for text in traceback.format_exception(error) for line in text.splitlines()
+    )
+    return "\n".join([*header, "", *map(visible, lines_of_traceback), ""])
 
 
 def _libraries() -> list[str]:

@@ -36,7 +36,7 @@ OUT_OF_MEMORY_TEXT = (
 
 def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int:
     """Run one command and return the exit code. received: the signals that have arrived."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
     for stream in (sys.stdout, sys.stderr):
         # A terminal without a character shows a substitute instead of failing.
         if isinstance(stream, io.TextIOWrapper):
@@ -46,7 +46,7 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
         from lightpaint.cli.options.completion import complete
 
         complete(parser)
-    options = parser.parse_args(given)
+    options = parser.parse_args(words)
     hint = ""
     try:
         # A command's imports happen when it runs, so that --help answers at once. An interrupt in
@@ -63,7 +63,7 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
         # The commands report this in their own words.
         warnings.simplefilter("ignore", SlowBackendWarning)
         with using_output_mode(OutputMode(options.as_json, options.is_quiet, options.is_verbose)):
-            outcome = command(**values_of(options, given))
+            outcome = command(**values_of(options, words))
             if options.as_json and outcome.told is not None:
                 terminal.write_json(outcome.told())
             terminal.note("done")
@@ -73,7 +73,7 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
     except Exception as error:
         # An interrupt inside a library often surfaces as an error of its own.
         if not received:
-            return _report(options.command, error, given)
+            return _report(options.command, error, words)
     lines.err(f"lightpaint {options.command}: interrupted{hint}")
     return 130
 
@@ -95,7 +95,7 @@ def _command(name: str) -> Callable[..., CommandOutcome]:
     return getattr(module, name)  # type: ignore[no-any-return]
 
 
-def _report(command: str, error: Exception, given: Sequence[str]) -> int:
+def _report(command: str, error: Exception, words: Sequence[str]) -> int:
     """Print what went wrong, and return the exit code."""
     if isinstance(error, LightpaintError):
         for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
@@ -104,4 +104,4 @@ def _report(command: str, error: Exception, given: Sequence[str]) -> int:
     if isinstance(error, MemoryError):
         lines.err(f"lightpaint {command}: {OUT_OF_MEMORY_TEXT}")
         return 2
-    return report_fault(f"lightpaint {command}", error, given)
+    return report_fault(f"lightpaint {command}", error, words)

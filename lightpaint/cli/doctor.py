@@ -68,17 +68,17 @@ def _package(name: str) -> Finding:
 
 def _extra(what: str, package: str, extra: str) -> Finding:
     """Return the finding of an optional package."""
-    found = _package(package)
-    if found.state == "ok":
-        return Finding(what, "ok", found.found)
+    version = _package(package)
+    if version.state == "ok":
+        return Finding(what, "ok", version.found)
     return Finding(what, "info", f"not installed, optional: pip install 'lightpaint[{extra}]'")
 
 
 def _denoiser() -> Finding:
     """Return the finding of the denoiser, which is optional."""
-    found = _package("pyoidn")
-    if found.state == "ok":
-        return Finding("denoiser", "ok", f"Open Image Denoise (pyoidn {found.found})")
+    version = _package("pyoidn")
+    if version.state == "ok":
+        return Finding("denoiser", "ok", f"Open Image Denoise (pyoidn {version.found})")
     return Finding("denoiser", "info", "a plain filter; a better one: pip install pyoidn")
 
 

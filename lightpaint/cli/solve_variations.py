@@ -51,8 +51,8 @@ class LookSet:
             publish_shifted(job, word, place, lighting, bases)
             self.entries.append(entry_of(job, place.folder, word))
             files = [file for file in place.files if file.is_file()]
-            about = {"variation": word, "of": str(job.folder)}
-            self.shifted.append(files_document(place.folder, files, **about))
+            relation = {"variation": word, "of": str(job.folder)}
+            self.shifted.append(files_document(place.folder, files, **relation))
 
     def continues_after(self, job: Job, error: Exception) -> bool:
         """Return True if the other looks are solved in spite of an error."""
@@ -64,12 +64,12 @@ class LookSet:
 
     def show(self, bases: Sequence[Basis]) -> None:
         """Print the failures, and write the gallery."""
-        for name, why in self.failed.items():
-            terminal.complain("solve", f"{name}: {why}")
+        for name, reason in self.failed.items():
+            terminal.complain("solve", f"{name}: {reason}")
         if self.gallery is None:
             return
-        named = {entry.name for entry in self.entries}
-        lost = [LookEntry(name, "") for name in self.failed if name not in named]
+        entry_names = {entry.name for entry in self.entries}
+        lost = [LookEntry(name, "") for name in self.failed if name not in entry_names]
         rows = write_solve_gallery(self.gallery, [*self.entries, *lost], self.failed, bases)
         terminal.write(f"{self.gallery / FILES[0]}: {counts_text(rows)}")
 
@@ -128,9 +128,9 @@ def _gallery_folder(output: Path | None, folders: Sequence[Path], *, force: bool
     """
     place = folders[0].parent if folders else output or Path()
     try:
-        if taken := next((x.name for x in folders if is_reserved(x.name)), ""):
+        if reserved := next((x.name for x in folders if is_reserved(x.name)), ""):
             raise OutputError(
-                f"{taken} is a folder of the gallery of several looks: give the "
+                f"{reserved} is a folder of the gallery of several looks: give the "
                 "painting another name"
             )
         check_gallery(place, force=force)

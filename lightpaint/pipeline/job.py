@@ -80,7 +80,7 @@ class Job:
         settings: Settings of the solve.
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
         views: Set on creation: the views, each with what it needs.
-        asked: Set on creation: all constraints, those of the lights file first.
+        all_constraints: Set on creation: all constraints, those of the lights file first.
         fit: Set on creation: the settings, with those decided that depend on the paintings.
         remarks: Set on creation: remarks for the user, in plain text.
         results: Set on creation: the folder, and the files that may be replaced there.
@@ -104,7 +104,7 @@ class Job:
     settings: Settings = field(default_factory=Settings)
     by_sensor: bool = False
     views: tuple[PaintedView, ...] = field(init=False, repr=False)
-    asked: Constraints = field(init=False, repr=False)
+    all_constraints: Constraints = field(init=False, repr=False)
     fit: Settings = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
     results: ResultFolder = field(init=False, repr=False)
@@ -120,20 +120,20 @@ class Job:
         basis = basis.basis if isinstance(basis, LightGroups) else basis
         if basis is not None and basis.origin.is_light_groups:
             pairs = zip(self.targets, targets, strict=True)
-            targets = [_over_look(given, target, basis) for given, target in pairs]
+            targets = [_over_look(painting, target, basis) for painting, target in pairs]
         scenes = [content(scene) for scene in self.scenes]
         folders = [self.folder]
         if self.by_sensor or len(scenes) > 1:
             folders = [self.folder / name for name in view_names(scenes)]
         self._check_painting_is_no_light()
         source = scenes[0] if scenes else basis
-        asked = self.constraints
+        all_constraints = self.constraints
         if isinstance(source, Scene | Basis):
-            asked = constraints_of(source.requests).and_then(asked)
+            all_constraints = constraints_of(source.requests).and_then(all_constraints)
         if scenes and basis is not None:
             check_same_view(scenes[0], basis)
         # Reports impossible constraints before rendering.
-        reduce_to(asked, basis_lights(scenes[0]) if basis is None else basis.lights)
+        reduce_to(all_constraints, basis_lights(scenes[0]) if basis is None else basis.lights)
         if self.settings.suggest:
             check_suggestible(scenes[0])
         views = tuple(
@@ -145,7 +145,7 @@ class Job:
         # The only place that sets these fields; they are frozen afterwards.
         fields = vars(self)
         fit = resolve_for_targets(self.settings, [view.target for view in views])
-        fields.update(views=views, asked=asked, fit=fit, results=results)
+        fields.update(views=views, all_constraints=all_constraints, fit=fit, results=results)
         fields.update(remarks=tuple(self._remarks(targets, scenes)))
 
     @property

@@ -45,11 +45,11 @@ def encode_job(
     by_sensor: bool,
 ) -> str:
     """Return a job's fields as text. Raises LightpaintError for objects in memory."""
-    named = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
-    for what, given in named:
-        if not all(isinstance(one, File) for one in given):
+    groups = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
+    for kind, sources in groups:
+        if not all(isinstance(source, File) for source in sources):
             raise LightpaintError(
-                f"this job cannot be sent: its {what} is in memory; give the path of a file"
+                f"this job cannot be sent: its {kind} is in memory; give the path of a file"
             )
     basis_record = {type(basis).__name__: asdict(basis)} if basis else None
     record = JobRecord(

@@ -99,7 +99,10 @@ def paint_with_light(
     }
     bases = basis if isinstance(basis, list) else None
     if bases is not None:
-        scene = [_with_film_of(x, its) for x, its in zip(_as_list(scene), bases, strict=True)]
+        scene = [
+            _with_film_of(x, view_basis)
+            for x, view_basis in zip(_as_list(scene), bases, strict=True)
+        ]
         # These scenes have the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
     read = {"mask": mask and str(mask), "layer": layer, "find": find}
@@ -126,7 +129,7 @@ def _job(
     }
     by_sensor = isinstance(scenes, list | tuple)
     painting_options = {**target_options, "transform": TransformChoice.of(settings.transform)}
-    changed = [name for name, value in target_options.items() if value not in (None, True)]
+    unused = [name for name, value in target_options.items() if value not in (None, True)]
     scenes = [SceneFile(str(x), **scene_options) if _is_path(x) else x for x in _as_list(scenes)]
     targets = [
         Painting(str(x), **painting_options) if _is_path(x) else x for x in _as_list(targets)
@@ -136,8 +139,8 @@ def _job(
     if scene_options and not any(isinstance(x, SceneFile) for x in scenes):
         names = ", ".join(f"{name}=..." for name in scene_options)
         raise SceneError(f"{names} cannot change a scene that is already loaded: give its path")
-    if changed and not any(isinstance(x, Painting) for x in targets):
-        names = ", ".join(f"{name}=..." for name in changed)
+    if unused and not any(isinstance(x, Painting) for x in targets):
+        names = ", ".join(f"{name}=..." for name in unused)
         raise TargetError(f"{names} cannot change a target that is already read: give its path")
     basis = BasisFile(str(basis)) if _is_path(basis) else basis
     all_constraints = Constraints() if constraints is None else constraints

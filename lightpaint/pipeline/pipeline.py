@@ -57,7 +57,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     problem = Problem.of(
         obtain_bases_of(job, bases, listen),
         [view.target for view in job.views],
-        constraints=job.asked,
+        constraints=job.all_constraints,
         fit=job.fit,
     )
     if job.settings.report:

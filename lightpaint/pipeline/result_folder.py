@@ -82,10 +82,10 @@ class ResultFolder:
                 f"{self._names_of(self._answers)}: {REMEDY}"
             )
         for file in existing:
-            known = record.files.get(file.relative_to(self.folder).as_posix())
-            if known is None:
+            checksum = record.files.get(file.relative_to(self.folder).as_posix())
+            if checksum is None:
                 raise OutputError(f"{file} exists and is not a result of lightpaint: {REMEDY}")
-            if known != _checksum(file):
+            if checksum != _checksum(file):
                 raise OutputError(f"{file} was changed since lightpaint wrote it: {REMEDY}")
 
     @contextmanager
@@ -108,10 +108,10 @@ class ResultFolder:
     def _answers(self) -> list[str]:
         """`answers` as they are recorded."""
         return [
-            os.path.relpath(os.path.realpath(one), self._real)
-            if isinstance(one, Path)
-            else one + IN_MEMORY
-            for one in self.answers
+            os.path.relpath(os.path.realpath(answer), self._real)
+            if isinstance(answer, Path)
+            else answer + IN_MEMORY
+            for answer in self.answers
         ]
 
     @property
@@ -137,10 +137,10 @@ class ResultFolder:
         record = self._read_record()
         if record is None:
             return None
-        known = {name: value for name, value in record.files.items() if is_below(name)}
-        if not any((self.folder / name).is_file() for name in known):
+        checksums = {name: value for name, value in record.files.items() if is_below(name)}
+        if not any((self.folder / name).is_file() for name in checksums):
             return None
-        return _Record(FORMAT, tuple(map(os.path.normpath, record.answers)), known)
+        return _Record(FORMAT, tuple(map(os.path.normpath, record.answers)), checksums)
 
     def _read_record(self) -> _Record | None:
         """Return the content of result.json; None if it is missing or not ours."""
@@ -164,11 +164,13 @@ class ResultFolder:
 
     def _names_of(self, answers: Iterable[str]) -> str:
         """Return recorded answers, named relative to the working directory."""
-        named = [
-            one if one.endswith(IN_MEMORY) else os.path.relpath(os.path.join(self._real, one))
-            for one in answers
+        names = [
+            answer
+            if answer.endswith(IN_MEMORY)
+            else os.path.relpath(os.path.join(self._real, answer))
+            for answer in answers
         ]
-        return one_line(" and ".join(named))
+        return one_line(" and ".join(names))
 
     def _unrecorded(self, existing: list[Path]) -> OutputError:
         """Return the error for a folder without a record."""
@@ -184,7 +186,8 @@ def is_as_written(folder: Path) -> bool:
     """Return True if all files in the record of `folder` exist and are unchanged."""
     record = ResultFolder(folder, (), (), ())._read_record()
     return record is not None and all(
-        is_below(name) and _checksum(folder / name) == known for name, known in record.files.items()
+        is_below(name) and _checksum(folder / name) == checksum
+        for name, checksum in record.files.items()
     )
 
 

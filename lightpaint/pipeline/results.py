@@ -256,8 +256,8 @@ def verify_result(
     `folder` holds no such result, ImageError if predicted.exr is damaged.
     """
     folder = Path(folder)
-    for each in (folder, folder.parent):
-        finish(each)
+    for candidate in (folder, folder.parent):
+        finish(candidate)
     relit_xml = folder / "relit.xml"
     if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
         relit_xml = folder.parent / "relit.xml"  # one of several views

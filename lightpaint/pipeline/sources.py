@@ -168,12 +168,12 @@ def content(source: Any) -> Any:
     return source.content if isinstance(source, File) else source
 
 
-def check_needed(given: Iterable[str], basis: Any) -> None:
+def check_needed(names: Iterable[str], basis: Any) -> None:
     """Raise BasisError for arguments that are useless with a basis without its scene.
 
     basis: a saved one, or light groups.
     """
-    if not (unused := [f"{name}=..." for name in given]):
+    if not (unused := [f"{name}=..." for name in names]):
         return
     if isinstance(basis, LightGroups | GroupsFile):
         raise BasisError(

@@ -131,9 +131,9 @@ def template_of_basis(
 def look_of_basis(basis: Basis, path: Path, *, transform: ViewTransform | None = None) -> Path:
     """Write only the look of a basis, as EXR at `path`; return the PNG beside it."""
     look, clean, features = _look_of_basis(basis)
-    shown = transform or ViewTransform("srgb", meter_exposure(look, basis))
+    view_transform = transform or ViewTransform("srgb", meter_exposure(look, basis))
     texts = {} if clean is None else denoiser_text(features, raw=path.name)
-    return write_look(path, look, shown, clean=clean, texts=texts)
+    return write_look(path, look, view_transform, clean=clean, texts=texts)
 
 
 def _look_of_basis(basis: Basis) -> tuple[Floats, Floats | None, Features | None]:
@@ -160,8 +160,10 @@ def render_look(
     settings = Settings(spp=spp, time_s=time_s, seed=seed, use_cache=use_cache)
     basis = _basis_of(scene, settings, listen)
     look, clean, features = _look(scene, basis, settings, listen)
-    shown = transform or ViewTransform("srgb", _exposure(scene, basis, clean))
-    return write_look(path, look, shown, clean=clean, texts=denoiser_text(features, raw=path.name))
+    view_transform = transform or ViewTransform("srgb", _exposure(scene, basis, clean))
+    return write_look(
+        path, look, view_transform, clean=clean, texts=denoiser_text(features, raw=path.name)
+    )
 
 
 def _basis_of(scene: Scene, settings: Settings, listen: Listener) -> Basis | None:

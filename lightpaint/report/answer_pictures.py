@@ -90,8 +90,8 @@ def _dim_look(current: Floats, transform: ViewTransform) -> Floats:
 
 
 def over_unpainted(
-    picture: Callable[[Floats], Floats],
-    of: Floats,
+    encode: Callable[[Floats], Floats],
+    picture: Floats,
     share: Floats,
     current: Floats,
     *,
@@ -100,15 +100,15 @@ def over_unpainted(
 ) -> npt.NDArray[Any]:
     """Return a picture, laid over `unpainted_look` by its share of each pixel, (h, w).
 
-    picture: makes display values of a band of `of`, (h, w, …). finish: what becomes of each band,
-    such as `to_8_bit`.
+    encode: makes display values of a band of `picture`, (h, w, …). finish: what becomes of each
+    band, such as `to_8_bit`.
     """
 
-    def lay(of: Floats, share: Floats, dim: Floats) -> npt.NDArray[Any]:
+    def lay(band: Floats, share: Floats, dim: Floats) -> npt.NDArray[Any]:
         share = share[..., None]
-        return finish(np.asarray(share * picture(of) + (1 - share) * dim[..., None]))
+        return finish(np.asarray(share * encode(band) + (1 - share) * dim[..., None]))
 
-    return np.asarray(by_bands(lay, of, share, _dim_look(current, transform)))
+    return np.asarray(by_bands(lay, picture, share, _dim_look(current, transform)))
 
 
 def target_picture(
@@ -125,8 +125,8 @@ def target_picture(
     display encoding of the target. finish: see `over_unpainted`.
     """
     share = painted_coverage(target, solution)
-    how: Any = {"transform": transform, "finish": finish}
-    return over_unpainted(transform.encode, target.image, share, current, **how)
+    options: Any = {"transform": transform, "finish": finish}
+    return over_unpainted(transform.encode, target.image, share, current, **options)
 
 
 def importance_picture(
@@ -146,8 +146,8 @@ def importance_picture(
         grey = luminance(transform.encode(look))[..., None]
         return np.asarray((0.35 + 0.65 * grey) * np.array([1.0, 0.93, 0.70]))
 
-    how: Any = {"transform": transform, "finish": finish}
-    return over_unpainted(yellow, current, coverage(importance / most), current, **how)
+    options: Any = {"transform": transform, "finish": finish}
+    return over_unpainted(yellow, current, coverage(importance / most), current, **options)
 
 
 @dataclass(frozen=True)
@@ -215,10 +215,10 @@ def residual_picture(
 
     finish: see `over_unpainted`.
     """
-    how: Any = {"transform": transform, "finish": finish}
+    options: Any = {"transform": transform, "finish": finish}
     share = coverage(solution.importance)
     return over_unpainted(
-        lambda x: diverging(x / residual.limit), residual.values, share, current, **how
+        lambda x: diverging(x / residual.limit), residual.values, share, current, **options
     )
 
 

@@ -12,33 +12,33 @@ from typing import Any, TypeVar
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_planes import DenoisedPlanes, obtain_denoised_planes
 
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 _lock = Lock()
 #: Results by the identity of a basis's planes, which its views share, and by key.
-_made: dict[int, dict[Hashable, Future[Any]]] = {}
+_memos: dict[int, dict[Hashable, Future[Any]]] = {}
 
 
-def make_once(basis: Basis, key: Hashable, make: Callable[[], Made]) -> Made:
+def make_once(basis: Basis, key: Hashable, make: Callable[[], Result]) -> Result:
     """Return the result of `make`, which runs once for a basis; concurrent callers wait for it."""
     with _lock:
         planes = id(basis.planes)
-        if planes not in _made:
-            weakref.finalize(basis.planes, _made.pop, planes, None)
-            _made[planes] = {}
-        its = _made[planes]
-        made = its.get(key)
-        if made is not None:
+        if planes not in _memos:
+            weakref.finalize(basis.planes, _memos.pop, planes, None)
+            _memos[planes] = {}
+        memo = _memos[planes]
+        future = memo.get(key)
+        if future is not None:
             is_mine = False
         else:
-            made, is_mine = its.setdefault(key, Future()), True
+            future, is_mine = memo.setdefault(key, Future()), True
     if is_mine:
         try:
-            made.set_result(make())
+            future.set_result(make())
         except BaseException as error:
-            its.pop(key, None)  # the next may have more luck
-            made.set_exception(error)
-    result: Made = made.result()
+            memo.pop(key, None)  # the next may have more luck
+            future.set_exception(error)
+    result: Result = future.result()
     return result
 
 
@@ -47,12 +47,12 @@ def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:
     return make_once(basis, "planes", lambda: obtain_denoised_planes(basis))
 
 
-def make_ahead(basis: Basis, makes: Callable[[Basis], object]) -> None:
-    """Start `makes(basis)` in a thread of its own, so that a later call finds its results."""
+def make_ahead(basis: Basis, make: Callable[[Basis], object]) -> None:
+    """Start `make(basis)` in a thread of its own, so that a later call finds its results."""
 
     def run() -> None:
         try:
-            makes(basis)
+            make(basis)
         except Exception:  # a later call raises it again
             return
 

@@ -70,7 +70,7 @@ def comparison_image(
     looks = looks or CleanLooks.raw(basis, predicted, verified)
     transform = looks.encoder(report_transform(target, basis, predicted))
     is_part = target.painted_share < WHOLE_SHARE
-    at = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
+    view_note = f" ({spoken_view(transform)})" if spoken_view(transform) else ""
     tiles = [
         Tile(
             f"target: {target.name}",
@@ -78,7 +78,7 @@ def comparison_image(
             target_picture(target, solution, looks.current, transform=transform, finish=to_8_bit),
         ),
         Tile(
-            f"predicted{at}",
+            f"predicted{view_note}",
             _short_verdict(appearance or compare_appearance(solution)),
             to_8_bit(transform.encode(looks.predicted)),
         ),
@@ -90,7 +90,7 @@ def comparison_image(
         rmse = float(np.sqrt(np.square(gap).mean()))
         tiles.append(
             Tile(
-                f"verified{at}",
+                f"verified{view_note}",
                 f"independent render, {rmse:.2g} RMS off the prediction",
                 to_8_bit(transform.encode(looks.verified)),
             )
@@ -172,7 +172,7 @@ def shorten_to_width(words: str, font: Any, width: int) -> str:
 
 
 def _short_verdict(appearance: Appearance) -> str:
-    how = (
+    word = (
         "close"
         if appearance.is_close
         else "out of reach"
@@ -180,4 +180,4 @@ def _short_verdict(appearance: Appearance) -> str:
         else "part of the way"
     )
     delta_e, noise = appearance.delta_e, appearance.noise
-    return f"{how}: mean dE {delta_e:.1f} where painted (noise explains {noise:.1f})"
+    return f"{word}: mean dE {delta_e:.1f} where painted (noise explains {noise:.1f})"

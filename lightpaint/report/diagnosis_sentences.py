@@ -43,9 +43,9 @@ def error_sentences(
     if not (parts := error_shares(d)):
         return [NO_ERROR]
     # What is kept has a bound of its own below.
-    which = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
+    lights = "the adjusted lights" if any(x.kind == "kept" for x in d.bounds) else "the lights"
     words = {
-        "unreachable": f"is out of reach of any mix of {which}{hold_clause(appearance)}",
+        "unreachable": f"is out of reach of any mix of {lights}{hold_clause(appearance)}",
         "forbidden": "would need other limits of the lights or light below zero"
         if d.is_constrained
         else "would need light below zero",
@@ -77,8 +77,8 @@ def bound_sentences(
     bounds only if there are none. any_color: how to let lights have any colour.
     """
     if appearance is not None and appearance.reasons:
-        told = [spoken_cause(reason, any_color=any_color) for reason in appearance.reasons]
-        return [sentence for sentence in told if sentence][:2]
+        sentences = [spoken_cause(reason, any_color=any_color) for reason in appearance.reasons]
+        return [sentence for sentence in sentences if sentence][:2]
     d = diagnosis
     most = [bound for bound in d.bounds[:1] if d.gain_share(bound) >= MIN_SHARE]
     to_switch_on = [
@@ -86,8 +86,8 @@ def bound_sentences(
         for bound in d.bounds
         if bound.is_switched_off and d.gain_share(bound) >= MIN_SWITCHED_OFF_SHARE
     ]
-    its = dict.fromkeys([*most, *to_switch_on[:1]])
-    return [spoken_bound(bound, d.gain_share(bound)) for bound in its]
+    bounds = dict.fromkeys([*most, *to_switch_on[:1]])
+    return [spoken_bound(bound, d.gain_share(bound)) for bound in bounds]
 
 
 #: Clauses on constraints and their release: for one light, and for several.
@@ -127,12 +127,12 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = 
         return f"{clause} {gained}."
     if reason.kind == "views":
         return ""
-    held = "Unpainted parts are held near their present look;"
+    opening = "Unpainted parts are held near their present look;"
     if (loosening := reason.loosening) is None:
-        return f"{held} releasing them {gained}."
+        return f"{opening} releasing them {gained}."
     share, rest = spoken_percent(loosening.share), loosening.unpainted_change
     cost = "" if rest is None else f", and change {spoken_changed(rest)}"
-    return f"{held} {weaker} {loosening.hold:g} would remove {share} of the difference{cost}."
+    return f"{opening} {weaker} {loosening.hold:g} would remove {share} of the difference{cost}."
 
 
 def painting_noise_clause(diagnosis: Diagnosis) -> str:
@@ -158,7 +158,7 @@ def spoken_bound(bound: Bound, share: float) -> str:
             f"whites ({bound.held_by}): any colour would remove {spoken_percent(share)} of the "
             "miss."
         )
-    held = {
+    effect = {
         "kept": f"kept as it is; adjusting {it} too",
         "lock": f"locked; adjusting {it}",
         "off": f"switched off, as asked; switching {it} on",
@@ -167,7 +167,7 @@ def spoken_bound(bound: Bound, share: float) -> str:
         "limits": f"at a limit ({bound.held_by}); removing it",
         "colour": f"limited in colour ({bound.held_by}); any other colour",
     }[bound.kind]
-    return f"{lights} {held} would remove {spoken_percent(share)} of the difference."
+    return f"{lights} {effect} would remove {spoken_percent(share)} of the difference."
 
 
 def spoken_hold(bound: Bound) -> str:
@@ -179,6 +179,6 @@ def spoken_hold(bound: Bound) -> str:
         return f"{bound.held_by}{tint}"
     if len(bound.multiplier) != 3:
         return "off"
-    felt = zip(CHANNELS, bound.multiplier, strict=True)
-    held = [n for n, m in felt if m > 0.01 * max(bound.multiplier)]
-    return "off" if len(held) == 3 else f"off in {' and '.join(held)}"
+    multipliers = zip(CHANNELS, bound.multiplier, strict=True)
+    channels = [n for n, m in multipliers if m > 0.01 * max(bound.multiplier)]
+    return "off" if len(channels) == 3 else f"off in {' and '.join(channels)}"

@@ -8,28 +8,28 @@ from lightpaint.lighting.solution import Solution
 def fit_clauses(solution: Solution) -> tuple[str, ...]:
     """Return clauses on the options of the fit; none for a literal fit."""
     certificate, fit = solution.certificate, solution.problem.fit
-    used = []
+    clauses = []
     if certificate.display:
-        used.append(f"fitted as the eye sees it ({certificate.display})")
+        clauses.append(f"fitted as the eye sees it ({certificate.display})")
     if fit.unpainted:
-        used.append(f"each unpainted pixel counts {fit.unpainted:g}")
+        clauses.append(f"each unpainted pixel counts {fit.unpainted:g}")
     elif fit.hold:
-        used.append(f"unpainted parts are held ({fit.hold:g})")
+        clauses.append(f"unpainted parts are held ({fit.hold:g})")
     if fit.colors == "gentle":
-        used.append("lights are pulled to their own colour (gentle)")
+        clauses.append("lights are pulled to their own colour (gentle)")
     elif fit.colors == "white":
-        used.append("lights are white")
+        clauses.append("lights are white")
     if certificate.noise_removed:
-        used.append("noise is corrected")
-    return tuple(used)
+        clauses.append("noise is corrected")
+    return tuple(clauses)
 
 
 def fit_sentence(solution: Solution, *, instead: str = "") -> str:
     """Return a sentence on the options of the fit. instead: a clause on how to switch them off."""
-    if not (used := fit_clauses(solution)):
+    if not (clauses := fit_clauses(solution)):
         return "The painting is fitted literally: linear light, nothing held, any colour."
-    said = "; ".join([*used, *([instead] if instead else [])])
-    return f"{said[0].upper()}{said[1:]}."
+    text = "; ".join([*clauses, *([instead] if instead else [])])
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def fit_options(solution: Solution) -> dict[str, Any]:

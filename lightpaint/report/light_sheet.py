@@ -97,9 +97,9 @@ def light_sheet(basis: Basis, *, title: str) -> npt.NDArray[np.uint8]:
     head = shorten_to_width(visible(title), large, room)
     baseline = 2 * grid.text
     draw.text((grid.gap, baseline), head, TEXT, large, anchor="ls")
-    said = "each alone, exposed by itself; its share of the picture as it is"
-    if large.getlength(head) + small.getlength(said) + 2 * grid.gap <= room:
-        draw.text((sheet.width - grid.gap, baseline), said, FAINT, small, anchor="rs")
+    subtitle = "each alone, exposed by itself; its share of the picture as it is"
+    if large.getlength(head) + small.getlength(subtitle) + 2 * grid.gap <= room:
+        draw.text((sheet.width - grid.gap, baseline), subtitle, FAINT, small, anchor="rs")
     for k, cell in enumerate(cells):
         _draw(sheet, cell, grid, grid.corner(k))
     if left:
@@ -116,23 +116,23 @@ def _cell(basis: Basis, k: int, share: float, factor: int) -> _Cell:
     name = light.name if len(light.members) == 1 else f"{light.name} ({len(light.members)})"
     is_off = not weight.any()
     image = block_mean(np.float32(1 if is_off else weight) * basis.planes.plane(k), factor)
-    said = "off" if is_off else spoken_percent(share)
-    said = f"kept, {said}" if light.is_fixed else said
+    text = "off" if is_off else spoken_percent(share)
+    text = f"kept, {text}" if light.is_fixed else text
     if not image.any():
-        return _Cell(visible(name), said, None)
+        return _Cell(visible(name), text, None)
     features = None if basis.features is None else basis.features.reduced(factor)
     clean = denoised(image, features)
-    seen = block_mean(basis.emitters_seen.astype(np.float32), factor) > 0
-    stops = exposure_of(clean, seen)
-    return _Cell(visible(name), said, encode_display(clean, stops=stops))
+    sees_emitter = block_mean(basis.emitters_seen.astype(np.float32), factor) > 0
+    stops = exposure_of(clean, sees_emitter)
+    return _Cell(visible(name), text, encode_display(clean, stops=stops))
 
 
 def _rest_sentence(shares: Doubles, shown: list[int]) -> str:
     """Return the number and share of lights that are not shown; "" if all are."""
     if not (rest := len(shares) - len(shown)):
         return ""
-    others = max(1 - float(shares[shown].sum()), 0.0)
-    return f"and {rest} more lights, together {spoken_percent(others)} of the picture"
+    other_share = max(1 - float(shares[shown].sum()), 0.0)
+    return f"and {rest} more lights, together {spoken_percent(other_share)} of the picture"
 
 
 def _grid(count: int, size: tuple[int, int]) -> _Grid:
@@ -165,8 +165,8 @@ def _draw(sheet: Image.Image, cell: _Cell, grid: _Grid, corner: tuple[int, int])
         picture = Image.fromarray(to_8_bit(cell.picture))
         scale = min(grid.width / picture.width, grid.height / picture.height)
         size = max(1, round(scale * picture.width)), max(1, round(scale * picture.height))
-        at = x + (grid.width - size[0]) // 2, y + (grid.height - size[1]) // 2
-        sheet.paste(picture.resize(size, Image.Resampling.LANCZOS), at)
+        position = x + (grid.width - size[0]) // 2, y + (grid.height - size[1]) // 2
+        sheet.paste(picture.resize(size, Image.Resampling.LANCZOS), position)
     baseline = y + grid.height + round(1.4 * grid.text)
     draw.text((x + grid.width, baseline), cell.share, FAINT, small, anchor="rs")
     room = grid.width - round(small.getlength(cell.share)) - grid.text

@@ -51,12 +51,12 @@ def noise_residual(solution: Solution, predicted: Estimate) -> float:
 def linear_residual(solution: Solution, predicted: Estimate) -> float:
     """Return `relative_residual` in linear light, whatever the space of the fit."""
 
-    def powers(D: Floats, meant: Floats, image: Floats) -> Floats:
-        both = np.square(meant - image, dtype=np.float64), np.square(meant, dtype=np.float64)
-        return np.array([(D[..., None] * x).sum() for x in both])
+    def powers(D: Floats, goal: Floats, image: Floats) -> Floats:
+        squares = np.square(goal - image, dtype=np.float64), np.square(goal, dtype=np.float64)
+        return np.array([(D[..., None] * x).sum() for x in squares])
 
-    meant = solution.goal(predicted.image)
-    missed2, norm2 = sum_by_bands(powers, solution.importance, meant, predicted.image).tolist()
+    goal = solution.goal(predicted.image)
+    missed2, norm2 = sum_by_bands(powers, solution.importance, goal, predicted.image).tolist()
     return float(np.sqrt(missed2 / norm2)) if norm2 > 0 else float(missed2 > 0)
 
 
@@ -82,8 +82,8 @@ def count_at_least_pixels(solution: Solution, predicted: Floats) -> tuple[int, i
     """
     loss = solution.problem.loss
     counts = (solution.importance > 0)[..., None]
-    its, brighter = (loss.exceeds(x) & counts for x in (np.inf, predicted))
-    pixels = int(its.any(axis=-1).sum())
+    may_exceed, brighter = (loss.exceeds(x) & counts for x in (np.inf, predicted))
+    pixels = int(may_exceed.any(axis=-1).sum())
     return (pixels, int(brighter.any(axis=-1).sum())) if pixels else None
 
 
@@ -93,9 +93,9 @@ def brightness(uncertainty: Uncertainty) -> tuple[Doubles, Doubles, Doubles]:
     Only known channels count.
     """
     # One path carries all channels, so that their errors go together.
-    known = np.isfinite(uncertainty.scatter)
+    is_known = np.isfinite(uncertainty.scatter)
     ends = (uncertainty.weights, *uncertainty.interval)
-    solved, low, high = (np.where(known, end, 0) @ LUMINANCE for end in ends)
+    solved, low, high = (np.where(is_known, end, 0) @ LUMINANCE for end in ends)
     return solved, low, high
 
 

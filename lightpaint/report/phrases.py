@@ -30,8 +30,8 @@ def spoken_elsewhere(rest: UnpaintedChange | None) -> str:
 
 
 def _spoken_most(rest: UnpaintedChange) -> str:
-    its = spoken_part(rest) if rest.object else spoken_ninth(rest.region)
-    return f"{its}, by ΔE {spoken_amount(rest.worst)}"
+    place = spoken_part(rest) if rest.object else spoken_ninth(rest.region)
+    return f"{place}, by ΔE {spoken_amount(rest.worst)}"
 
 
 def spoken_part(rest: UnpaintedChange) -> str:
@@ -54,8 +54,8 @@ def spoken_lights(names: Sequence[str], *, start: bool = False) -> str:
     listed = some_of([name or "without a name" for name in names], room=MAX_NAME_CHARACTERS)
     if all(re.search("light|lamp", name, re.IGNORECASE) for name in names):
         return listed
-    word = "light" if len(names) == 1 else "lights"
-    return f"{word.capitalize() if start else word} {listed}"
+    noun = "light" if len(names) == 1 else "lights"
+    return f"{noun.capitalize() if start else noun} {listed}"
 
 
 def spoken_region(place: Place) -> str:
@@ -83,11 +83,11 @@ def spoken_where(place: Place) -> str:
 
 def spoken_place(place: Place) -> str:
     """Return a sentence on where light is missing, and what it lacks."""
-    where = f"{spoken_region(place)} ({spoken_percent(place.share)})"
+    place_text = f"{spoken_region(place)} ({spoken_percent(place.share)})"
     change = spoken_difference(place.painted, place.reached)
     return (
-        f"Most of what is out of reach is {where}: the painting is {change} than any mix of the "
-        "lights."
+        f"Most of what is out of reach is {place_text}: the painting is {change} than any mix of "
+        "the lights."
     )
 
 

@@ -71,7 +71,7 @@ def report_numbers(
     """Return the numbers of `report_page`, with its arguments, as JSON."""
     transform = report_transform(target, basis, predicted.image)
     residual = missed or residual_of(solution, predicted.image, transform=transform)
-    told = {
+    numbers = {
         "format": FORMAT,
         "lightpaint": __version__,
         "target": target.name,
@@ -85,7 +85,7 @@ def report_numbers(
             "residual_limit": residual.limit,
             "residual_pixels": 2 * residual.radius + 1,
         },
-        "seen": _seen(appearance or compare_appearance(solution, predicted)),
+        "seen": _appearance(appearance or compare_appearance(solution, predicted)),
         "meant": fit_options(solution),
         "colors": {choice.colors: _choice(choice) for choice in color_choices} or None,
         "fit": _fit(solution, predicted, unconstrained),
@@ -95,7 +95,7 @@ def report_numbers(
         "verification": None if verification is None else verification_numbers(verification),
         "suggestions": _suggestion_list(suggestions, solution.lighting.cd_per_unit),
     }
-    return json.dumps(finite(told), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(finite(numbers), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _basis(basis: Basis) -> dict[str, Any]:
@@ -123,7 +123,7 @@ def _painting(target: Target, solution: Solution) -> dict[str, Any]:
     }
 
 
-def _seen(appearance: Appearance) -> dict[str, Any]:
+def _appearance(appearance: Appearance) -> dict[str, Any]:
     """Return the mean CIEDE2000 over the paint, and the share of the request that has come
     about."""
     place = appearance.place
@@ -143,12 +143,12 @@ def _seen(appearance: Appearance) -> dict[str, Any]:
 
 def _reason(reason: Reason) -> dict[str, Any]:
     """Return a reason that keeps the lights from the paint, with its share of the error."""
-    told: dict[str, Any] = {"kind": reason.kind, "names": reason.names or None}
-    told |= {"share": reason.share, "is_joint": reason.is_joint or None}
-    if (its := reason.loosening) is not None:
-        told |= {"weaker_hold": its.hold, "weaker_hold_share": its.share}
-        told |= {"weaker_hold_elsewhere": _unpainted(its.unpainted_change)}
-    return told
+    numbers: dict[str, Any] = {"kind": reason.kind, "names": reason.names or None}
+    numbers |= {"share": reason.share, "is_joint": reason.is_joint or None}
+    if (loosening := reason.loosening) is not None:
+        numbers |= {"weaker_hold": loosening.hold, "weaker_hold_share": loosening.share}
+        numbers |= {"weaker_hold_elsewhere": _unpainted(loosening.unpainted_change)}
+    return numbers
 
 
 def _unpainted(rest: UnpaintedChange | None) -> dict[str, Any] | None:
@@ -161,15 +161,15 @@ def _unpainted(rest: UnpaintedChange | None) -> dict[str, Any] | None:
 
 def _choice(choice: ColorChoice) -> dict[str, Any]:
     """Return the answer of a choice of colours, and the light that it would change most."""
-    told: dict[str, Any] = {"delta_e": choice.delta_e}
+    numbers: dict[str, Any] = {"delta_e": choice.delta_e}
     if choice.light:
-        told |= {"light": choice.light, "before": choice.before, "color": choice.color}
-    return told
+        numbers |= {"light": choice.light, "before": choice.before, "color": choice.color}
+    return numbers
 
 
 def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict[str, Any]:
     """Return RMS errors relative to the painting, and `norm2`, the scale of the objectives."""
-    told = {
+    numbers = {
         "missed": relative_residual(solution),
         "noise": noise_residual(solution, predicted),
         "missed_without_constraints": None if free is None else relative_residual(free),
@@ -178,27 +178,27 @@ def _fit(solution: Solution, predicted: Estimate, free: Solution | None) -> dict
         "noise_removed": solution.problem.noise_removed,
     }
     if solution.problem.refinement is not None:
-        told["refined"] = solution.problem.refinement.share
+        numbers["refined"] = solution.problem.refinement.share
     if not solution.problem.is_linear:
-        told["missed_in_linear_light"] = linear_residual(solution, predicted)
+        numbers["missed_in_linear_light"] = linear_residual(solution, predicted)
     if solution.certificate.display:
-        told["codes_missed"] = error_in_codes(solution)
+        numbers["codes_missed"] = error_in_codes(solution)
     if (brighter := count_at_least_pixels(solution, predicted.image)) is not None:
-        told["at_least"], told["at_least_and_brighter"] = brighter
-    return told
+        numbers["at_least"], numbers["at_least_and_brighter"] = brighter
+    return numbers
 
 
 def _lights(
     basis: Basis, solution: Solution, uncertainty: Uncertainty | None
 ) -> Mapping[str, dict[str, Any]]:
     lighting = solution.lighting
-    shares, before = (energy_shares(basis, its) for its in (lighting, Lighting.present(basis)))
-    told: dict[str, dict[str, Any]] = {}
+    shares, before = (energy_shares(basis, x) for x in (lighting, Lighting.present(basis)))
+    by_name: dict[str, dict[str, Any]] = {}
     for k, (light, setting) in enumerate(zip(basis.lights, lighting.lights, strict=True)):
         # Only channels that reach something painted; the others are undetermined.
         told_of = np.array(setting.reached) | light.is_fixed
         now, new = (float(luminance(told_of * np.array(x.emission))) for x in (light, setting))
-        told[light.name] = {
+        by_name[light.name] = {
             "share": float(shares[k]),
             "share_before": float(before[k]),
             "emission_before": light.emission,
@@ -208,18 +208,18 @@ def _lights(
         }
     if uncertainty is not None:
         errors, (solved, *ends) = relative_errors(uncertainty), brightness(uncertainty)
-        for k, its in enumerate(told.values()):
-            its["interval"] = [float(end[k]) for end in ends]
-            its["relative_error"] = float(errors[k])
-            its["untold"] = UNTOLD_HERE if uncertainty.untold[k] else None
+        for k, numbers in enumerate(by_name.values()):
+            numbers["interval"] = [float(end[k]) for end in ends]
+            numbers["relative_error"] = float(errors[k])
+            numbers["untold"] = UNTOLD_HERE if uncertainty.untold[k] else None
             if solved[k] > 0:
-                its["relative_interval"] = [float(end[k] / solved[k]) - 1 for end in ends]
-    return told
+                numbers["relative_interval"] = [float(end[k] / solved[k]) - 1 for end in ends]
+    return by_name
 
 
 def _missed(solution: Solution, d: Diagnosis, transform: ViewTransform) -> dict[str, Any]:
     """Return the shares of the error's energy."""
-    told: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "energy": d.total,
         "out_of_reach": d.share(d.unreachable),
         "forbidden": d.share(d.forbidden),
@@ -236,8 +236,8 @@ def _missed(solution: Solution, d: Diagnosis, transform: ViewTransform) -> dict[
     }
     if d.place is not None:
         names = ("region", "share", "box", "painted", "reached")
-        told["place"] = {name: getattr(d.place, name) for name in names}
-    return told
+        numbers["place"] = {name: getattr(d.place, name) for name in names}
+    return numbers
 
 
 def _uncertainty(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> dict[str, Any]:
@@ -282,13 +282,13 @@ def _suggestion_list(
     ]
 
 
-def finite(told: Any) -> Any:
+def finite(value: Any) -> Any:
     """Return the same without missing values, and without NumPy's numbers."""
-    if isinstance(told, Mapping):
-        held = {key: finite(value) for key, value in told.items()}
-        return {key: value for key, value in held.items() if value is not None}
-    if isinstance(told, list | tuple):
-        return [finite(value) for value in told]
-    if isinstance(told, np.generic):
-        told = told.item()
-    return None if isinstance(told, float) and not math.isfinite(told) else told
+    if isinstance(value, Mapping):
+        parts = {key: finite(part) for key, part in value.items()}
+        return {key: part for key, part in parts.items() if part is not None}
+    if isinstance(value, list | tuple):
+        return [finite(part) for part in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -29,8 +29,8 @@ def spoken_errors(uncertainty: Uncertainty | None, count: int) -> list[str]:
     """
     if uncertainty is None:
         return [""] * count
-    told = zip(*brightness(uncertainty), uncertainty.untold, strict=True)
-    return [UNTOLD if untold else _spoken_error(*ends) for *ends, untold in told]
+    lights = zip(*brightness(uncertainty), uncertainty.untold, strict=True)
+    return [UNTOLD if untold else _spoken_error(*ends) for *ends, untold in lights]
 
 
 def untold_lights(lighting: Lighting) -> str:
@@ -70,7 +70,9 @@ def partly_reached(lighting: Lighting) -> list[str]:
 
 def unreached_channels(light: LightSetting) -> str:
     """Return `green and blue`: the channels of a light that reach nothing that counts."""
-    return " and ".join(c for c, told in zip(CHANNELS, light.reached, strict=True) if not told)
+    return " and ".join(
+        c for c, is_reached in zip(CHANNELS, light.reached, strict=True) if not is_reached
+    )
 
 
 def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> str:
@@ -83,15 +85,15 @@ def uncertainty_sentence(basis: Basis, solution: Solution, uncertainty: Uncertai
         return untold
     if k is None:
         has_noise = any(x.any() for x in basis.noise)
-        why = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
-        return f"More samples would change no light: {why}."
+        reason = "nothing in it depends on the noise" if has_noise else "the basis has no noise"
+        return f"More samples would change no light: {reason}."
     shares = energy_shares(basis, solution.lighting)
     errors = relative_errors(uncertainty)
     name = solution.lighting.lights[k].name
     light = f"{spoken_lights([name])}, {spoken_percent(shares[k])} of the picture"
     change = "as much as all of it" if errors[k] > 1 else f"± {spoken_percent(float(errors[k]))}"
-    said = (
+    sentence = (
         f"More samples would change {light}, by {change} (95 %); "
         f"{halving_spp(basis, uncertainty, k)} samples per pixel would halve that."
     )
-    return f"{untold} {said}" if untold else said
+    return f"{untold} {sentence}" if untold else sentence

@@ -64,21 +64,21 @@ def verdict(
         'Close: it looks as painted. Mean ΔE 0.0 over what was painted (... as the scene is now...'
     """
     appearance = appearance or compare_appearance(solution, predicted)
-    said = [
+    sentences = [
         headline(appearance),
         f"{spoken_delta_e(appearance, known=bool(predicted.half_difference.any()))}.",
     ]
     if not solution.certificate.converged:
-        said.append("The solve stopped before it converged.")
+        sentences.append("The solve stopped before it converged.")
     if verification is None:
-        said.append("Not checked by a render.")
+        sentences.append("Not checked by a render.")
     elif verification.agrees:
-        said.append("A render confirms it.")
+        sentences.append("A render confirms it.")
         if verification.unseen:
-            said.append(f"{spoken_blindness(verification)}.")
+            sentences.append(f"{spoken_blindness(verification)}.")
     else:
-        said.append(f"A render does NOT confirm it: {agreement(verification)}.")
-    return " ".join(said)
+        sentences.append(f"A render does NOT confirm it: {agreement(verification)}.")
+    return " ".join(sentences)
 
 
 def headline(appearance: Appearance) -> str:
@@ -86,9 +86,9 @@ def headline(appearance: Appearance) -> str:
 
     A cause is named only if a third of what the fit misses is due to it.
     """
-    told = spoken_elsewhere(appearance.unpainted_change) if appearance.changes_unpainted else ""
+    addition = spoken_elsewhere(appearance.unpainted_change) if appearance.changes_unpainted else ""
     present = f"{spoken_present(appearance)} " if appearance.is_worse else ""
-    return f"{present}{_paint_headline(appearance)} {told}".rstrip()
+    return f"{present}{_paint_headline(appearance)} {addition}".rstrip()
 
 
 def spoken_present(appearance: Appearance) -> str:
@@ -152,14 +152,14 @@ def spoken_reason(appearance: Appearance) -> str:
         return spoken_noise(appearance) or NO_MAIN_CAUSE
     if not appearance.local_lights:
         return "no light reaches it"
-    some, is_one = _spoken_some(appearance.local_lights)
+    names, is_one = _spoken_some(appearance.local_lights)
     if is_darker(appearance):
-        return f"{some} {'lights' if is_one else 'light'} it too"
+        return f"{names} {'lights' if is_one else 'light'} it too"
     if not appearance.has_strong_light:
-        return f"{some} {'does' if is_one else 'do'} little there"
+        return f"{names} {'does' if is_one else 'do'} little there"
     if _are_kept(appearance):
-        its = "is limited by its constraints"
-        return f"{some} {its if is_one else 'are limited by their constraints'}"
+        reason = "is limited by its constraints"
+        return f"{names} {reason if is_one else 'are limited by their constraints'}"
     free = tuple(name for name in appearance.local_lights if name not in appearance.held_lights)
     return f"{_spoken_some(free)[0]} would light too much else"
 
@@ -170,11 +170,11 @@ def spoken_holding(reason: Reason) -> str:
     if len(reason.names) > MAX_NAMES and reason.kind == "views":
         return "other views ask for different light"
     if len(reason.names) > MAX_NAMES:
-        which = f"{len(reason.names)} lights"
+        lights = f"{len(reason.names)} lights"
     else:
         *most, last = [some_names([name]) for name in reason.names] or [""]
-        which = f"{', '.join(most)} and {last}" if most else last
-    return (one if len(reason.names) == 1 else several).format(which)
+        lights = f"{', '.join(most)} and {last}" if most else last
+    return (one if len(reason.names) == 1 else several).format(lights)
 
 
 def spoken_noise(appearance: Appearance) -> str:
@@ -223,12 +223,15 @@ def spoken_delta_e(appearance: Appearance, *, known: bool) -> str:
 def spoken_blindness(verification: Verification) -> str:
     """Name the least detectable lights: `The render would probably have missed … in bulb`."""
     unseen, power = verification.unseen, verification.power or {}
-    others, more = [name for name in power if name not in unseen], len(unseen) - MAX_UNSEEN_NAMES
-    if more > 0 and len(others) <= MAX_UNSEEN_NAMES:
-        names = "any light" + (f" but {some_names(others, joint=' and ')}" if others else "")
+    other_names = [name for name in power if name not in unseen]
+    unnamed = len(unseen) - MAX_UNSEEN_NAMES
+    if unnamed > 0 and len(other_names) <= MAX_UNSEEN_NAMES:
+        names = "any light" + (
+            f" but {some_names(other_names, joint=' and ')}" if other_names else ""
+        )
     else:
-        least = [some_names([name]) for name in unseen[:MAX_UNSEEN_NAMES]] + [f"{more} more"] * (
-            more > 0
+        least = [some_names([name]) for name in unseen[:MAX_UNSEEN_NAMES]] + [f"{unnamed} more"] * (
+            unnamed > 0
         )
         *most, last = least
         names = f"{', '.join(most)} and {last}" if most else last
@@ -239,8 +242,8 @@ def agreement(verification: Verification | None) -> str:
     """Return whether prediction and verification agree, as a clause with its numbers."""
     if verification is None:
         return "the prediction is not verified by a render"
-    word = "agree within noise" if verification.agrees else "DISAGREE by more than their noise"
+    state = "agree within noise" if verification.agrees else "DISAGREE by more than their noise"
     return (
-        f"prediction and verification {word} "
+        f"prediction and verification {state} "
         f"({verification.difference:.1f} standard errors apart, limit {verification.limit:.3g})"
     )

@@ -22,28 +22,30 @@ DOMINANT_SHARE = 0.5
 
 def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> list[str]:
     """Return sentences for people. target: of one view, as it was given to the solve."""
-    seen = solution.basis.emitters_seen
+    sees_emitter = solution.basis.emitters_seen
     painted = target.importance > 0
-    out = ignored_paint(target, seen, solution.problem.fit.emitters)
-    if out.any():
+    ignored = ignored_paint(target, sees_emitter, solution.problem.fit.emitters)
+    if ignored.any():
         return [
-            f"{_share(out, painted)}, and count nothing; "
+            f"{_share(ignored, painted)}, and count nothing; "
             'emitters="count" holds the emitters themselves to how bright they were painted',
-            *_too_bright(target, solution, predicted, out),
+            *_too_bright(target, solution, predicted, ignored),
         ]
-    counted = seen & painted
+    counted = sees_emitter & painted
     [read] = solution.problem.views.targets
     if read.at_least is not None:
         counted &= ~read.at_least.all(axis=-1)
     if not counted.any():
         return []
 
-    def energies(D: Floats, image: Floats, its: Bools) -> Floats:
+    def energies(D: Floats, image: Floats, pixels: Bools) -> Floats:
         energy = D[..., None] * np.square(image, dtype=np.float64)
-        return np.array([energy[its].sum(), energy.sum()])
+        return np.array([energy[pixels].sum(), energy.sum()])
 
-    own, every = sum_by_bands(energies, target.importance, target.image, counted).tolist()
-    if (part := own / (every or 1)) >= DOMINANT_SHARE:
+    emitter_energy, total_energy = sum_by_bands(
+        energies, target.importance, target.image, counted
+    ).tolist()
+    if (part := emitter_energy / (total_energy or 1)) >= DOMINANT_SHARE:
         return [
             f"{_share(counted, painted)}, which make up {100 * part:.0f} % of the painted energy "
             'and rule the fit: emitters="skip" leaves them out'
@@ -51,37 +53,48 @@ def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> 
     return []
 
 
-def _share(some: Bools, painted: Bools) -> str:
-    count, every = int(some.sum()), int(painted.sum())
+def _share(selected: Bools, painted: Bools) -> str:
+    count, total = int(selected.sum()), int(painted.sum())
     return (
-        f"emitters are seen in {count} of {every} painted pixels "
-        f"({100 * count / every:.{1 if count < 0.1 * every else 0}f} %)"
+        f"emitters are seen in {count} of {total} painted pixels "
+        f"({100 * count / total:.{1 if count < 0.1 * total else 0}f} %)"
     )
 
 
-def _too_bright(target: Target, solution: Solution, predicted: Estimate, out: Bools) -> list[str]:
+def _too_bright(
+    target: Target, solution: Solution, predicted: Estimate, ignored: Bools
+) -> list[str]:
     """Return a warning of lights that come out far brighter in view than they were painted."""
     basis = solution.basis
     # Where the painting means "at least", nothing is too bright.
     if target.at_least is not None:
-        out = out & ~target.at_least.any(axis=-1)
-    images = basis.planes.pixels(np.flatnonzero(out)) * solution.weights[:, None].astype(np.float32)
-    whose = np.argmax(luminance(images), axis=0) if out.any() else np.zeros(0, np.intp)
-    here, meant = (np.asarray(luminance(x[out])) for x in (predicted.image, target.image))
-    told = []
-    for k in np.unique(whose):
-        there, wanted = here[whose == k].sum(), np.maximum(meant[whose == k], 0).sum()
-        if there > MIN_RATIO * wanted and not basis.is_fixed[k]:
-            told.append(f"{basis.names[k]} ({_times(float(there), float(wanted))})")
-    if not told:
+        ignored = ignored & ~target.at_least.any(axis=-1)
+    images = basis.planes.pixels(np.flatnonzero(ignored)) * solution.weights[:, None].astype(
+        np.float32
+    )
+    brightest_light = (
+        np.argmax(luminance(images), axis=0) if ignored.any() else np.zeros(0, np.intp)
+    )
+    predicted_light, painted_light = (
+        np.asarray(luminance(x[ignored])) for x in (predicted.image, target.image)
+    )
+    texts = []
+    for k in np.unique(brightest_light):
+        reached, goal = (
+            predicted_light[brightest_light == k].sum(),
+            np.maximum(painted_light[brightest_light == k], 0).sum(),
+        )
+        if reached > MIN_RATIO * goal and not basis.is_fixed[k]:
+            texts.append(f"{basis.names[k]} ({_times(float(reached), float(goal))})")
+    if not texts:
         return []
     return [
-        f"WARNING: brighter than painted where they are seen: {some_of(told, room=300)}; "
+        f"WARNING: brighter than painted where they are seen: {some_of(texts, room=300)}; "
         'emitters="count" holds them to the painting'
     ]
 
 
-def _times(there: float, meant: float) -> str:
-    if meant <= 0:
+def _times(reached: float, goal: float) -> str:
+    if goal <= 0:
         return "painted black"
-    return f"{there / meant:,.{0 if there >= 10 * meant else 1}f} times"
+    return f"{reached / goal:,.{0 if reached >= 10 * goal else 1}f} times"

@@ -18,7 +18,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.verification import compare
-from lightpaint.report.page.html import SHOWN
+from lightpaint.report.page.html import ROWS_SHOWN
 from lightpaint.report.page.page import report_page
 from lightpaint.target.target import Target
 
@@ -129,7 +129,7 @@ def test_what_is_folded_is_there(hall: str) -> None:
     script = page.index("<script>")
     assert page.index("ceiling_<wbr>lamp_<wbr>301<") < script
     shown = re.sub(r"<details.*?</details>", "", page[:script], flags=re.DOTALL)
-    assert len(re.findall('<td class="thumb">', shown)) == SHOWN
+    assert len(re.findall('<td class="thumb">', shown)) == ROWS_SHOWN
     assert len(re.findall('<td class="thumb">', page)) == 302
     assert "292 more lights, each at most" in page
     assert not re.search(r"<details[^>]*\bopen\b", page)
@@ -147,5 +147,5 @@ def test_what_is_folded_is_there(hall: str) -> None:
 
 
 def test_few_lights_are_not_folded(make_basis: Any) -> None:
-    page = _page(make_basis, SHOWN + 3)
+    page = _page(make_basis, ROWS_SHOWN + 3)
     assert 'class="more"' not in page.split('id="lights"')[1].split("How sure")[0]

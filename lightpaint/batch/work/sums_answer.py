@@ -39,7 +39,7 @@ def answer_by_sums(job: Job, basis: Basis) -> None:
     basis = basis if view.scene is None else basis.with_requests(view.scene.requests)
     if not basis.knows_noise:
         # Only pixels show which differences are rounding alone (see lighting/round_off.py).
-        problem = Problem.of(basis, view.target, constraints=job.asked, fit=job.fit)
+        problem = Problem.of(basis, view.target, constraints=job.all_constraints, fit=job.fit)
         publish_lighting_only(job, solution_of(problem).lighting)
         return
     sums = sum_rows(basis, view.target, slice(None), job.fit)
@@ -57,7 +57,7 @@ def publish_solved_lights(
         lights,
         job.views[0].target.name,
         sums,
-        constraints=job.asked,
+        constraints=job.all_constraints,
         fit=job.fit,
         scene_identity=scene_identity,
         spp=spp,

@@ -65,8 +65,8 @@ def show_look(look: Look, folder: Path, *, table: Table = "short") -> None:
         listed = ", ".join(f"{100 * missed:.1f} % with {count}" for count, missed in curve)
         terminal.write(f"missed of the painting (RMS, with noise), by number of lights: {listed}")
     terminal.write(f"results in {folder}{'' if str(folder).endswith('/') else '/'}")
-    if said := left_open(look):
-        terminal.say(said)
+    if note := left_open(look):
+        terminal.say(note)
     if not certificate.converged:
         terminal.say(
             f"the solve stopped after {max(certificate.sweeps)} sweeps at a KKT residual of "
@@ -89,64 +89,64 @@ def _sentences(look: Look, table: Table) -> list[str]:
     if table == "short":
         is_told = not look.analysis.appearance.is_close
         return [*(_what_holds(look)[:1] if is_told else []), *closer]
-    told = [
+    sentences = [
         *error_sentences(look.diagnosis, look.analysis.appearance, holds=_what_holds(look)),
         *closer,
     ]
     if look.uncertainty is not None:
-        told.append(uncertainty_sentence(look.basis, look.solution, look.uncertainty))
-    return told
+        sentences.append(uncertainty_sentence(look.basis, look.solution, look.uncertainty))
+    return sentences
 
 
 def _what_holds(look: Look) -> list[str]:
     """Return what keeps the lights from the painting, the main reason first, with options."""
     if not look.analysis.appearance.reasons:
         return bound_sentences(look.diagnosis)
-    told = [_spoken_cause(look, reason) for reason in look.analysis.appearance.reasons]
-    return [sentence for sentence in told if sentence][:2]
+    sentences = [_spoken_cause(look, reason) for reason in look.analysis.appearance.reasons]
+    return [sentence for sentence in sentences if sentence][:2]
 
 
 def _spoken_cause(look: Look, reason: Reason) -> str:
     """Return a reason in words, with the options to leave out."""
-    said = spoken_cause(reason, weaker="--hold")
+    sentence = spoken_cause(reason, weaker="--hold")
     keys = KEYS_BY_KIND.get(reason.kind, ())
     options = [
         f"--{'limit' if key == 'limits' else key} {name}"
-        for name, wish, where in look.solution.problem.constraints.lights
+        for name, wish, origin in look.solution.problem.constraints.lights
         for key in keys
         if key in wish
         and key != "duv"
-        and where.startswith(BY_OPTION)
+        and origin.startswith(BY_OPTION)
         and any(name == light or fnmatchcase(light, name) for light in reason.names)
     ]
     if not options:
-        return said
-    return f"{said.removesuffix('.')}: leave out {some_names(options, joint=' and ')}."
+        return sentence
+    return f"{sentence.removesuffix('.')}: leave out {some_names(options, joint=' and ')}."
 
 
 def spoken_settings(settings: Settings) -> str:
     """Return the settings in use, given or by default: `space display, hold 1, ...`."""
-    told = {field.name: getattr(settings, field.name) for field in fields(settings)}
-    transform = told.pop("transform")
-    told |= {"view": transform and spoken_view(transform), "command": None}
+    values = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    transform = values.pop("transform")
+    values |= {"view": transform and spoken_view(transform), "command": None}
     # Mention skipped stages, but not stages that always run.
-    said = {name: value for name, value in told.items() if value not in (None, "")}
-    said = {name: value for name, value in said.items() if name not in ("verify", "report")}
-    return ", ".join(f"{name} {value}" for name, value in said.items() if value is not False)
+    chosen = {name: value for name, value in values.items() if value not in (None, "")}
+    chosen = {name: value for name, value in chosen.items() if name not in ("verify", "report")}
+    return ", ".join(f"{name} {value}" for name, value in chosen.items() if value is not False)
 
 
 def left_open(look: Look) -> str:
     """Return one line on lights that the painting does not determine; "" if there are none."""
     unreached = look.solution.certificate.unreached
     dark = [name for name in unreached if not look.basis.image(name).any()]
-    told = []
+    notes = []
     if dark:
-        told.append(f"the picture shows nothing of {some_names(dark)}: kept as it is")
+        notes.append(f"the picture shows nothing of {some_names(dark)}: kept as it is")
     if appearance := [name for name in unreached if name not in dark]:
-        told.append(f"no painted pixel sees {some_names(appearance)}: kept as it is")
-    told += partly_reached(look.lighting)
-    told += [ambiguity.sentence for ambiguity in look.analysis.ambiguities]
-    return f"the painting leaves lights open: {some_of(told, joint='; ')}" if told else ""
+        notes.append(f"no painted pixel sees {some_names(appearance)}: kept as it is")
+    notes += partly_reached(look.lighting)
+    notes += [ambiguity.sentence for ambiguity in look.analysis.ambiguities]
+    return f"the painting leaves lights open: {some_of(notes, joint='; ')}" if notes else ""
 
 
 def _show_short(look: Look) -> None:
@@ -154,26 +154,26 @@ def _show_short(look: Look) -> None:
     lights, present = look.lighting.lights, look.basis.lights
     shares = energy_shares(look.basis, look.lighting)
     errors = spoken_errors(look.uncertainty, len(shares))
-    shown = _important_lights(look)
+    important = _important_lights(look)
     table, swatches = terminal.table("light", "stops", "colour", "±", "share"), []
-    for k in shown:
-        changed = change(present[k], lights[k])
-        is_off = changed == "off"
+    for k in important:
+        change_text = change(present[k], lights[k])
+        is_off = change_text == "off"
         swatches.append(None if is_off else _color(look, lights[k]))
         table.row(
             lights[k].name + "*" * lights[k].is_active,
-            changed,
+            change_text,
             "" if is_off else _spoken_color(look, lights[k]),
             errors[k],
             f"{100 * shares[k]:.1f} %",
             room=NAME,
         )
     terminal.print_table(table, swatches)
-    if said := untold_lights(look.lighting):
-        terminal.tell(said)
-    if rest := sorted(set(range(len(lights))) - set(shown)):
+    if note := untold_lights(look.lighting):
+        terminal.tell(note)
+    if rest := sorted(set(range(len(lights))) - set(important)):
         terminal.tell(_spoken_rest(look, rest))
-    if any(lights[k].is_active for k in shown):
+    if any(lights[k].is_active for k in important):
         terminal.write("* limited by a constraint (--table full shows which)")
 
 
@@ -182,8 +182,8 @@ def _important_lights(look: Look) -> list[int]:
     weights = look.solution.weights
     if len(weights) <= ALL:
         return list(range(len(weights)))
-    moved = np.abs(weights - look.basis.present_weights)
-    power = (moved + weights) * look.basis.totals @ LUMINANCE
+    change_size = np.abs(weights - look.basis.present_weights)
+    power = (change_size + weights) * look.basis.totals @ LUMINANCE
     return sorted(np.argsort(-power, kind="stable")[:MOST].tolist())
 
 
@@ -198,9 +198,9 @@ def _spoken_rest(look: Look, rest: list[int]) -> str:
         "dimmer": sum(x.startswith("−") for x in changes),
         "as they were": changes.count("0.0"),
     }
-    told = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    text = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     share = energy_shares(look.basis, look.lighting)[rest].sum()
-    return f"and {len(rest)} more ({told}): together {spoken_percent(float(share))} of the picture"
+    return f"and {len(rest)} more ({text}): together {spoken_percent(float(share))} of the picture"
 
 
 def change(light: BasisLight, setting: LightSetting) -> str:
@@ -239,11 +239,11 @@ def _spoken_color(look: Look, light: LightSetting) -> str:
 def _show_all(look: Look) -> None:
     """Print a row for each light: before, solved, certainty, and share of the picture."""
     shares = energy_shares(look.basis, look.lighting)
-    held = any(light.constraint for light in look.lighting.lights)
+    has_constraints = any(light.constraint for light in look.lighting.lights)
     headings = ("light", "plugin", "emission now", "solved R G B", "±", "unit", "share", "colour")
     amounts = () if look.lighting.cd_per_unit is None else ("luminous", "flux")
-    asked = ["constraint (* limits it)"] if held else []
-    table = terminal.table(*headings, *amounts, *asked)
+    columns = ["constraint (* limits it)"] if has_constraints else []
+    table = terminal.table(*headings, *amounts, *columns)
     errors = spoken_errors(look.uncertainty, len(shares))
     for k, (light, now) in enumerate(zip(look.lighting.lights, look.basis.lights, strict=True)):
         appearance = look.lighting.photometry(light)
@@ -257,7 +257,7 @@ def _show_all(look: Look) -> None:
             f"{100 * shares[k]:.1f} %",
             "" if light.is_fixed else appearance.color,
             *appearance.amounts[: len(amounts)],
-            *([light.constraint + "*" * light.is_active] if held else []),
+            *([light.constraint + "*" * light.is_active] if has_constraints else []),
         )
     terminal.print_table(table)
 
@@ -268,5 +268,5 @@ def _solved(light: LightSetting) -> str:
     solved = terminal.numbers(light.emission)
     if all(light.reached):
         return solved
-    kept = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
-    return f"{solved} ({kept})"
+    note = f"{unreached_channels(light)} kept" if any(light.reached) else "kept"
+    return f"{solved} ({note})"

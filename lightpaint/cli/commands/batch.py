@@ -35,25 +35,25 @@ def batch(
     is_dry: bool,
     form: str | None,
     only: str | None,
-    how: RunOptions,
+    run_options: RunOptions,
     force: bool,
     log: Path | None,
 ) -> CommandOutcome:
     """Run `lightpaint batch looks.toml -o DIR`, or `--init SCENE PAINTING...`."""
     if is_first:
-        made = output or Path("looks.toml")
-        write_starter_manifest(made, paths[0], paths[1:], force=force)
-        terminal.write(f"{made}: {len(paths) - 1} looks; run them with")
-        terminal.write(f"lightpaint batch {shlex.quote(str(made))}")
-        return CommandOutcome(lambda: {"manifest": str(made), "looks": len(paths) - 1})
+        manifest_file = output or Path("looks.toml")
+        write_starter_manifest(manifest_file, paths[0], paths[1:], force=force)
+        terminal.write(f"{manifest_file}: {len(paths) - 1} looks; run them with")
+        terminal.write(f"lightpaint batch {shlex.quote(str(manifest_file))}")
+        return CommandOutcome(lambda: {"manifest": str(manifest_file), "looks": len(paths) - 1})
     if form is not None and len(paths) != 2:
         raise BatchError("the folder of the job is missing: give looks.toml --export openjd DIR")
     if form is None and len(paths) > 1:
         raise BatchError(f"{len(paths)} manifests: give one, or --init SCENE PAINTING...")
     folder = output or Path(scene_name(Path(paths[0])))
     # The same command in all reports, however often and from wherever the batch is run.
-    manifest, into = (str(Path(x).absolute()) for x in (paths[0], folder))
-    command = shlex.join(["lightpaint", "batch", manifest, "-o", into])
+    manifest, output_folder = (str(Path(x).absolute()) for x in (paths[0], folder))
+    command = shlex.join(["lightpaint", "batch", manifest, "-o", output_folder])
     planned = plan(paths[0], folder, force=force, command=command).select(only)
     if is_dry:
         return _dry(planned)
@@ -81,7 +81,7 @@ def batch(
         return "" if done.left_s is None else f", {spoken_time(done.left_s)} left"
 
     with listen:
-        outcome = run_batch(planned, how, listen, on_step=on_step)
+        outcome = run_batch(planned, run_options, listen, on_step=on_step)
     note(f"done {len(outcome.done)}, failed {len(outcome.failed)}")
     return _outcome(planned, outcome)
 
@@ -98,8 +98,8 @@ def _outcome(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
     """Print the results of a run, and return them for programs."""
     _show(planned, outcome.rows)
     folder = planned.folder
-    for name, why in list(outcome.failed.items())[:LISTED]:
-        terminal.complain("batch", f"{name}: {why}")
+    for name, reason in list(outcome.failed.items())[:LISTED]:
+        terminal.complain("batch", f"{name}: {reason}")
     if len(outcome.failed) > LISTED:
         terminal.complain("batch", f"and {len(outcome.failed) - LISTED} more, in summary.csv")
     if outcome.skipped:
@@ -135,9 +135,9 @@ def _dry(planned: Plan) -> CommandOutcome:
     """Print what would be done and its cost, without doing it."""
     table, looks = terminal.table("look", "what", "of"), []
     for look in planned.chosen_looks:
-        what = look.failure or ("done earlier" if look.is_done else ", ".join(look.entry.want))
-        of = ", ".join([*(x.path for x in look.entry.paintings), *look.entry.of])
-        table.row(look.entry.name, visible(what), of or look.entry.lighting)
+        action = look.failure or ("done earlier" if look.is_done else ", ".join(look.entry.want))
+        inputs = ", ".join([*(x.path for x in look.entry.paintings), *look.entry.of])
+        table.row(look.entry.name, visible(action), inputs or look.entry.lighting)
         looks.append({"look": look.entry.name, "is_done": look.is_done, "want": look.entry.want})
     terminal.print_table(table)
     needed = estimate(planned)

@@ -29,18 +29,18 @@ def export(
     source, listen = Source(content(scene), content(groups), stage), terminal.TerminalListener()
     names = names_of_forms(to, source)
     writers, remark = writers_of(names, answer, source, folder, listen)
-    made = {folder / name: make for name, make in writers.items()}
-    check_files(list(made), [lighting, *source.files])
+    file_writers = {folder / name: make for name, make in writers.items()}
+    check_files(list(file_writers), [lighting, *source.files])
     check_writable(folder)
-    if not force and (existing := [file for file in made if file.exists()]):
+    if not force and (existing := [file for file in file_writers if file.exists()]):
         raise OutputError(
             f"{existing[0]} exists: name another folder (folder=...), or pass force=True"
         )
-    texts = {file: make() for file, make in made.items()}
+    texts = {file: make() for file, make in file_writers.items()}
     for file, text in texts.items():
         write_text(file, text)
         terminal.write(str(file))
     if remark:
         listen.say(remark)
-    files = list(made)
+    files = list(file_writers)
     return CommandOutcome(lambda: documents.files_document(folder, files, lighting=str(lighting)))

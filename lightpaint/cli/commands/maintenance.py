@@ -17,12 +17,13 @@ def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
     if action != "drop" and names:
         raise BasisError(f"cache {action} takes no name: did you mean cache drop {names[0]}?")
     if action == "list":
-        kept, about = bases.entries(), {"folder": str(folder()), "largest": bases.MAX_BYTES}
-        tables.show_kept(kept)
-        size = sum(entry.size for entry in kept) / 1e6
+        listed_entries = bases.entries()
+        fields = {"folder": str(folder()), "largest": bases.MAX_BYTES}
+        tables.show_kept(listed_entries)
+        size = sum(entry.size for entry in listed_entries) / 1e6
         terminal.write(f"kept in {folder()}: {size:.0f} of at most {bases.MAX_BYTES / 1e6:.0f} MB")
-        listed = [documents.kept_document(entry) for entry in reversed(kept)]
-        return CommandOutcome(lambda: {**about, "kept": listed})
+        listed = [documents.kept_document(entry) for entry in reversed(listed_entries)]
+        return CommandOutcome(lambda: {**fields, "kept": listed})
     dropped = bases.entries() if action == "clear" else _kept_by_names(names)
     freed = bases.delete_entries(dropped)
     if action == "clear":
@@ -30,8 +31,8 @@ def cache(*, action: str, names: Sequence[str]) -> CommandOutcome:
     if action == "drop":
         tables.show_kept(dropped)
     terminal.write(f"{len(dropped)} deleted from {folder()}: {freed / 1e6:.1f} MB are free")
-    gone = [documents.kept_document(entry) for entry in dropped]
-    return CommandOutcome(lambda: {"folder": str(folder()), "dropped": gone, "freed": freed})
+    deleted = [documents.kept_document(entry) for entry in dropped]
+    return CommandOutcome(lambda: {"folder": str(folder()), "dropped": deleted, "freed": freed})
 
 
 def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
@@ -40,14 +41,14 @@ def _kept_by_names(names: Sequence[str]) -> list[bases.Entry]:
         raise BasisError(
             "cache drop needs the name of a scene or of a file, as cache list shows it"
         )
-    found: dict[Path, bases.Entry] = {}
+    by_path: dict[Path, bases.Entry] = {}
     for name in names:
-        if not (its := bases.entries_named(name)):
+        if not (matches := bases.entries_named(name)):
             scenes = {entry.origin.scene for entry in bases.entries() if entry.origin is not None}
-            there = some_names(sorted(scenes)) or "none"
-            raise BasisError(f"no basis of {name!r} is kept in {folder()}: it has {there}")
-        found |= {entry.path: entry for entry in its}
-    return list(found.values())
+            known_scenes = some_names(sorted(scenes)) or "none"
+            raise BasisError(f"no basis of {name!r} is kept in {folder()}: it has {known_scenes}")
+        by_path |= {entry.path: entry for entry in matches}
+    return list(by_path.values())
 
 
 def doctor(*, variant: str | None) -> CommandOutcome:

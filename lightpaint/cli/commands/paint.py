@@ -82,8 +82,8 @@ def paint(
         _announce(server, subject.name, folder, is_reachable=host is not None)
         if with_browser and _has_browser():
             # Some browsers block the process that starts them.
-            given = (server.one_time_url(),)
-            Thread(target=_show, args=given, name="browser", daemon=True).start()
+            urls = (server.one_time_url(),)
+            Thread(target=_show, args=urls, name="browser", daemon=True).start()
 
     try:
         paint_in_browser(
@@ -105,15 +105,15 @@ def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) 
     name: of what is painted. is_reachable: whether an address to listen at was given.
     """
     if is_reachable:
-        about = REACH[server.address.reach].format(name=server.address.name, folder=folder)
+        reach_text = REACH[server.address.reach].format(name=server.address.name, folder=folder)
         is_open = server.address.reach is not Reach.MACHINE
-        (partial(terminal.complain, "paint") if is_open else terminal.say)(about)
-    said = f"painting {name} at {server.url} (Ctrl-C ends it; everything is kept in {folder})"
+        (partial(terminal.complain, "paint") if is_open else terminal.say)(reach_text)
+    sentence = f"painting {name} at {server.url} (Ctrl-C ends it; everything is kept in {folder})"
     if output_mode().as_json:  # at once and in one line: programs connect while it runs
-        lines.err(said)
+        lines.err(sentence)
         lines.out(json.dumps({**server.connection, "folder": str(folder), "scene": name}))
     else:
-        terminal.write(said)
+        terminal.write(sentence)
 
 
 def _say(text: str) -> None:

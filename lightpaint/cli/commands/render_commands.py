@@ -59,12 +59,12 @@ def basis(*, scene: SceneFile, output: Path, settings: Settings) -> CommandOutco
         of_film = remarks_of_film(loaded, settings)
         for remark in (*remarks_of_scene(loaded), *of_film, *remarks_of_memory(loaded)):
             listen.say(remark)
-        made = obtain(loaded, settings, listen)
-    write_basis(output, made)
-    kept = " and what is kept" if made.is_fixed.any() else ""
-    count = int((~made.is_fixed).sum())
-    terminal.write(f"{output}: {count} lights{kept}, {made.origin.spp} samples per pixel")
-    return CommandOutcome(lambda: documents.basis_document(output, made))
+        rendered = obtain(loaded, settings, listen)
+    write_basis(output, rendered)
+    note = " and what is kept" if rendered.is_fixed.any() else ""
+    count = int((~rendered.is_fixed).sum())
+    terminal.write(f"{output}: {count} lights{note}, {rendered.origin.spp} samples per pixel")
+    return CommandOutcome(lambda: documents.basis_document(output, rendered))
 
 
 def template(
@@ -84,7 +84,7 @@ def template(
     check_files(_replaced(output), loaded.read_files)
     for remark in remarks_of_film(loaded, settings):
         terminal.say(remark)
-    how: dict[str, Any] = {
+    options: dict[str, Any] = {
         "transform": transform,
         "spp": samples(settings.quality, spp=settings.spp, time_s=settings.time_s),
         "time_s": settings.time_s,
@@ -95,9 +95,9 @@ def template(
         for remark in remarks_of_scene(loaded, is_rendered=False):
             listen.say(remark)
         if is_folder(output):
-            files = render_template(loaded, output, progress=listen, **how)
+            files = render_template(loaded, output, progress=listen, **options)
         else:
-            files = [output, render_look(loaded, output, progress=listen, **how)]
+            files = [output, render_look(loaded, output, progress=listen, **options)]
     return _show_template(output, files)
 
 
@@ -109,17 +109,19 @@ def _template_of_basis(
 ) -> CommandOutcome:
     """Write a template of a saved basis or of light groups."""
     check_nothing_unused(settings, source)
-    found = source.content
-    made = found if isinstance(found, Basis) else found.basis
-    check_files(_replaced(output), [Path(source.path)] if isinstance(found, Basis) else found.files)
-    if not isinstance(found, Basis):
-        for remark in found.remarks:
+    content = source.content
+    basis = content if isinstance(content, Basis) else content.basis
+    check_files(
+        _replaced(output), [Path(source.path)] if isinstance(content, Basis) else content.files
+    )
+    if not isinstance(content, Basis):
+        for remark in content.remarks:
             terminal.say(remark)
     if is_folder(output):
-        files = template_of_basis(made, output, transform=transform)
+        files = template_of_basis(basis, output, transform=transform)
     else:
-        files = [output, look_of_basis(made, output, transform=transform)]
-    return _show_template(output, files, is_denoised=made.knows_noise)
+        files = [output, look_of_basis(basis, output, transform=transform)]
+    return _show_template(output, files, is_denoised=basis.knows_noise)
 
 
 def _show_template(
@@ -147,8 +149,10 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
         lines.append(
             f"{output / CLEAN}: the same in linear light, to paint over in programs that read EXR"
         )
-    its = "the look as rendered, with its noise" if is_denoised else "the same in linear light"
-    lines.append(f"{output / LIGHT if is_tree else output}: {its}")
+    description = (
+        "the look as rendered, with its noise" if is_denoised else "the same in linear light"
+    )
+    lines.append(f"{output / LIGHT if is_tree else output}: {description}")
     if is_tree and (output / MATTES) in {file.parent for file in files}:
         lines.append(f"{output}/{MATTES}: a mask for each object")
         lines.append(f"{output}/{LIGHTS}: what each light does alone")
@@ -159,25 +163,25 @@ def template_lines(output: Path, files: Sequence[Path], *, is_denoised: bool = T
 
 def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOutcome:
     """Run `lightpaint demo -o DIR`."""
-    made = write_demo(folder)
+    written = write_demo(folder)
     options = [f"--spp {settings.spp}"] if settings.spp else []
     options += [f"-m {variant}"] if variant else []
-    files = shlex.join(map(str, (made.scene, made.painting, "-o", made.answer)))
+    files = shlex.join(map(str, (written.scene, written.painting, "-o", written.answer)))
     command = " ".join(("lightpaint solve", files, *options))
     terminal.say(
         f"wrote a gallery and a painting of it in the evening to {folder}; this solves for it:"
     )
     terminal.say(command)
-    scene = SceneFile(str(made.scene), variant=variant)
+    scene = SceneFile(str(written.scene), variant=variant)
     settings = replace(settings, command=from_any_folder(command))
-    painting = Painting(str(made.painting))
-    solved = solve(jobs=[Job((scene,), (painting,), made.answer, settings=settings)])
+    painting = Painting(str(written.painting))
+    solved = solve(jobs=[Job((scene,), (painting,), written.answer, settings=settings)])
     terminal.write("")
-    terminal.write(f"Open {made.answer / 'report.html'} in a browser. Then paint your own:")
-    terminal.write(f"lightpaint template {shlex.quote(str(made.scene))}")
-    about = {"scene": str(made.scene), "painting": str(made.painting), "command": command}
+    terminal.write(f"Open {written.answer / 'report.html'} in a browser. Then paint your own:")
+    terminal.write(f"lightpaint template {shlex.quote(str(written.scene))}")
+    fields = {"scene": str(written.scene), "painting": str(written.painting), "command": command}
     results = solved.told
-    return replace(solved, told=lambda: about | (results() if results is not None else {}))
+    return replace(solved, told=lambda: fields | (results() if results is not None else {}))
 
 
 def relight(
@@ -201,8 +205,8 @@ def relight(
         if lighting.scene_identity not in ("", scene_of(loaded, lighting).identity):
             terminal.say(f"{folder}: the lighting was solved for an earlier state of the scene")
         with terminal.TerminalListener() as listen:
-            how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
-            relight_look({"": loaded}, lighting, place, progress=listen, **how)
+            options: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
+            relight_look({"": loaded}, lighting, place, progress=listen, **options)
             listen.note(f"{folder} relit and rendered")
         terminal.write(f"{folder}: relit.xml, relit.exr, relit.png")
     return CommandOutcome(
@@ -220,10 +224,10 @@ def verify(*, folders: Sequence[Path], variant: str | None, settings: Settings) 
     """Run `lightpaint verify DIR...`."""
     use_variant(variant)
     results = []
-    for folder in (view for given in folders for view in result_folders(given)):
+    for folder in (view for folder_given in folders for view in result_folders(folder_given)):
         with terminal.TerminalListener() as listen:
-            how: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
-            result = verify_result(folder, progress=listen, **how)
+            options: dict[str, Any] = {"spp": settings.spp, "seed": settings.seed}
+            result = verify_result(folder, progress=listen, **options)
             listen.note(f"{folder} rendered and compared")
         terminal.write(f"{folder}: {tables.spoken_agreement(result)}")
         results.append((folder, result))

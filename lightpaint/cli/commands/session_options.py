@@ -22,20 +22,20 @@ def solve_command(
 
 def options_of(requests: SessionRequests) -> list[str]:
     """Return requests as options of `lightpaint solve`."""
-    made = []
-    for name, asked in requests.lights.items():
-        made += [option for key in asked for option in _options(name, key, asked)]
+    options = []
+    for name, constraint in requests.lights.items():
+        options += [option for key in constraint for option in _options(name, key, constraint)]
     for names in requests.ties:
-        made.append(f"--tie {quote(','.join(names))}")
+        options.append(f"--tie {quote(','.join(names))}")
     for key, value in requests.values.items():
         option = f"--{key.replace('_', '-')}"
-        made.append(option if value is True else f"{option} {value}")
-    return made
+        options.append(option if value is True else f"{option} {value}")
+    return options
 
 
-def _options(name: str, key: str, asked: Mapping[str, Any]) -> list[str]:
+def _options(name: str, key: str, constraint: Mapping[str, Any]) -> list[str]:
     """Return one request for a light as options; duv goes with its kelvin."""
-    value = asked[key]
+    value = constraint[key]
     if key in ("off", "lock") and value is True:
         return [f"--{key} {quote(name)}"]
     if key == "limits":
@@ -44,7 +44,7 @@ def _options(name: str, key: str, asked: Mapping[str, Any]) -> list[str]:
         )
         return [f"--limit {quote(f'{name}={ends}')}"]
     if key == "kelvin":
-        duv = f",duv={asked['duv']:g}" if "duv" in asked else ""
+        duv = f",duv={constraint['duv']:g}" if "duv" in constraint else ""
         kelvin = (
             ":".join(map(_value_text, value))
             if isinstance(value, list | tuple)

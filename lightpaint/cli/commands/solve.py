@@ -25,7 +25,7 @@ def solve(
     *,
     jobs: Sequence[Job],
     table: Table = "short",
-    wanted: Tolerances = ANY,
+    tolerances: Tolerances = ANY,
     several: "LookSet | None" = None,
 ) -> CommandOutcome:
     """Run `lightpaint solve SCENE|BASIS TARGET...` or `SCENE --target SENSOR=TARGET...`.
@@ -53,7 +53,7 @@ def solve(
         for view, look in zip(job.views, looks, strict=True):
             results.append((job, view, look))
             shortfalls += [
-                f"{view.folder} {x}" for x in wanted.shortfalls(look.analysis.appearance)
+                f"{view.folder} {x}" for x in tolerances.shortfalls(look.analysis.appearance)
             ]
     if several is not None:
         several.show(obtained or [])
@@ -61,14 +61,14 @@ def solve(
         terminal.say("solved from a saved basis, without a render: lightpaint relight makes one")
     if shortfalls:
         terminal.complain("solve", some_of(shortfalls, joint="; "))
-    made = [] if several is None else several.shifted
+    variations = [] if several is None else several.shifted
 
-    def told() -> dict[str, Any]:
-        found = {"results": [documents.result_document(*x, wanted) for x in results]}
-        return found | ({"variations": made} if made else {})
+    def document() -> dict[str, Any]:
+        results_document = {"results": [documents.result_document(*x, tolerances) for x in results]}
+        return results_document | ({"variations": variations} if variations else {})
 
     return CommandOutcome(
-        told,
+        document,
         1 if shortfalls or (several is not None and several.failed) else 0,
     )
 
@@ -83,5 +83,5 @@ def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
         if look.suggestions is not None:
             tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
     if job.groups is not None:
-        there = ", ".join(name for name in EXPORTS if (job.folder / name).is_file())
-        terminal.write(f"for other programs: {there}")
+        exports = ", ".join(name for name in EXPORTS if (job.folder / name).is_file())
+        terminal.write(f"for other programs: {exports}")

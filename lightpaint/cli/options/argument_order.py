@@ -43,7 +43,7 @@ class CommandParser(Parser):
         return options, unknown
 
 
-def in_order(parser: argparse.ArgumentParser, given: Sequence[str]) -> list[str]:
+def in_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
     """Return arguments with the options in front, each with its value.
 
     An option without its value comes last, so that it takes nothing else, and completion, which
@@ -52,27 +52,27 @@ def in_order(parser: argparse.ArgumentParser, given: Sequence[str]) -> list[str]
     plain: list[str] = []
     options: list[str] = []
     incomplete: list[str] = []
-    for _, words, is_open in _split(parser, given, plain):
-        (incomplete if is_open else options).extend(words)
+    for _, parts, is_open in _split(parser, words, plain):
+        (incomplete if is_open else options).extend(parts)
     if any(word.startswith("-") for word in plain):
         return [*options, *incomplete, "--", *plain]
     return [*options, *plain, *incomplete]
 
 
 def options_but(
-    parser: argparse.ArgumentParser, given: Sequence[str], *dropped: str
+    parser: argparse.ArgumentParser, words: Sequence[str], *dropped: str
 ) -> tuple[str, ...]:
     """Return the words of all options but those that go to `dropped`, quoted for a shell."""
-    options = _split(parser, given, [])
-    kept = [words for option, words, _ in options if option and option.dest not in dropped]
-    return tuple(shlex.quote(word) for words in kept for word in words)
+    options = _split(parser, words, [])
+    remaining = [parts for option, parts, _ in options if option and option.dest not in dropped]
+    return tuple(shlex.quote(part) for parts in remaining for part in parts)
 
 
 def _split(
-    parser: argparse.ArgumentParser, given: Sequence[str], plain: list[str]
+    parser: argparse.ArgumentParser, words: Sequence[str], plain: list[str]
 ) -> Iterator[tuple[argparse.Action | None, list[str], bool]]:
     """Yield each option, its words, and whether it lacks its value; others go to `plain`."""
-    left = [*given]
+    left = [*words]
     while left:
         word = left.pop(0)
         if word == "--":
@@ -93,10 +93,10 @@ def _is_plain(word: str) -> bool:
 
 def _option(parser: argparse.ArgumentParser, word: str) -> argparse.Action | None:
     """Return the option that `word` names, whole or abbreviated; None if it names none."""
-    known = parser._option_string_actions
-    if word in known or not word.startswith("--"):
-        return known.get(word)
-    matches = {id(action): action for name, action in known.items() if name.startswith(word)}
+    actions = parser._option_string_actions
+    if word in actions or not word.startswith("--"):
+        return actions.get(word)
+    matches = {id(action): action for name, action in actions.items() if name.startswith(word)}
     return next(iter(matches.values())) if len(matches) == 1 else None
 
 

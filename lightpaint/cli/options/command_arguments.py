@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from lightpaint.batch.run_options import RunOptions
 
 
-def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
-    """Return the keyword arguments of a command's function. given: the options as typed."""
-    asked, settings = vars(options), settings_of(options, given)
-    output = Path(asked["output"]) if asked.get("output") else None
+def values_of(options: Namespace, words: Sequence[str]) -> dict[str, Any]:
+    """Return the keyword arguments of a command's function. words: the options as typed."""
+    values, settings = vars(options), settings_of(options, words)
+    output = Path(values["output"]) if values.get("output") else None
     match options.command:
         case "lights":
             is_drawn = output is not None or not (options.no_sheet or options.as_json)
@@ -74,7 +74,7 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
                 "force": options.force,
             }
         case "paint":
-            return _paint_arguments(options, settings, given)
+            return _paint_arguments(options, settings, words)
         case "relight":
             scene = scene_of(options, is_to_solve=False, use_lights_file=False)
             paths = list(map(Path, options.lightings))
@@ -90,12 +90,12 @@ def values_of(options: Namespace, given: Sequence[str]) -> dict[str, Any]:
 
 def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
     """Return the arguments of `solve`, with a gallery if there are several looks."""
-    how: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         "table": options.table,
-        "wanted": Tolerances(options.max_miss, options.min_fit),
+        "tolerances": Tolerances(options.max_miss, options.min_fit),
     }
     if len(options.targets) <= 1 and not options.variations:
-        return {"jobs": jobs_of(options, settings), **how}
+        return {"jobs": jobs_of(options, settings), **arguments}
 
     # Imported late: a single look needs no gallery.
     from lightpaint.batch.manifest.variations import parse_variations
@@ -110,7 +110,7 @@ def _solve_arguments(options: Namespace, settings: Settings) -> dict[str, Any]:
         keep_going=options.keep_going,
         force=options.force,
     )
-    return {"jobs": jobs, "several": several, **how}
+    return {"jobs": jobs, "several": several, **arguments}
 
 
 def _batch_arguments(options: Namespace) -> dict[str, Any]:
@@ -122,7 +122,7 @@ def _batch_arguments(options: Namespace) -> dict[str, Any]:
         "is_dry": options.dry_run,
         "only": options.only,
         "form": options.export,
-        "how": _run_options(options),
+        "run_options": _run_options(options),
         "force": options.force,
         "log": Path(options.log) if options.log else None,
     }
@@ -151,15 +151,15 @@ def _run_options(options: Namespace) -> "RunOptions":
 
 
 def _paint_arguments(
-    options: Namespace, settings: Settings, given: Sequence[str]
+    options: Namespace, settings: Settings, words: Sequence[str]
 ) -> dict[str, Any]:
     """Return the arguments of `paint`."""
-    sources, asked = painted_of(options), constraints_of(options)
+    sources, constraints = painted_of(options), constraints_of(options)
     source = sources[0]
     if options.lights_file and not isinstance(source, SceneFile):
-        asked = read_constraints(options.lights_file).and_then(asked)
-    named = f"{scene_name(Path(source.path))}.paint"
-    [folder] = folders_of(options.output and Path(options.output), [named])
+        constraints = read_constraints(options.lights_file).and_then(constraints)
+    session_name = f"{scene_name(Path(source.path))}.paint"
+    [folder] = folders_of(options.output and Path(options.output), [session_name])
     # The command that the page shows for exported paintings has only options that `solve` knows.
     dropped = ["output", "new", "host", "port", "with_browser", "view", "exposure"]
     dropped += ["as_json", "is_quiet", "is_verbose"]
@@ -168,9 +168,9 @@ def _paint_arguments(
         "sources": sources,
         "folder": folder,
         "settings": settings,
-        "constraints": asked,
+        "constraints": constraints,
         "choice": transform_of(options),
-        "options": options_but(options.parser, given[given.index("paint") + 1 :], *dropped),
+        "options": options_but(options.parser, words[words.index("paint") + 1 :], *dropped),
         "new": options.new,
         "host": options.host,
         "port": options.port,

@@ -29,12 +29,12 @@ def is_folder(output: Path) -> bool:
     return output.suffix.lower() != ".exr"
 
 
-def settings_of(options: Namespace, given: Sequence[str]) -> Settings:
+def settings_of(options: Namespace, words: Sequence[str]) -> Settings:
     """Return the settings in the options; others have their defaults."""
     # The transform belongs to the painting; the command is the whole line.
     names = {field.name for field in fields(Settings)} - {"transform", "command"}
     values = {name: value for name, value in vars(options).items() if name in names}
-    return Settings(**values, command=from_any_folder(["lightpaint", *given]))
+    return Settings(**values, command=from_any_folder(["lightpaint", *words]))
 
 
 def jobs_of(
@@ -55,9 +55,9 @@ def jobs_of(
     if not paths:
         raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
     paintings = _paintings_of(options, paths)
-    asked = constraints_of(options)
+    constraints = constraints_of(options)
     if basis is not None and options.lights_file:
-        asked = read_constraints(options.lights_file).and_then(asked)
+        constraints = read_constraints(options.lights_file).and_then(constraints)
     if options.views:
         if options.sensor:
             raise TargetError("-s cannot be used with --target, which names the sensors")
@@ -65,7 +65,7 @@ def jobs_of(
         folder = Path(options.output or Path(paths[0]).stem)
         if options.output and options.variations:
             folder /= Path(paths[0]).stem
-        return [Job(scenes, tuple(paintings), folder, None, asked, settings, by_sensor=True)]
+        return [Job(scenes, tuple(paintings), folder, None, constraints, settings, by_sensor=True)]
     # One scene, loaded once for all jobs.
     source = () if basis is not None else (scene_of(options),)
     output = options.output and Path(options.output)
@@ -76,7 +76,7 @@ def jobs_of(
     jobs = []
     for painting, folder in zip(paintings, folders, strict=True):
         try:
-            jobs.append(Job(source, (painting,), folder, basis, asked, settings))
+            jobs.append(Job(source, (painting,), folder, basis, constraints, settings))
         except LOOK_ERRORS as error:
             if failed is None or not options.keep_going or len(paintings) == 1:
                 raise
@@ -132,8 +132,8 @@ def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:
     for name in names:
         # The reader of the file reports names that are not UTF-8.
         if not is_name(name) and is_utf_8(Path(name)):
-            how = "choose one with -o" if len(names) == 1 else "solve it alone, with -o"
-            raise OutputError(f"{one_line(repr(name))} cannot be the name of a folder: {how}")
+            advice = "choose one with -o" if len(names) == 1 else "solve it alone, with -o"
+            raise OutputError(f"{one_line(repr(name))} cannot be the name of a folder: {advice}")
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise OutputError(
             f"results would overwrite each other in {some_names(twice)}: run those of one name "

@@ -20,30 +20,30 @@ LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")
 
 def source_of_template(options: Namespace) -> SceneFile | BasisFile | GroupsFile:
     """Return the source of a template: a scene, a saved basis, or light groups."""
-    given = ",".join(options.lights or ())
+    light_list = ",".join(options.lights or ())
     if options.scene is None:
-        if not given:
+        if not light_list:
             raise BasisError("nothing to paint on: give a scene, a basis, or light groups")
-        _check_light_groups(given)
-        options.scene, options.lights = given, None
-    elif given and _is_file_to_be(given, Path(options.scene)):
-        raise BasisError(f"{options.scene} and --lights {given} at once: give one to paint on")
+        _check_light_groups(light_list)
+        options.scene, options.lights = light_list, None
+    elif light_list and _is_file_to_be(light_list, Path(options.scene)):
+        raise BasisError(f"{options.scene} and --lights {light_list} at once: give one to paint on")
     options.source, options.targets, options.masks, options.views = options.scene, [], [], []
     return basis_of(options) or scene_of(options)
 
 
-def scene_of(options: Namespace, *, is_to_solve: bool = True, **how: Any) -> SceneFile:
+def scene_of(options: Namespace, *, is_to_solve: bool = True, **fields: Any) -> SceneFile:
     """Return the scene of a command. is_to_solve: whether its lights are chosen."""
     path = options.source if options.command in ("solve", "paint") else options.scene
     if is_to_solve:
-        how |= {
+        fields |= {
             "lights": options.lights,
             "groups": _groups(options.groups),
             "lights_file": options.lights_file,
             "use_lights_file": options.use_lights_file,
             "group_alike": options.group_alike,
         }
-    loading = {"sensor": options.sensor, "variant": options.variant, **how}
+    loading = {"sensor": options.sensor, "variant": options.variant, **fields}
     loading["integrator"] = options.integrator
     return SceneFile(path, parameters=dict(options.parameters), **loading)
 
@@ -53,8 +53,8 @@ def scene_to_export(options: Namespace) -> SceneFile | None:
     if options.scene is None:
         return None
     parameters = dict(options.parameters)
-    how: dict[str, Any] = {"sensor": options.sensor, "variant": options.variant}
-    return SceneFile(options.scene, parameters=parameters, use_lights_file=False, **how)
+    fields: dict[str, Any] = {"sensor": options.sensor, "variant": options.variant}
+    return SceneFile(options.scene, parameters=parameters, use_lights_file=False, **fields)
 
 
 def painted_of(options: Namespace) -> list[SceneFile | BasisFile | GroupsFile]:
@@ -62,27 +62,27 @@ def painted_of(options: Namespace) -> list[SceneFile | BasisFile | GroupsFile]:
 
     They are a scene, once for each sensor; bases of several views; or light groups.
     """
-    given = ",".join(options.lights or ())
+    light_list = ",".join(options.lights or ())
     paths = options.sources
-    if not paths and not given:
+    if not paths and not light_list:
         raise BasisError("nothing to paint: give a scene, a basis, or light groups")
     options.sensor = options.sensors[0] if options.sensors else None
     if not paths:
-        _check_light_groups(given)
-        paths, options.lights = [given], None
-    elif given and _is_file_to_be(given, Path(paths[0])):
-        raise BasisError(f"{paths[0]} and --lights {given} at once: give one to paint")
-    made = []
+        _check_light_groups(light_list)
+        paths, options.lights = [light_list], None
+    elif light_list and _is_file_to_be(light_list, Path(paths[0])):
+        raise BasisError(f"{paths[0]} and --lights {light_list} at once: give one to paint")
+    sources = []
     for options.source in paths:
-        made.append(basis_of(options) or scene_of(options))
-    if len(paths) > 1 and not all(isinstance(one, BasisFile) for one in made):
+        sources.append(basis_of(options) or scene_of(options))
+    if len(paths) > 1 and not all(isinstance(source, BasisFile) for source in sources):
         raise BasisError(
             f"{len(paths)} things to paint: several must be bases of the views of one scene; for "
             "views of a scene repeat --sensor"
         )
     if len(options.sensors) > 1:
         return [scene_of(options, sensor=sensor) for sensor in options.sensors]
-    return made
+    return sources
 
 
 def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
@@ -92,12 +92,12 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
     for options that are useless without a scene.
     """
     source, names = Path(options.source), options.lights
-    given = ",".join(names or ())
+    light_list = ",".join(names or ())
     basis: BasisFile | GroupsFile
-    if given and _is_file_to_be(given, source):
-        _check_light_groups(given)
+    if light_list and _is_file_to_be(light_list, source):
+        _check_light_groups(light_list)
         options.targets = [options.source, *options.targets]
-        basis, names = _groups_file(given, options), None
+        basis, names = _groups_file(light_list, options), None
     elif source.suffix.lower() != ".xml" and is_light_groups(source):
         basis = _groups_file(options.source, options)
     elif options.pattern:
@@ -119,7 +119,7 @@ def basis_of(options: Namespace) -> BasisFile | GroupsFile | None:
     check_needed([*idle, *(["lights"] if names and not is_groups else [])], basis)
     if names:
         raise BasisError(
-            f"--lights {given} chooses lights of a scene: of light groups, keep the "
+            f"--lights {light_list} chooses lights of a scene: of light groups, keep the "
             "others as they are with --lock NAME"
         )
     return basis
@@ -131,32 +131,32 @@ def _groups_file(path: str, options: Namespace) -> GroupsFile:
     return GroupsFile(path, options.pattern, leave_out=pictures)
 
 
-def _is_file_to_be(given: str, source: Path) -> bool:
+def _is_file_to_be(text: str, source: Path) -> bool:
     """Return True if `--lights` means a file or folder, and not lights of a scene or a basis."""
-    if given.lower().endswith(".exr"):
+    if text.lower().endswith(".exr"):
         return True
     # A folder of results may well have the name of a light.
-    return source.suffix.lower() != ".xml" and Path(given).exists()
+    return source.suffix.lower() != ".xml" and Path(text).exists()
 
 
-def _check_light_groups(given: str) -> None:
+def _check_light_groups(text: str) -> None:
     """Raise BasisError if `--lights` names something else, ImageError if it is damaged."""
-    path = Path(given)
+    path = Path(text)
     if not path.exists():
-        raise BasisError(f"no such file or folder of light groups: --lights {given}")
+        raise BasisError(f"no such file or folder of light groups: --lights {text}")
     if path.is_dir() and not is_light_groups(path):
-        raise BasisError(f"--lights {given} is a folder without an .exr file")
+        raise BasisError(f"--lights {text} is a folder without an .exr file")
     # The reader refuses files that are not EXR.
     if path.is_file() and is_exr(path) and is_own_basis(path):
         raise BasisError(
-            f"--lights {given} holds no light groups: give an EXR of another renderer, or a "
+            f"--lights {text} holds no light groups: give an EXR of another renderer, or a "
             "folder of them; pass a basis of lightpaint in place of the scene"
         )
 
 
-def _groups(given: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
+def _groups(pairs: Sequence[tuple[str, list[str]]]) -> dict[str, list[str]]:
     """Return emitters by name of the group; lists of repeated groups are joined."""
     groups: dict[str, list[str]] = {}
-    for name, members in given:
+    for name, members in pairs:
         groups[name] = groups.get(name, []) + members
     return groups

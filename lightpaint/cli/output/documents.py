@@ -42,7 +42,7 @@ def light_document(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
         }
         for member in light.members
     ]
-    about = {
+    document = {
         "name": light.name,
         "plugin": light.plugin,
         "parameter": light.parameter,
@@ -54,8 +54,8 @@ def light_document(light: Light, cd_per_unit: float | None) -> dict[str, Any]:
         "members": members,
     }
     if len(members) == 1:
-        about["sampling_weight"] = light.members[0].sampling_weight
-    return about
+        document["sampling_weight"] = light.members[0].sampling_weight
+    return document
 
 
 def basis_document(file: Path, basis: Basis) -> dict[str, Any]:
@@ -74,19 +74,21 @@ def basis_document(file: Path, basis: Basis) -> dict[str, Any]:
     }
 
 
-def result_document(job: Job, view: PaintedView, look: Look, wanted: Tolerances) -> dict[str, Any]:
+def result_document(
+    job: Job, view: PaintedView, look: Look, tolerances: Tolerances
+) -> dict[str, Any]:
     """Return the document of one view in `solve`: its report.json, lighting.json and files."""
-    others = {its.folder for its in job.views} - {view.folder, job.folder}
+    other_folders = {other_view.folder for other_view in job.views} - {view.folder, job.folder}
     files = [*job.results.files, job.folder / RECORD]
     return {
         "target": look.target.name,
         "sensor": look.basis.origin.sensor,
         "folder": str(job.folder),
         "view": str(view.folder),
-        "files": [str(x) for x in files if x.is_file() and x.parent not in others],
+        "files": [str(x) for x in files if x.is_file() and x.parent not in other_folders],
         "verdict": look.verdict,
         "is_close": look.analysis.appearance.is_close,
-        **wanted.document(look.analysis.appearance),
+        **tolerances.document(look.analysis.appearance),
         "report": _in_file(view.folder / "report.json"),
         "lighting": _in_file(job.folder / "lighting.json"),
     }
@@ -108,12 +110,12 @@ def verified_document(folder: Path, result: Verification) -> dict[str, Any]:
 
 def kept_document(entry: cache.Entry) -> dict[str, Any]:
     """Return the document of one basis in the cache, without what cannot be read."""
-    told: dict[str, Any] = {"file": str(entry.path), "bytes": entry.size}
-    if (known := entry.origin) is not None and entry.image_size is not None:
+    document: dict[str, Any] = {"file": str(entry.path), "bytes": entry.size}
+    if (origin := entry.origin) is not None and entry.image_size is not None:
         height, width = entry.image_size
-        told |= {"scene": known.scene, "sensor": known.sensor, "size": [width, height]}
-        told |= {"lights": entry.lights, "spp": known.spp, "seed": known.seed}
-    return told
+        document |= {"scene": origin.scene, "sensor": origin.sensor, "size": [width, height]}
+        document |= {"lights": entry.lights, "spp": origin.spp, "seed": origin.seed}
+    return document
 
 
 def doctor_document(findings: Sequence[Finding]) -> dict[str, Any]:

@@ -25,14 +25,14 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
     for light in scene.lights:
         single = light.member_names == (light.name,) and not light.is_fixed
         if not single:
-            what = "kept as it is" if light.is_fixed else terminal.numbers(light.emission)
+            state = "kept as it is" if light.is_fixed else terminal.numbers(light.emission)
             unit = "" if light.is_fixed else light.unit
             count = f"{len(light.members)} emitter{'s' if len(light.members) > 1 else ''}"
             whole = photometry_of(light, cd_per_unit)
             table.row(
                 light.name,
                 light.plugin,
-                what,
+                state,
                 unit,
                 count,
                 "",
@@ -41,7 +41,7 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
             )
         # One row is enough for many similar lamps without names.
         for member in () if light.is_found else light.members:
-            its = photometry_of(member, cd_per_unit)
+            measured = photometry_of(member, cd_per_unit)
             table.row(
                 member.name if single else f"  {member.name}",
                 member.plugin,
@@ -49,8 +49,8 @@ def show_lights(scene: Scene, cd_per_unit: float | None) -> None:
                 member.kind.unit if member.kind is not None else MULTIPLE,
                 member.form,
                 f"{member.sampling_weight:g}",
-                its.color,
-                *its.amounts[: len(amounts)],
+                measured.color,
+                *measured.amounts[: len(amounts)],
             )
     terminal.print_table(table)
 
@@ -70,12 +70,12 @@ def show_kept(entries: Sequence[Entry]) -> None:
     """Print a row for each basis in the cache, the last used first."""
     table = terminal.table("scene", "sensor", "pixels", "lights", "spp", "seed", "MB", "file")
     for entry in reversed(entries):
-        known, about = entry.origin, ["?"] * 6
-        if known is not None and entry.image_size is not None:
+        origin, cells = entry.origin, ["?"] * 6
+        if origin is not None and entry.image_size is not None:
             height, width = entry.image_size
-            about = [known.scene, known.sensor, f"{width}x{height}", str(entry.lights)]
-            about += [str(known.spp), str(known.seed)]
-        table.row(*about, f"{entry.size / 1e6:.0f}", entry.path.name)
+            cells = [origin.scene, origin.sensor, f"{width}x{height}", str(entry.lights)]
+            cells += [str(origin.spp), str(origin.seed)]
+        table.row(*cells, f"{entry.size / 1e6:.0f}", entry.path.name)
     terminal.print_table(table)
 
 
@@ -99,7 +99,7 @@ def show_suggestions(
     amounts = () if cd_per_unit is None else ("luminous", "flux")
     table = terminal.table(*headings, *amounts)
     for light in suggestions:
-        seen = light.photometry(cd_per_unit)
+        measured = light.photometry(cd_per_unit)
         table.row(
             light.name,
             spoken_position(light),
@@ -107,8 +107,8 @@ def show_suggestions(
             "W/sr",
             spoken_percent(light.gain_share),
             spoken_percent(light.missed_share),
-            seen.color,
-            *seen.amounts[: len(amounts)],
+            measured.color,
+            *measured.amounts[: len(amounts)],
         )
     terminal.print_table(table)
     terminal.write("paste this into <scene>, and solve again:")

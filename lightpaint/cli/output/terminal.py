@@ -45,13 +45,13 @@ class Rows(Table):
 
 def table(*columns: str) -> Rows:
     """Return an empty table with these headings."""
-    made = Rows(box=None, pad_edge=False, header_style="bold")
+    rows = Rows(box=None, pad_edge=False, header_style="bold")
     for column in columns:
-        made.add_column(column, no_wrap=True)
-    return made
+        rows.add_column(column, no_wrap=True)
+    return rows
 
 
-def print_table(made: Rows, swatches: Sequence[str | None] = ()) -> None:
+def print_table(rows: Rows, swatches: Sequence[str | None] = ()) -> None:
     """Print a table to stdout. Piped output has no width limit: nothing is cut.
 
     swatches: a colour like `#ffaa66` for each row, or None. They appear before the rows if the
@@ -61,12 +61,12 @@ def print_table(made: Rows, swatches: Sequence[str | None] = ()) -> None:
         return
     width = None if sys.stdout.isatty() else 1000
     page = Console(highlight=False, width=width, file=io.StringIO(), color_system=None)
-    page.print(made)
-    rows = page.file.getvalue().rstrip().split("\n")  # type: ignore[attr-defined]
+    page.print(rows)
+    printed = page.file.getvalue().rstrip().split("\n")  # type: ignore[attr-defined]
     if not (swatches and has_truecolour()):
-        write_lines("\n".join(rows))
+        write_lines("\n".join(printed))
         return
-    for row, color in zip(rows, (None, *swatches), strict=True):
+    for row, color in zip(printed, (None, *swatches), strict=True):
         lines.out(row.rstrip(), swatch=color or "")
 
 
@@ -82,10 +82,10 @@ def write(text: str) -> None:
         lines.out(text)
 
 
-def write_json(told: Mapping[str, Any]) -> None:
+def write_json(document: Mapping[str, Any]) -> None:
     """Print the results to stdout as a document for programs."""
     # json escapes all but ASCII, which has one more invisible character.
-    text = json.dumps(told, indent=2, allow_nan=False).replace("\x7f", "\\u007f")
+    text = json.dumps(document, indent=2, allow_nan=False).replace("\x7f", "\\u007f")
     for line in text.split("\n"):
         lines.out(line)
 

@@ -28,12 +28,12 @@ MIN_GAIN, SAME_DELTA_E = 1.0, 0.1
 def spoken_choice(choice: ColorChoice, chosen: ColorChoice) -> str:
     """Return `free: ΔE 2.1 instead of 2.6, but pendant turns green`."""
     gains = chosen.delta_e - choice.delta_e
-    told = f"ΔE {choice.delta_e:.1f} instead of {chosen.delta_e:.1f}"
+    text = f"ΔE {choice.delta_e:.1f} instead of {chosen.delta_e:.1f}"
     if abs(gains) < SAME_DELTA_E:
-        told = f"as close (ΔE {choice.delta_e:.1f})"
+        text = f"as close (ΔE {choice.delta_e:.1f})"
     turns = spoken_turn(choice)
     joint = ", but " if gains >= SAME_DELTA_E else ", and "
-    return f"{choice.colors}: {told}{joint + turns if turns else ''}"
+    return f"{choice.colors}: {text}{joint + turns if turns else ''}"
 
 
 def spoken_turn(choice: ColorChoice) -> str:
@@ -44,13 +44,13 @@ def spoken_turn(choice: ColorChoice) -> str:
     words = [hue_name(x) for x in (before, after)]
     whites = [cct_and_duv(x) for x in (before, after)]
     if words[0] != words[1]:
-        how = words[1]
+        word = words[1]
     elif words[0].endswith("white") and whites[0] and whites[1]:
-        how = "warmer" if whites[1][0] < whites[0][0] else "cooler"
+        word = "warmer" if whites[1][0] < whites[0][0] else "cooler"
     else:
         deeper = np.ptp(after) / after.max() > np.ptp(before) / before.max()
-        how = f"a {'deeper' if deeper else 'paler'} {words[1]}"
-    return f"{some_names([choice.light])} turns {how}"
+        word = f"a {'deeper' if deeper else 'paler'} {words[1]}"
+    return f"{some_names([choice.light])} turns {word}"
 
 
 def closer_choice(choices: Choices) -> str:
@@ -88,5 +88,5 @@ def _change_cell(choice: ColorChoice, chosen: ColorChoice) -> str:
     if choice is chosen:
         return ""
     gains = chosen.delta_e - choice.delta_e
-    near = "as close" if abs(gains) < SAME_DELTA_E else "closer" if gains > 0 else "farther"
-    return "; ".join(filter(None, (near, spoken_turn(choice))))
+    closeness = "as close" if abs(gains) < SAME_DELTA_E else "closer" if gains > 0 else "farther"
+    return "; ".join(filter(None, (closeness, spoken_turn(choice))))

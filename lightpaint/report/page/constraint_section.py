@@ -12,7 +12,7 @@ from lightpaint.lighting.solution import Solution
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.measures import relative_residual
 from lightpaint.report.page.figures import PagePicture, figure
-from lightpaint.report.page.html import SHOWN, SPARE, row, share_cell, table
+from lightpaint.report.page.html import ROWS_SHOWN, SPARE_ROWS, row, share_cell, table
 from lightpaint.report.phrases import spoken_percent
 
 #: Least width in pixels of reduced pictures; a whole factor gives up to twice as much.
@@ -37,16 +37,16 @@ def constraints_section(
     if free is None:
         return ""
     start = solution.weights
-    without, asked = (spoken_percent(relative_residual(x)) for x in (free, solution))
+    without, with_constraints = (spoken_percent(relative_residual(x)) for x in (free, solution))
     pictures = [
         (free.weights, "Without constraints", f"{without} missed."),
-        (start, "With the constraints", f"{asked} missed."),
+        (start, "With the constraints", f"{with_constraints} missed."),
     ]
     return (
         '<section><h2>What the constraints cost</h2><div class="explained"><div>'
         f"<p>Free to have any colour and brightness, the lights would miss {without} of the "
-        f"painted light (RMS). With the constraints, they miss {asked}. Both pictures are sums "
-        f"of the basis images.</p></div>{_curve(solution, free)}</div>"
+        f"painted light (RMS). With the constraints, they miss {with_constraints}. Both pictures "
+        f"are sums of the basis images.</p></div>{_curve(solution, free)}</div>"
         f'<div class="maps">{_figures(basis, pictures, transform, looks)}'
         f"{_numbers(basis, solution, transform, looks)}"
         "</div></section>"
@@ -58,28 +58,32 @@ def _curve(solution: Solution, free: Solution) -> str:
     curve = solution.certificate.curve
     if not curve:
         return ""
-    used, near = _used_count(solution), list(curve)
-    if len(curve) > SHOWN + SPARE:
-        near = sorted(sorted(curve, key=lambda point: abs(point[0] - used))[: SHOWN - 1])
-    told = [
-        *((_lights(count) + ", as asked" * (count == used), missed) for count, missed in near),
+    used_count, points = _used_count(solution), list(curve)
+    if len(curve) > ROWS_SHOWN + SPARE_ROWS:
+        nearest = sorted(curve, key=lambda point: abs(point[0] - used_count))
+        points = sorted(nearest[: ROWS_SHOWN - 1])
+    entries = [
+        *(
+            (_lights(count) + ", as asked" * (count == used_count), missed)
+            for count, missed in points
+        ),
         ("without constraints", relative_residual(free)),
-        *((_lights(count), missed) for count, missed in curve if (count, missed) not in near),
+        *((_lights(count), missed) for count, missed in curve if (count, missed) not in points),
     ]
-    rows = [row(what, share_cell(spoken_percent(x), min(x, 1.0))) for what, x in told]
+    rows = [row(label, share_cell(spoken_percent(x), min(x, 1.0))) for label, x in entries]
     heads = ("lights on, the best set found", "missed")
-    return f"<div>{table(heads, rows, shown=len(near) + 1)}</div>"
+    return f"<div>{table(heads, rows, shown=len(points) + 1)}</div>"
 
 
 def _numbers(
     basis: Basis, solution: Solution, transform: ViewTransform, looks: CleanLooks | None
 ) -> str:
     """Return, with `sparse`, pictures with fewer and with more lights."""
-    used, missed_with = _used_count(solution), dict(solution.certificate.curve)
+    used_count, missed_with = _used_count(solution), dict(solution.certificate.curve)
     pictures = [
         (weights, f"With {_lights(count)}", f"{spoken_percent(missed_with[count])} missed.")
         for count, weights in solution.tried
-        if count in missed_with and 0 < abs(count - used) <= NEIGHBOURS
+        if count in missed_with and 0 < abs(count - used_count) <= NEIGHBOURS
     ]
     return _figures(basis, pictures, transform, looks)
 

@@ -123,12 +123,12 @@ def _shares(diagnosis: Diagnosis) -> str:
     ]
     if d.compromise > 0:
         parts.insert(2, ("given up for the other views", d.compromise))
-    shares = [(what, d.share(part)) for what, part in parts]
-    rows = [row(what, share_cell(spoken_percent(x), x)) for what, x in shares]
+    shares = [(label, d.share(part)) for label, part in parts]
+    rows = [row(label, share_cell(spoken_percent(x), x)) for label, x in shares]
     if d.ignored > 0:
         times = d.ignored / d.total if d.total > 0 else np.inf
-        told = f"{times:.2g} times as much" if np.isfinite(times) else "all"
-        rows.append(row("elsewhere, where it does not count", told))
+        text = f"{times:.2g} times as much" if np.isfinite(times) else "all"
+        rows.append(row("elsewhere, where it does not count", text))
     return f'<table class="shares"><tbody>{"".join(rows)}</tbody></table>'
 
 
@@ -202,8 +202,8 @@ def _bounds(diagnosis: Diagnosis) -> str:
     ]
     if not rows:
         return ""
-    more = diagnosis.bounds_left_out
-    others = f"<p>{more} more seem to matter less and were not analysed.</p>" if more else ""
+    left_out = diagnosis.bounds_left_out
+    note = f"<p>{left_out} more seem to matter less and were not analysed.</p>" if left_out else ""
     meaning = (
         "<p>Gain: how much of the difference would go if this limit alone were removed. It is a"
         " share of everything that counts, including the unpainted parts that are held. A light"
@@ -214,15 +214,15 @@ def _bounds(diagnosis: Diagnosis) -> str:
     )
     return (
         '<div class="explained" style="margin-top: 32px"><div><h3>What limits the lights</h3>'
-        f"{others}{fold('How to read the table', meaning)}</div>"
+        f"{note}{fold('How to read the table', meaning)}</div>"
         f"<div>{table(BOUND_HEADS, rows, kind='bounds', shown=SHOWN_ROWS)}</div></div>"
     )
 
 
 def _bound_words(bound: Bound) -> str:
     """Return the bound in words; zero is called zero, unlike a wish for off."""
-    held = spoken_hold(bound)
-    return held.replace("off", "zero") if bound.kind == "zero" else held
+    channels = spoken_hold(bound)
+    return channels.replace("off", "zero") if bound.kind == "zero" else channels
 
 
 def _multiplier(bound: Bound) -> str:

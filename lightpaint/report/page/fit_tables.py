@@ -35,9 +35,14 @@ def fit_table(solution: Solution) -> str:
     q = solution.certificate
     norm2 = np.where(solution.norm2 > 0, solution.norm2, 1)
     errors = None if q.objective_error is None else np.array(q.objective_error)
-    each = [""] * 3 if errors is None else [f" ± {e:.1g}" for e in errors / norm2]
+    errors_text = [""] * 3 if errors is None else [f" ± {e:.1g}" for e in errors / norm2]
     columns = zip(
-        ("red", "green", "blue"), q.relative_objective, each, q.kkt_residual, q.sweeps, strict=True
+        ("red", "green", "blue"),
+        q.relative_objective,
+        errors_text,
+        q.kkt_residual,
+        q.sweeps,
+        strict=True,
     )
     rows = [
         row(name, f"{objective:.3g}{error}", f"{np.sqrt(objective):.3g}", f"{kkt:.1e}", f"{sweeps}")
@@ -77,9 +82,9 @@ def _power(v: Verification) -> list[tuple[str, str]]:
     """Return a row on the chance of detecting an error in each light, the smallest first."""
     if not v.power:
         return []
-    in_order = sorted(v.power.items(), key=lambda its: its[1])
-    told = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
-    return [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(told, room=400))]
+    in_order = sorted(v.power.items(), key=lambda item: item[1])
+    texts = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
+    return [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(texts, room=400))]
 
 
 def render_table(
@@ -93,30 +98,32 @@ def render_table(
     origin, q = basis.origin, solution.certificate
     height, width = basis.size
     stopped = f"no: stopped after {max(q.sweeps)} sweeps"
-    seen = int(basis.emitters_seen.sum())
-    out = int(ignored_paint(target, basis.emitters_seen, solution.problem.fit.emitters).sum())
+    emitter_pixels = int(basis.emitters_seen.sum())
+    ignored_pixels = int(
+        ignored_paint(target, basis.emitters_seen, solution.problem.fit.emitters).sum()
+    )
     adjusted = int((~basis.is_fixed).sum())
-    told: list[tuple[str, str]] = [
+    entries: list[tuple[str, str]] = [
         ("Solve converged", "yes" if q.converged else stopped),
         ("Lights", f"{adjusted}, of them {_lights_off(solution) or 'none'} off"),
         ("Image", f"{width} × {height} pixels{_full_size(basis, verification)}"),
         ("Basis", f"{origin.method}, {_samples(basis)}"),
         ("Integrator", f"{origin.integrator}, not the scene's own" if origin.integrator else ""),
-        ("Emitters seen directly", f"in {seen} pixels{_seen_note(out)}"),
+        ("Emitters seen directly", f"in {emitter_pixels} pixels{_seen_note(ignored_pixels)}"),
     ]
     missed, noise = relative_residual(solution), noise_residual(solution, predicted)
-    told.append(("Missed (RMS)", f"{missed:.3g} of what was asked; noise adds {noise:.3g}"))
-    told += _display_facts(solution, predicted)
+    entries.append(("Missed (RMS)", f"{missed:.3g} of what was asked; noise adds {noise:.3g}"))
+    entries += _display_facts(solution, predicted)
     for light in basis.lights:
         if light.is_fixed:
-            told.append(("Kept as they are", name_list(light.members)))
+            entries.append(("Kept as they are", name_list(light.members)))
     if q.unreached:
-        told.append(("Reach nothing painted, so kept", name_list(q.unreached)))
+        entries.append(("Reach nothing painted, so kept", name_list(q.unreached)))
     for channels in partly_reached(solution.lighting):
-        told.append(("Reach nothing painted in a channel", channels))
+        entries.append(("Reach nothing painted in a channel", channels))
     if target.not_finite:
-        told.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
-    return facts([(what, value) for what, value in told if value])
+        entries.append(("NaN or Inf in the target", f"{target.not_finite} pixels, not counted"))
+    return facts([(label, value) for label, value in entries if value])
 
 
 def _display_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, str]]:
@@ -124,9 +131,9 @@ def _display_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, s
     if solution.problem.is_linear or solution.reweighting is None:
         return []
     q = solution.certificate
-    told: list[tuple[str, str]] = []
+    entries: list[tuple[str, str]] = []
     if q.display:
-        told += [
+        entries += [
             ("Fitted in display space", f"as {q.display} shows it"),
             (
                 "Missed on the display",
@@ -142,8 +149,8 @@ def _display_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, s
     if (at_least := count_at_least_pixels(solution, predicted.image)) is not None:
         pixels, brighter = at_least
         text = f"{pixels} pixels, {brighter} of which are brighter now"
-        told.append(("Painted as at least so bright", text))
-    return [*told, ("Linear problems solved", f"{q.rounds}, each certified")]
+        entries.append(("Painted as at least so bright", text))
+    return [*entries, ("Linear problems solved", f"{q.rounds}, each certified")]
 
 
 def _samples(basis: Basis) -> str:
@@ -164,7 +171,11 @@ def versions(basis: Basis) -> str:
     parts = [f"lightpaint {__version__}"]
     if basis.origin.lightpaint != __version__:
         parts[0] += f" (basis by {basis.origin.lightpaint})"
-    parts += [f"{name} {its}" for name in ("mitsuba", "drjit", "numpy") if (its := version(name))]
+    parts += [
+        f"{name} {installed}"
+        for name in ("mitsuba", "drjit", "numpy")
+        if (installed := version(name))
+    ]
     software = Software.here()
     parts.append(f"{software.blas} {software.kernel}".strip())
     return " · ".join([*parts, f"Python {platform.python_version()}"])
@@ -174,5 +185,5 @@ def _lights_off(solution: Solution) -> int:
     return sum(not any(light.emission) for light in solution.lighting.lights)
 
 
-def _seen_note(out: int) -> str:
-    return f", of which {out} were painted and do not count" if out else ""
+def _seen_note(ignored_pixels: int) -> str:
+    return f", of which {ignored_pixels} were painted and do not count" if ignored_pixels else ""

@@ -12,11 +12,11 @@ class Html(str):
 
 #: Rows of a table, or names of a list, that are shown of many, and the most others that need no
 #: fold.
-SHOWN, SPARE = 10, 3
+ROWS_SHOWN, SPARE_ROWS = 10, 3
 
 
 def table(
-    headings: Iterable[str], rows: Sequence[str], *, kind: str = "", shown: int = SHOWN
+    headings: Iterable[str], rows: Sequence[str], *, kind: str = "", shown: int = ROWS_SHOWN
 ) -> str:
     """Return a table under its headings, the most important rows first; the rest of many is folded.
 
@@ -30,7 +30,7 @@ def table(
             f"</thead><tbody>{''.join(rows)}</tbody></table></div>"
         )
 
-    if len(rows) <= shown + SPARE:
+    if len(rows) <= shown + SPARE_ROWS:
         return part(rows)
     return part(rows[:shown]) + fold(f"{len(rows) - shown} more", part(rows[shown:]))
 
@@ -49,8 +49,8 @@ def breakable_name(name: str) -> Html:
 def name_list(names: Sequence[str]) -> Html:
     """Return names with commas, escaped; the rest of many is folded."""
     first, more = names, ""
-    if len(names) > SHOWN + SPARE:
-        first, rest = names[:SHOWN], names[SHOWN:]
+    if len(names) > ROWS_SHOWN + SPARE_ROWS:
+        first, rest = names[:ROWS_SHOWN], names[ROWS_SHOWN:]
         more = fold(f"and {len(rest)} more", ", ".join(map(breakable_name, rest)))
     return Html(", ".join(map(breakable_name, first)) + more)
 
@@ -73,7 +73,7 @@ def share_cell(text: str, share: float) -> str:
     )
 
 
-def facts(told: Iterable[tuple[str, Any]]) -> str:
+def facts(entries: Iterable[tuple[str, Any]]) -> str:
     """Return terms with their values, which are escaped here unless they are HTML."""
-    texts = ((k, v if isinstance(v, Html) else escape(str(v))) for k, v in told)
+    texts = ((k, v if isinstance(v, Html) else escape(str(v))) for k, v in entries)
     return "".join(f"<dt>{escape(k)}</dt><dd>{v}</dd>" for k, v in texts)

@@ -23,7 +23,7 @@ from lightpaint.report.basis_memo import make_once
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
-from lightpaint.report.page.html import SHOWN, SPARE, breakable_name, fold, share_cell
+from lightpaint.report.page.html import ROWS_SHOWN, SPARE_ROWS, breakable_name, fold, share_cell
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.uncertainty_sentences import (
     UNTOLD,
@@ -61,19 +61,19 @@ def lights_table(
     """
     is_clean = is_clean and len(basis.lights) <= MAX_CLEAN_THUMBNAILS
     rows = _rows(basis, solution, uncertainty, is_clean=is_clean)
-    if len(rows) <= SHOWN + SPARE:
+    if len(rows) <= ROWS_SHOWN + SPARE_ROWS:
         return _table(rows, solution)
     shares = largest_shares(basis, solution.lighting)
     most = most_visible_lights(basis, solution.lighting)
     rest = np.setdiff1d(np.arange(len(rows)), most)
-    told = (
+    note = (
         f"{len(rest)} more lights, each at most "
         f"{spoken_percent(float(shares[rest].max()))} of the picture, now or as solved"
     )
     return (
         f"<p>The {len(most)} lights with the largest shares of the picture, now or as solved.</p>"
         + _table([rows[k] for k in most], solution)
-        + fold(told, _table([rows[k] for k in rest], solution))
+        + fold(note, _table([rows[k] for k in rest], solution))
     )
 
 
@@ -102,11 +102,11 @@ def _rows(
         name, setting = escape(light.name), settings[light.name]
         error = UNTOLD_HERE if errors[k] == UNTOLD else errors[k]
         error = f" <small>{error}</small>" if error else ""
-        what = f"What {name} lights alone, shown at {stops:+.1f} stops"
+        caption = f"What {name} lights alone, shown at {stops:+.1f} stops"
         rows.append(
             f'<tr><td class="thumb"><img src="{uri}" '
-            f'width="{shape[1]}" height="{shape[0]}" alt="{what}" '
-            f'title="{what}"></td>'
+            f'width="{shape[1]}" height="{shape[0]}" alt="{caption}" '
+            f'title="{caption}"></td>'
             f'<th scope="row" class="name">{breakable_name(light.name)}'
             f"<small>{escape(light.plugin)}"
             f"{' · ' + escape(light.form) if light.form else ''}</small></th>"
@@ -126,21 +126,24 @@ def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int,
         picture, stops = thumbnail(basis.planes.plane(k), basis.emitters_seen, is_clean=is_clean)
         return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
 
-    every = range(len(basis.lights))
-    return make_once(basis, ("thumbnails", is_clean), lambda: in_turns(shown, every, basis.size))
+    all_lights = range(len(basis.lights))
+    return make_once(
+        basis, ("thumbnails", is_clean), lambda: in_turns(shown, all_lights, basis.size)
+    )
 
 
 def _emission_cells(light: BasisLight, setting: LightSetting, lighting: Lighting) -> str:
     """Return cells with colour, emission before and after, their unit, and photometry."""
-    seen = lighting.photometry(setting)
+    measured = lighting.photometry(setting)
     if light.is_fixed:
         return "".join(f'<td class="{kind}"></td>' for kind, _ in COLUMNS[2:7])
     return (
-        f'<td class="colour">{_swatch(setting, seen)}</td>'
+        f'<td class="colour">{_swatch(setting, measured)}</td>'
         f'<td class="rgb now">{_rgb(light.emission)}</td>'
         f'<td class="rgb new">{_rgb(setting.emission, setting.reached)}</td>'
         f'<td class="unit">{escape(light.parameter)} <small>{escape(light.unit)}</small></td>'
-        f'<td class="rgb amount{" flux" * (lighting.cd_per_unit is None)}">{_amounts(seen)}</td>'
+        f'<td class="rgb amount{" flux" * (lighting.cd_per_unit is None)}">'
+        f"{_amounts(measured)}</td>"
     )
 
 
@@ -152,14 +155,14 @@ def change(light: BasisLight, setting: LightSetting) -> str:
         return "kept as it is"
     if not any(setting.reached):
         return "unchanged: reaches nothing painted"
-    kept = f"<small>{unreached_channels(setting)} kept: reaches nothing painted</small>"
-    return _changed(light, setting) + (kept if setting.is_partly_reached else "")
+    note = f"<small>{unreached_channels(setting)} kept: reaches nothing painted</small>"
+    return _changed(light, setting) + (note if setting.is_partly_reached else "")
 
 
 def _changed(light: BasisLight, setting: LightSetting) -> str:
-    its = np.array(setting.reached)
-    before = float(luminance(np.where(its, light.emission, 0)))
-    after = float(luminance(np.where(its, setting.emission, 0)))
+    is_reached = np.array(setting.reached)
+    before = float(luminance(np.where(is_reached, light.emission, 0)))
+    after = float(luminance(np.where(is_reached, setting.emission, 0)))
     if after == 0:
         return "off" if before > 0 else "stays off"
     if before == 0:
@@ -170,8 +173,8 @@ def _changed(light: BasisLight, setting: LightSetting) -> str:
 
 def _constraint_note(setting: LightSetting) -> str:
     """Return the constraint on a light, and whether it holds the light."""
-    holds = " (limits it)" if setting.is_active else ""
-    return f" <small>{escape(setting.constraint)}{holds}</small>" if setting.constraint else ""
+    note = " (limits it)" if setting.is_active else ""
+    return f" <small>{escape(setting.constraint)}{note}</small>" if setting.constraint else ""
 
 
 def hex_color(emission: RGB) -> str | None:
@@ -179,35 +182,35 @@ def hex_color(emission: RGB) -> str | None:
     return rgb_to_hex(np.array(emission)) if any(emission) else None
 
 
-def _swatch(setting: LightSetting, seen: Photometry) -> str:
+def _swatch(setting: LightSetting, measured: Photometry) -> str:
     """Return the colour of a light; for a multiplier, the colour of its factor."""
     if setting.is_partly_reached:
         return '<span class="swatch none"></span><small>not known</small>'
     emission = setting.emission
-    color = seen.hex or hex_color(emission)
+    color = measured.hex or hex_color(emission)
     if color is None or not any(emission):
         return '<span class="swatch none"></span> <small>off</small>'
-    kelvin = "" if seen.kelvin is None else f"{seen.kelvin:.0f} K"
-    away = "" if seen.duv is None else f"Duv {seen.duv:+.3f}".replace("-", "−")
+    kelvin = "" if measured.kelvin is None else f"{measured.kelvin:.0f} K"
+    away = "" if measured.duv is None else f"Duv {measured.duv:+.3f}".replace("-", "−")
     return (
         f'<span class="swatch" style="background: {color}"></span><code>{color}</code>'
         f"{f' <small>{kelvin}</small> <small>{away}</small>' if kelvin else ''}"
     )
 
 
-def _amounts(seen: Photometry) -> str:
+def _amounts(measured: Photometry) -> str:
     """Return luminous quantity and flux; without a scale, the relative flux."""
-    if seen.luminous is not None or seen.flux_lm is not None:
-        return " <br>".join(filter(None, seen.amounts))
-    return "" if seen.flux_y is None else f"{seen.flux_y:.3g}"
+    if measured.luminous is not None or measured.flux_lm is not None:
+        return " <br>".join(filter(None, measured.amounts))
+    return "" if measured.flux_y is None else f"{measured.flux_y:.3g}"
 
 
 def _rgb(emission: RGB, reached: Sequence[bool] = ALL_REACHED) -> str:
     """Return a line for each channel, in brackets if it is undetermined."""
     if not any(emission):
         return "off"
-    told = zip(emission, reached, strict=True)
-    return " <br>".join(f"{v:.4g}" if tells else f"({v:.4g})" for v, tells in told)
+    channels = zip(emission, reached, strict=True)
+    return " <br>".join(f"{v:.4g}" if is_reached else f"({v:.4g})" for v, is_reached in channels)
 
 
 def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
@@ -219,7 +222,7 @@ def largest_shares(basis: Basis, lighting: Lighting) -> Doubles:
 def most_visible_lights(basis: Basis, lighting: Lighting) -> Indices:
     """Return places of the lights to show of many, those with the largest shares; all of few."""
     count = len(basis.lights)
-    if count <= SHOWN + SPARE:
+    if count <= ROWS_SHOWN + SPARE_ROWS:
         return np.arange(count)
     shares = largest_shares(basis, lighting)
-    return np.sort(np.argsort(-shares, kind="stable")[:SHOWN])
+    return np.sort(np.argsort(-shares, kind="stable")[:ROWS_SHOWN])

@@ -131,9 +131,11 @@ def planes_for_page(basis: Basis, *, is_clean: bool) -> tuple[list[int], list[di
 
     is_clean: whether they are denoised.
     """
-    every = np.arange(len(basis.lights))
+    all_lights = np.arange(len(basis.lights))
     return make_once(
-        basis, ("mixer", is_clean), lambda: _compact_planes(basis, every, [], is_clean=is_clean)
+        basis,
+        ("mixer", is_clean),
+        lambda: _compact_planes(basis, all_lights, [], is_clean=is_clean),
     )
 
 
@@ -146,10 +148,10 @@ def _compact_planes(
 
     def small(k: int) -> Floats:
         if k >= len(lights):
-            made = (planes or basis).mix(mixes[k - len(lights)])
+            mixed = (planes or basis).mix(mixes[k - len(lights)])
         else:
-            made = planes.plane(lights[k]) if planes else basis.planes.plane(lights[k])
-        return np.asarray(block_mean(made, factor), np.float32)
+            mixed = planes.plane(lights[k]) if planes else basis.planes.plane(lights[k])
+        return np.asarray(block_mean(mixed, factor), np.float32)
 
     pictures = in_turns(small, range(len(lights) + len(mixes)), basis.size)
     if is_clean and planes is None and factor < CLEAN_REDUCTION:
@@ -179,9 +181,11 @@ def light_data(light: BasisLight) -> dict[str, Any]:
 
 
 def _kelvin(emission: Any, unit: str) -> float | None:
-    seen = photometry(emission, unit=unit)
-    is_white = seen.kelvin is not None and seen.duv is not None and abs(seen.duv) <= WHITE
-    return seen.kelvin if is_white else None
+    measured = photometry(emission, unit=unit)
+    is_white = (
+        measured.kelvin is not None and measured.duv is not None and abs(measured.duv) <= WHITE
+    )
+    return measured.kelvin if is_white else None
 
 
 def _rest(basis: Basis, lighting: Lighting, shown: Indices) -> dict[str, Any] | None:
@@ -210,7 +214,7 @@ def kelvin_colors() -> list[Any]:
 
 def transform_data(transform: ViewTransform) -> dict[str, Any]:
     """Return a transform for the page: sRGB by name, a curve, or a lattice if channels mix."""
-    about: dict[str, Any] = {"stops": transform.stops, "low": LOW, "high": HIGH}
+    data: dict[str, Any] = {"stops": transform.stops, "low": LOW, "high": HIGH}
     plain = ViewTransform(transform.name)
     curve, lattice = None, None
     if transform.name != "srgb" and transform.is_per_channel:
@@ -218,7 +222,7 @@ def transform_data(transform: ViewTransform) -> dict[str, Any]:
     elif transform.name != "srgb":
         table = lattice_of(plain, SIDE, LOW, HIGH).reshape(SIDE * SIDE, SIDE, 3)
         lattice = _plane_data(pack_picture(table, dropped=1))
-    return {**about, "curve": curve, "lattice": lattice}
+    return {**data, "curve": curve, "lattice": lattice}
 
 
 def _painting(painting: Floats, basis: Basis, count: int) -> str:
@@ -231,9 +235,14 @@ def plane_data(picture: Floats) -> dict[str, Any]:
     return _plane_data(pack_picture(picture))
 
 
-def _plane_data(its: PackedPicture) -> dict[str, Any]:
-    data = "data:;base64," + base64.b64encode(its.data).decode("ascii")
-    return {"data": data, "scale": its.scale, "dropped": its.dropped, "size": list(its.size)}
+def _plane_data(picture: PackedPicture) -> dict[str, Any]:
+    data = "data:;base64," + base64.b64encode(picture.data).decode("ascii")
+    return {
+        "data": data,
+        "scale": picture.scale,
+        "dropped": picture.dropped,
+        "size": list(picture.size),
+    }
 
 
 def lighting_data(lighting: Lighting) -> dict[str, Any]:

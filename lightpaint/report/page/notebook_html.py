@@ -79,17 +79,19 @@ def lighting_html(lighting: Lighting) -> str:
 
     def row(k: int) -> Sequence[str]:
         light = lighting.lights[k]
-        seen = lighting.photometry(light)
-        asked = "kept" if light.is_fixed else light.constraint
-        asked = ", ".join(filter(None, (asked, UNTOLD_HERE if light.untold else "")))
-        colour, output = _swatch(light.emission, seen), " ".join(seen.amounts)
+        measured = lighting.photometry(light)
+        constraint = "kept" if light.is_fixed else light.constraint
+        constraint = ", ".join(filter(None, (constraint, UNTOLD_HERE if light.untold else "")))
+        colour, output = _swatch(light.emission, measured), " ".join(measured.amounts)
         if light.is_partly_reached:
             colour = _Markup("")
-        return light.name, colour, _rgb(light.emission), light.unit, output, asked
+        return light.name, colour, _rgb(light.emission), light.unit, output, constraint
 
-    told = "" if lighting.certificate is None else f"<p>{escape(str(lighting.certificate))}</p>"
+    certificate = (
+        "" if lighting.certificate is None else f"<p>{escape(str(lighting.certificate))}</p>"
+    )
     heads = ("light", "colour", "emission", "unit", "output", "asked")
-    return told + _table(heads, row, _sizes(lighting.lights))
+    return certificate + _table(heads, row, _sizes(lighting.lights))
 
 
 @html_of.register
@@ -101,26 +103,27 @@ def solution_html(solution: Solution) -> str:
     def row(k: int) -> Sequence[str]:
         light, setting = basis.lights[k], lighting.lights[k]
         # What a page of the report stacks stands in a line here.
-        told = change(light, setting).replace("<small>", " ").replace("</small>", "")
-        told += f", {UNTOLD_HERE}" if setting.untold else ""
+        change_text = change(light, setting).replace("<small>", " ").replace("</small>", "")
+        change_text += f", {UNTOLD_HERE}" if setting.untold else ""
         colour = _swatch(setting.emission, lighting.photometry(setting))
         colour = _Markup("") if setting.is_partly_reached else colour
         now, new = _rgb(light.emission), _rgb(setting.emission)
-        return light.name, colour, now, new, told, setting.constraint
+        return light.name, colour, now, new, change_text, setting.constraint
 
-    moved = np.abs(solution.weights - basis.present_weights) * basis.totals @ LUMINANCE
+    change_size = np.abs(solution.weights - basis.present_weights) * basis.totals @ LUMINANCE
     heads = ("light", "colour", "now", "new", "change", "asked")
-    return f"<p>{escape(str(solution.certificate))}</p>" + _table(heads, row, moved)
+    return f"<p>{escape(str(solution.certificate))}</p>" + _table(heads, row, change_size)
 
 
 @html_of.register
 def verification_html(verification: Verification) -> str:
     """Return the render, and whether it agrees with the prediction."""
-    said = agreement(verification)
+    sentence = agreement(verification)
     return (
         _picture("verified", [verification.verified.image], _transform(verification.verified.image))
-        + f"<p>{escape(said[0].upper() + said[1:])}; ΔE2000 {verification.delta_e_mean:.2f} on "
-        f"average, below {verification.delta_e_95:.2f} in 95 % of the pixels.</p>"
+        + f"<p>{escape(sentence[0].upper() + sentence[1:])}; ΔE2000 "
+        f"{verification.delta_e_mean:.2f} on average, below {verification.delta_e_95:.2f} in 95 % "
+        "of the pixels.</p>"
     )
 
 
@@ -139,10 +142,10 @@ def look_html(
         images.append(covered(verification.verified.image, predicted.size))
         names.append("verified")
     transform = report_transform(target, solution.basis, predicted.image)
-    said = verdict(solution, predicted, verification, appearance=appearance)
+    sentence = verdict(solution, predicted, verification, appearance=appearance)
     return (
         _picture(", ".join(names), images, transform, paintings=1)
-        + f"<p>{', '.join(names)}</p><p>{escape(said)}</p>{solution_html(solution)}"
+        + f"<p>{', '.join(names)}</p><p>{escape(sentence)}</p>{solution_html(solution)}"
     )
 
 
@@ -189,15 +192,15 @@ def _table(heads: Sequence[str], row: Callable[[int], Sequence[str]], sizes: Any
     """
 
     def cells(kind: str, texts: Iterable[str]) -> str:
-        made = (x if isinstance(x, _Markup) else escape(_shorten(x)) for x in texts)
-        row = "".join(f'<{kind} style="{CELL}">{x}</{kind}>' for x in made)
+        texts_html = (x if isinstance(x, _Markup) else escape(_shorten(x)) for x in texts)
+        row = "".join(f'<{kind} style="{CELL}">{x}</{kind}>' for x in texts_html)
         return f"<tr>{row}</tr>"
 
     chosen = _largest_indices(np.asarray(sizes, np.float64), MAX_LIGHTS)
     body = "".join(cells("td", row(k)) for k in chosen)
     left = len(sizes) - len(chosen)
-    more = f"<p>… and {left} more, which matter less</p>" if left else ""
-    return f"<table>{cells('th', heads)}{body}</table>{more}"
+    note = f"<p>… and {left} more, which matter less</p>" if left else ""
+    return f"<table>{cells('th', heads)}{body}</table>{note}"
 
 
 class _Markup(str):
@@ -225,13 +228,13 @@ def _rgb(emission: RGB) -> str:
     return " ".join(f"{v:.4g}" for v in emission) if any(emission) else "off"
 
 
-def _swatch(emission: RGB, seen: Photometry) -> _Markup:
+def _swatch(emission: RGB, measured: Photometry) -> _Markup:
     """Return the colour of a light; for a multiplier, the colour of its factor."""
-    color = (seen.hex or hex_color(emission)) if any(emission) else None
+    color = (measured.hex or hex_color(emission)) if any(emission) else None
     if color is None:
         return _Markup("")
     box = f"display: inline-block; width: 1em; height: 1em; background: {color}"
-    kelvin = "" if seen.kelvin is None else f" {seen.kelvin:.0f} K"
+    kelvin = "" if measured.kelvin is None else f" {measured.kelvin:.0f} K"
     return _Markup(f'<span style="{box}" title="{color}"></span>{kelvin}')
 
 

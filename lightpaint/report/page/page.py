@@ -39,7 +39,7 @@ from lightpaint.report.page.constraint_section import constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.page.figures import PagePicture, maps, wipe
 from lightpaint.report.page.fit_tables import fit_table, render_table, verification_table, versions
-from lightpaint.report.page.html import SHOWN, SPARE
+from lightpaint.report.page.html import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.page.lights_table import lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.suggestion_section import suggestion_section
@@ -103,13 +103,13 @@ def report_page(
         ),
         "lights": partial(lights_table, basis, solution, uncertainty, is_clean=looks.is_clean),
     }
-    made = in_turns(lambda make: make(), tuple(making.values()), basis.size)
-    drawn = dict(zip(making, made, strict=True))
-    drawn["missed"] += drawn.pop("constraints") + colors_section(color_choices)
-    drawn["mixer"] += mixer_assets()
+    results = in_turns(lambda make: make(), tuple(making.values()), basis.size)
+    parts = dict(zip(making, results, strict=True))
+    parts["missed"] += parts.pop("constraints") + colors_section(color_choices)
+    parts["mixer"] += mixer_assets()
     template = resources.files("lightpaint.report.page").joinpath("page.html.in")
     return Template(template.read_text(encoding="utf-8")).substitute(
-        **drawn,
+        **parts,
         **_texts(basis, target, solution, predicted, verification, appearance),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
         suggestions=suggestion_section(
@@ -149,7 +149,7 @@ def _texts(
 
 def prepare_page(basis: Basis) -> None:
     """Make the parts of a page that depend on the basis alone; `report_page` then finds them."""
-    if len(basis.lights) <= SHOWN + SPARE:
+    if len(basis.lights) <= ROWS_SHOWN + SPARE_ROWS:
         planes_for_page(basis, is_clean=True)
     thumbnails_of(basis, is_clean=len(basis.lights) <= MAX_CLEAN_THUMBNAILS)
 
@@ -166,8 +166,8 @@ def _wipe(
 
     def picture(name: str, alt: str, clean: Floats, noisy: Floats) -> PagePicture:
         size = looks.predicted.shape[:2]
-        both = [to_8_bit(covered(transform.encode(x), size)) for x in (clean, noisy)]
-        return PagePicture(name, alt, both[0], both[1] if looks.is_clean else None)
+        pair = [to_8_bit(covered(transform.encode(x), size)) for x in (clean, noisy)]
+        return PagePicture(name, alt, pair[0], pair[1] if looks.is_clean else None)
 
     pictures = [
         picture("now", "The scene as it is.", looks.current, raw.current),
@@ -184,8 +184,8 @@ def _wipe(
         ),
     ]
     if looks.verified is not None and raw.verified is not None:
-        about = "An independent render of the relit scene."
-        pictures.append(picture("render", about, looks.verified, raw.verified))
+        caption = "An independent render of the relit scene."
+        pictures.append(picture("render", caption, looks.verified, raw.verified))
     return wipe(pictures)
 
 
@@ -230,15 +230,17 @@ def _notes(remarks: list[str]) -> str:
     return "".join(f'<p class="note">{escape(remark)}.</p>' for remark in remarks)
 
 
-def _exposure(transform: ViewTransform, predicted: Floats, how: str) -> str:
+def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
     """Return how linear light became these pictures, and how much of it they cannot show."""
-    at = f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
+    exposure_text = (
+        f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
+    )
     clipped = brighter_than_white(predicted, transform)
-    text = f"All at {at}, {'sRGB' if transform.name == 'srgb' else transform.name}."
+    text = f"All at {exposure_text}, {'sRGB' if transform.name == 'srgb' else transform.name}."
     if clipped > 0:
         text += f" {max(100 * clipped, 0.1):.1f} % of the prediction is brighter than white."
-    if how:
-        text += f" Denoised by {escape(how)}; all numbers and maps are of the raw renders."
+    if origin:
+        text += f" Denoised by {escape(origin)}; all numbers and maps are of the raw renders."
     return text
 
 

@@ -51,7 +51,7 @@ def suggestion_section(
     """
     if suggestions is None:
         return ""
-    how = (
+    method = (
         "<p>Each is a point light that was tried in free space, with all lights solved again "
         "together with it and those above it. Paste it into <code>&lt;scene&gt;</code> and "
         "solve again; the small pictures are previews.</p>"
@@ -69,7 +69,7 @@ def suggestion_section(
     )
     return (
         f"<section><h2>Lights that would help</h2><p>{escape(spoken_suggestions(suggestions))}</p>"
-        f"{how}{shown}</section>"
+        f"{method}{shown}</section>"
     )
 
 
@@ -79,19 +79,21 @@ def _suggestion_html(
     """Return one suggested light. before: whether there are earlier ones, which are in both
     pictures.
     """
-    seen = suggestion.photometry(cd_per_unit)
-    amounts = ", ".join(filter(None, seen.amounts))
-    told = [
+    measured = suggestion.photometry(cd_per_unit)
+    amounts = ", ".join(filter(None, measured.amounts))
+    entries = [
         ("at", spoken_position(suggestion)),
         ("intensity", f"{' '.join(f'{v:.4g}' for v in suggestion.emission)} W/sr"),
-        ("colour", seen.color),
+        ("colour", measured.color),
         ("amount", amounts),
         ("removes", f"{spoken_percent(suggestion.gain_share)} of the difference"),
         ("leaves", f"{spoken_percent(suggestion.missed_share)} of it"),
     ]
-    listed = facts((k, v) for k, v in told if v)
-    swatch = f'<span class="swatch" style="background: {seen.hex}"></span>' if seen.hex else ""
-    where = (
+    listed = facts((k, v) for k, v in entries if v)
+    swatch = (
+        f'<span class="swatch" style="background: {measured.hex}"></span>' if measured.hex else ""
+    )
+    position = (
         "the ring marks its position, which may be hidden"
         if suggestion.seen_at
         else "its position is outside the picture"
@@ -101,19 +103,23 @@ def _suggestion_html(
     return (
         f'<h3 style="margin-top:24px">{name}</h3><div class="maps">'
         f"{_picture(suggestion.without, f'Without {name}', without, None, transform)}"
-        f"{_picture(suggestion.with_it, f'With {name}', where, suggestion.seen_at, transform)}"
+        f"{_picture(suggestion.with_it, f'With {name}', position, suggestion.seen_at, transform)}"
         f"<div>{swatch}<dl>{listed}</dl></div></div>"
         f'<pre style="margin-top:12px">{escape(suggestion.xml)}</pre>'
     )
 
 
 def _picture(
-    image: Floats, name: str, caption: str, at: tuple[float, float] | None, transform: ViewTransform
+    image: Floats,
+    name: str,
+    caption: str,
+    mark: tuple[float, float] | None,
+    transform: ViewTransform,
 ) -> str:
     height, width = image.shape[:2]
     ring = ""
-    if at is not None:
-        place = f"left:{100 * at[0]:.2f}%;top:{100 * at[1]:.2f}%"
+    if mark is not None:
+        place = f"left:{100 * mark[0]:.2f}%;top:{100 * mark[1]:.2f}%"
         ring = f'<span style="{RING};{place}" aria-hidden="true"></span>'
     source = data_uri(to_8_bit(transform.encode(image)))
     return (

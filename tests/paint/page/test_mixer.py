@@ -17,7 +17,7 @@ from lightpaint.colour.display.transform_table import curve_of, lattice_of
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.packed_picture import BRIGHTEST, DROPPED_BITS, PackedPicture, pack_picture
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.report.page.html import SHOWN
+from lightpaint.report.page.html import ROWS_SHOWN
 from lightpaint.report.page.mixer import mixer_assets, mixer_html
 from lightpaint.report.page.page import report_page
 
@@ -256,16 +256,16 @@ def test_of_hundreds_of_lights_the_rest_is_one(make_basis: Any, opened: Any) -> 
     basis = lit(make_basis, 60)
     transform, answer = shown_through(basis), solved(basis)[1].weights
     page = opened(report(basis))
-    assert page.locator(".mixer-light").count() == SHOWN + 1
+    assert page.locator(".mixer-light").count() == ROWS_SHOWN + 1
     check(page, codes(basis, answer, transform))
     page.get_by_text("Reset to now").click()
     check(page, codes(basis, basis.present_weights, transform))
     data = json.loads(page.locator(".mixer script").inner_text())
-    assert len(data["rest"]["answer"]) == 60 - SHOWN
+    assert len(data["rest"]["answer"]) == 60 - ROWS_SHOWN
     rest = [basis.names.index(name) for name in data["rest"]["present"]]
     weights = basis.present_weights.copy()
     weights[rest] *= 2
-    move(page, SHOWN, 0, 1)
+    move(page, ROWS_SHOWN, 0, 1)
     check(page, codes(basis, weights, transform))
 
 
