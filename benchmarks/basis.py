@@ -4,7 +4,8 @@
 
 12 lights are the gallery's; larger numbers hang in a hall made for the purpose. Everything
 runs in one process with its kernels warm, in turns, and ratios are taken between neighbours
-in time. Loading is not counted. Variance is that of a plane, averaged over pixels and
+in time. Seconds are the processor's, of all threads, so other work on the machine matters little;
+loading is not counted. Variance is that of a plane, averaged over pixels and
 channels, from the difference of two independent halves; "at equal time" divides by what the
 samples cost. Where there are many lights, only M of them, evenly spread over the list, are
 rendered alone, and their time is scaled to all.
@@ -35,7 +36,7 @@ HALL_SIZE = {"width": 480, "height": 270}
 
 
 class Run(NamedTuple):
-    """Seconds, and the variance of the mean of each plane."""
+    """Seconds of the processor, and the variance of the mean of each plane."""
 
     seconds: float
     variances: npt.NDArray[np.float64]
@@ -87,10 +88,10 @@ def one_pass(scene: Scene, spp: int, *, seed: int) -> Run:
     begun: list[float] = []
 
     def progress(_label: str, _done: int, _total: int) -> None:
-        begun.append(time.perf_counter())
+        begun.append(time.process_time())
 
     basis = render_basis(scene, spp=spp, seed=seed, progress=progress)
-    seconds = time.perf_counter() - begun[0]
+    seconds = time.process_time() - begun[0]
     variances = np.square(basis.half_differences, dtype=np.float64).mean(axis=(1, 2, 3))
     del basis
     gc.collect()
@@ -116,9 +117,9 @@ def _render(
     scene: Scene, emission: dict[str, tuple[float, float, float]], spp: int, seed: int
 ) -> Run:
     loaded = scene.load(emission)
-    start = time.perf_counter()
+    start = time.process_time()
     image = render_loaded(loaded, scene, spp=spp, seed=seed, stream=Stream.TEMPLATE)
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     del loaded
     gc.collect()
     return Run(
