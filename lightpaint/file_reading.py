@@ -23,7 +23,7 @@ _Result = TypeVar("_Result")
 
 def file_length(
     path: Path,
-    what: str,
+    kind: str,
     error: type[LightpaintError],
     *,
     limit: int = MAX_TEXT,
@@ -33,27 +33,27 @@ def file_length(
 
     Reading a device, a pipe or a socket might never end, so this comes before any reading. Files
     under /proc, which claim to be empty, might not end either; a file on a drive that is away never
-    begins. what: the kind of file that is expected.
+    begins. kind: of file that is expected.
     """
-    article = "an" if what[0] in "aeiou" else "a"
+    article = "an" if kind[0] in "aeiou" else "a"
     try:
         status, is_sparse = _call_in_time(lambda: _stat(Path(path), limit))
     except (FileNotFoundError, NotADirectoryError):
-        raise error(f"no such {what}: {path}") from None
+        raise error(f"no such {kind}: {path}") from None
     except (OSError, ValueError) as reason:  # a name too long, or with a NUL in it
         detail = getattr(reason, "strerror", None) or reason
         raise error(f"cannot read {one_line(str(path))}: {detail}") from None
     if stat.S_ISDIR(status.st_mode):
-        raise error(f"{path} is a folder, not {article} {what}")
+        raise error(f"{path} is a folder, not {article} {kind}")
     if not stat.S_ISREG(status.st_mode):
-        raise error(f"{path} is a device or a pipe, not {article} {what}")
+        raise error(f"{path} is a device or a pipe, not {article} {kind}")
     if status.st_size > limit:
         raise error(
-            f"{path} is {status.st_size} bytes long: no {what} has more than {limit}, so it is not "
+            f"{path} is {status.st_size} bytes long: no {kind} has more than {limit}, so it is not "
             "read"
         )
     if status.st_size == 0 and (_is_virtual(status) or not may_be_empty):
-        raise error(f"{path} is empty, or only made up when it is read: expected {article} {what}")
+        raise error(f"{path} is empty, or only made up when it is read: expected {article} {kind}")
     if is_sparse:
         raise error(
             f"{path} is {status.st_size} bytes long, and nearly all of it was never written"
@@ -135,7 +135,7 @@ def _call_in_time(work: Callable[[], _Result]) -> _Result:
 
 def read_bytes(
     path: Path,
-    what: str,
+    kind: str,
     error: type[LightpaintError],
     *,
     limit: int = MAX_TEXT,
@@ -144,7 +144,7 @@ def read_bytes(
     """Return the content of the file at `path`. Raises `error`, in one line, if anything prevents
     it.
     """
-    if file_length(path, what, error, limit=limit, may_be_empty=may_be_empty) == 0:
+    if file_length(path, kind, error, limit=limit, may_be_empty=may_be_empty) == 0:
         return b""  # and is not read: a read might never return
     data = bytearray()
     try:
@@ -156,17 +156,17 @@ def read_bytes(
     except OSError as reason:
         raise error(f"cannot read {path}: {reason.strerror or reason}") from None
     if len(data) > limit:  # it has grown since: somebody is still writing it
-        raise error(f"{path} has no end: no {what} has more than {limit} bytes")
+        raise error(f"{path} has no end: no {kind} has more than {limit} bytes")
     return bytes(data)
 
 
-def read_text(path: Path, what: str, error: type[LightpaintError], **options: Any) -> str:
+def read_text(path: Path, kind: str, error: type[LightpaintError], **options: Any) -> str:
     """Return the text of the UTF-8 file at `path`, without a byte-order mark.
 
     options: as in `read_bytes`. Raises `error`, in one line, for all that prevents it.
     """
     try:
-        return read_bytes(path, what, error, **options).decode("utf-8-sig")
+        return read_bytes(path, kind, error, **options).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
         raise error(
             f"{path} is not text in UTF-8: {reason.reason} at byte {reason.start}"

@@ -103,8 +103,8 @@ def without_path(text: str, path: str | Path) -> str:
     """Return `text` with `it` in place of the path of a file, quoted or not, wherever that stands
     whole.
     """
-    named = rf"""(?<![\w./\\-])(["']?){re.escape(str(path))}\1(?![\w/\\-])"""
-    return re.sub(named, "it", text)
+    pattern = rf"""(?<![\w./\\-])(["']?){re.escape(str(path))}\1(?![\w/\\-])"""
+    return re.sub(pattern, "it", text)
 
 
 def check_writable(folder: Path) -> None:
@@ -129,10 +129,10 @@ def check_files(files: Iterable[Path], reads: Iterable[Path]) -> None:
 
     A command never overwrites a file that it reads, under whatever name or link.
     """
-    known: dict[tuple[int, int], Path] = {}
+    by_identity: dict[tuple[int, int], Path] = {}
     for path in reads:
         with suppress(OSError):
-            known[_inode(path)] = path
+            by_identity[_inode(path)] = path
     for file in files:
         check_name(file)
         if file.is_dir():
@@ -140,7 +140,7 @@ def check_files(files: Iterable[Path], reads: Iterable[Path]) -> None:
                 f"{file} is a folder, but a file is to be written there: move it away"
             )
         with suppress(OSError):
-            if _inode(file) in known:
+            if _inode(file) in by_identity:
                 raise OutputError(
                     f"{file} is an input of this command, which would overwrite it: write to "
                     "another place (folder=...)"

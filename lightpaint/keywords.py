@@ -26,7 +26,7 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
     def decorate(call: _Call) -> _Call:
         inner: Any = call.__init__ if isinstance(call, type) else call  # type: ignore[misc]
         parameters = inspect.signature(inner).parameters
-        known = _names(parameters) | {x.name for kind in passed_on for x in fields(kind) if x.init}
+        names = _names(parameters) | {x.name for kind in passed_on for x in fields(kind) if x.init}
 
         if not passed_on and any(x.kind is x.VAR_KEYWORD for x in parameters.values()):
             return call
@@ -34,9 +34,9 @@ def keywords(*passed_on: type) -> Callable[[_Call], _Call]:
         @wraps(inner)
         def checked(*args: Any, **kwargs: Any) -> Any:
             for name in kwargs:
-                if name not in known:
+                if name not in names:
                     # Named after the function that was called, not the decorator.
-                    raise _unknown(call.__qualname__, name, known) from None
+                    raise _unknown(call.__qualname__, name, names) from None
             return inner(*args, **kwargs)
 
         if isinstance(call, type):
@@ -54,6 +54,6 @@ def _names(parameters: Mapping[str, inspect.Parameter]) -> set[str]:
 
 
 def _unknown(call: str, name: str, known: Collection[str]) -> KeywordError:
-    near = difflib.get_close_matches(name, sorted(known), 1)
-    hint = f": did you mean {near[0]!r}?" if near else f"; it has {some_names(sorted(known))}"
+    similar = difflib.get_close_matches(name, sorted(known), 1)
+    hint = f": did you mean {similar[0]!r}?" if similar else f"; it has {some_names(sorted(known))}"
     return KeywordError(f"{call}() has no argument {name!r}{hint}")

@@ -21,7 +21,7 @@ _Item = TypeVar("_Item")
 
 def visible(text: str) -> str:
     r"""Return `text` in one line, with invisible characters as Python writes them, like `\\x1b`."""
-    return _INVISIBLE.sub(lambda found: ascii(found[0])[1:-1], text)
+    return _INVISIBLE.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
 def some_names(names: Iterable[str], joint: str = ", ") -> str:
@@ -43,8 +43,8 @@ def some_of(texts: Sequence[str], joint: str = ", ", room: int = MAX_LIST_LENGTH
     for k, text in enumerate(texts):
         extended = f"{shown}{joint if k else ''}{text}"
         if len(extended) > room:
-            more = f"… and {len(texts) - k} more"
-            return f"{shown}{joint}{more}" if k else more
+            rest_note = f"… and {len(texts) - k} more"
+            return f"{shown}{joint}{rest_note}" if k else rest_note
         shown = extended
     return shown
 
@@ -60,9 +60,9 @@ class Listed(tuple[_Item, ...]):
 
 def short_repr(value: Any) -> str:
     """Return the repr of a dataclass on one screen: arrays by their shapes, long values cut."""
-    shown = [field.name for field in fields(value) if field.repr]
-    room = MAX_LIST_LENGTH // len(shown)
-    texts = (f"{name}={_brief(getattr(value, name), room - len(name))}" for name in shown)
+    names = [field.name for field in fields(value) if field.repr]
+    room = MAX_LIST_LENGTH // len(names)
+    texts = (f"{name}={_brief(getattr(value, name), room - len(name))}" for name in names)
     return f"{type(value).__name__}({', '.join(texts)})"
 
 

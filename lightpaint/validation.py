@@ -63,9 +63,9 @@ def number(about: str, *, may_be_zero: bool = False) -> Check:
 
 def one_of(words: Any) -> Check:
     """Expect one of the words of a Literal."""
-    known = get_args(words)
-    expected = " or ".join(map(repr, known))
-    return lambda value: isinstance(value, str) and value in known, expected
+    words_known = get_args(words)
+    expected = " or ".join(map(repr, words_known))
+    return lambda value: isinstance(value, str) and value in words_known, expected
 
 
 def a(kind: type, about: str) -> Check:

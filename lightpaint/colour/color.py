@@ -54,8 +54,8 @@ def kelvin_to_rgb(kelvin: float, duv: float = 0.0) -> Doubles:
         raise ColorError(
             f"a Duv of {duv:g} is out of range: expected -{LARGEST_DUV:g} to {LARGEST_DUV:g}"
         )
-    at, along, _ = _locus(1e6 / kelvin)
-    xyz = xyz_of(at + duv * _towards_green(along))
+    uv, tangent, _ = _locus(1e6 / kelvin)
+    xyz = xyz_of(uv + duv * _towards_green(tangent))
     rgb = np.maximum(np.linalg.solve(rgb_to_xyz(REC709), xyz), 0)
     rgb /= luminance(rgb)
     rgb.setflags(write=False)
@@ -85,11 +85,11 @@ def _cct_and_duv(*light: float) -> tuple[float, float] | None:
     # Newton's steps end where the difference is perpendicular to the locus, so that the temperature
     # given to `kelvin_to_rgb` comes back, to 1e-9.
     for _ in range(NEWTON_STEPS):
-        at, along, bend = _locus(mired)
-        mired += float((uv - at) @ along / (along @ along - (uv - at) @ bend))
+        at, tangent, bend = _locus(mired)
+        mired += float((uv - at) @ tangent / (tangent @ tangent - (uv - at) @ bend))
         mired = min(max(mired, 1e6 / (2 * KELVIN_RANGE[1])), 2e6 / KELVIN_RANGE[0])
-    at, along, _ = _locus(mired)
-    kelvin, duv = 1e6 / mired, float((uv - at) @ _towards_green(along))
+    at, tangent, _ = _locus(mired)
+    kelvin, duv = 1e6 / mired, float((uv - at) @ _towards_green(tangent))
     lowest, highest = KELVIN_RANGE
     # The ends of the range come back up to round-off.
     if not (lowest - 0.1 <= kelvin <= highest + 10 and abs(duv) <= LARGEST_DUV + 1e-5):
@@ -118,8 +118,8 @@ def rgb_to_hex(rgb: Floats) -> str:
     """
     rgb = _three_numbers(rgb)
     brightest = float(rgb.max())
-    shown = rgb / brightest if brightest > 0 else np.zeros(3)
-    r, g, b = to_8_bit(encode_display(shown))
+    scaled_rgb = rgb / brightest if brightest > 0 else np.zeros(3)
+    r, g, b = to_8_bit(encode_display(scaled_rgb))
     return f"#{r:02x}{g:02x}{b:02x}"
 
 

@@ -41,18 +41,18 @@ def lab(image: Floats) -> Doubles:
     return np.stack([116 * fy - 16, 500 * (fx - fy), 200 * (fy - fz)], axis=-1)
 
 
-def ciede2000(one: Doubles, other: Doubles) -> Doubles:
+def ciede2000(first: Doubles, second: Doubles) -> Doubles:
     """Return CIEDE2000, (…,), between colours (…, 3) in L*a*b*."""
-    (L1, a1, b1), (L2, a2, b2) = (np.moveaxis(x, -1, 0) for x in (one, other))
+    (L1, a1, b1), (L2, a2, b2) = (np.moveaxis(x, -1, 0) for x in (first, second))
     mean = (np.hypot(a1, b1) + np.hypot(a2, b2)) / 2
     stretch = 1.5 - 0.5 * _levelled(mean)
     C1, h1 = _polar(stretch * a1, b1)
     C2, h2 = _polar(stretch * a2, b2)
     # The difference of hue, the short way round; greys have no hue.
-    both = C1 * C2 > 0
-    turn = np.where(both, (h2 - h1 + 180) % 360 - 180, 0.0)
-    turn = np.where(both & (h2 - h1 == 180), 180.0, turn)
-    h = np.where(both, _between(h1, h2), h1 + h2)
+    are_coloured = C1 * C2 > 0
+    turn = np.where(are_coloured, (h2 - h1 + 180) % 360 - 180, 0.0)
+    turn = np.where(are_coloured & (h2 - h1 == 180), 180.0, turn)
+    h = np.where(are_coloured, _between(h1, h2), h1 + h2)
     L, C = (L1 + L2) / 2, (C1 + C2) / 2
     T = 1 - 0.17 * _cos(h - 30) + 0.24 * _cos(2 * h) + 0.32 * _cos(3 * h + 6)
     T -= 0.20 * _cos(4 * h - 63)

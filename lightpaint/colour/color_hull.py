@@ -120,19 +120,19 @@ class ColorHull:
         return np.asarray(mixed * (luminance(rgb) / luminance(mixed)), np.float64)
 
 
-def _cross(one: Doubles, other: Doubles) -> Doubles:
+def _cross(first: Doubles, second: Doubles) -> Doubles:
     """Return the cross products of vectors (…, 2)."""
-    return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
 
 
 def _cut(corners: Doubles, direction: Doubles, reach: float) -> Doubles:
     """Return the part of a convex polygon, (m, 2), that reaches no further (Sutherland–Hodgman)."""
     room = reach - corners @ direction
-    kept = []
+    corners_kept = []
     for k, (a, left) in enumerate(zip(corners, room, strict=True)):
         b, other = corners[(k + 1) % len(corners)], room[(k + 1) % len(corners)]
         if left >= 0:
-            kept.append(a)
+            corners_kept.append(a)
         if left * other < 0:
-            kept.append(a + (b - a) * (left / (left - other)))
-    return np.array(kept).reshape(-1, 2)
+            corners_kept.append(a + (b - a) * (left / (left - other)))
+    return np.array(corners_kept).reshape(-1, 2)

@@ -31,8 +31,8 @@ def hue_name(rgb: Floats) -> str:
 
     rgb: (3,) linear Rec.709, of any brightness but black.
     """
-    shown = np.asarray(rgb, np.float64) / np.max(rgb)
-    temperature = cct_and_duv(shown)
+    scaled_rgb = np.asarray(rgb, np.float64) / np.max(rgb)
+    temperature = cct_and_duv(scaled_rgb)
     if temperature is not None and abs(temperature[1]) <= WHITE_DUV and temperature[0] >= WARMEST:
         return (
             "warm white"
@@ -41,6 +41,6 @@ def hue_name(rgb: Floats) -> str:
             if temperature[0] > COOL
             else "white"
         )
-    _, a, b = lab(shown)
+    _, a, b = lab(scaled_rgb)
     angle = float(np.degrees(np.arctan2(b, a))) % 360
     return next(word for end, word in HUES if angle <= end)

@@ -64,7 +64,7 @@ class Photometry:
 
     def fields(self) -> dict[str, Any]:
         """Return the fields for JSON (docs/formats.md); missing quantities are left out."""
-        named = {
+        by_name = {
             "y": self.y,
             "hex": self.hex,
             "cct_k": self.kelvin,
@@ -75,7 +75,7 @@ class Photometry:
             "luminous_unit": self.luminous_unit or None,
             "flux_lm": self.flux_lm,
         }
-        return {key: value for key, value in named.items() if value is not None}
+        return {key: value for key, value in by_name.items() if value is not None}
 
 
 def photometry(

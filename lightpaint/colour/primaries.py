@@ -35,8 +35,8 @@ SPACES = {
 
 def primaries_in(space: str) -> tuple[float, ...]:
     """Return CIE xy of red, green, blue and white of a space, by its name in colour-science."""
-    known = colour_science().RGB_COLOURSPACES[space]
-    return tuple(map(float, (*known.primaries.ravel(), *known.whitepoint)))
+    color_space = colour_science().RGB_COLOURSPACES[space]
+    return tuple(map(float, (*color_space.primaries.ravel(), *color_space.whitepoint)))
 
 
 @lru_cache(64)
@@ -73,11 +73,11 @@ def to_rec709(primaries: tuple[float, ...]) -> Doubles:
     A different white is adapted: white in the file becomes white here. XYZ has no white of its own,
     holds colours as measured, and is taken as it is.
     """
-    ours, theirs = rgb_to_xyz(REC709), rgb_to_xyz(primaries)
+    to_xyz, source_to_xyz = rgb_to_xyz(REC709), rgb_to_xyz(primaries)
     is_same_white = np.allclose(primaries[6:], REC709[6:], rtol=0, atol=ROUNDING)
     if not (is_same_white or are_same(primaries, XYZ)):
-        theirs = adaptation(theirs.sum(axis=1), ours.sum(axis=1)) @ theirs
-    return np.asarray(np.linalg.solve(ours, theirs), np.float64)
+        source_to_xyz = adaptation(source_to_xyz.sum(axis=1), to_xyz.sum(axis=1)) @ source_to_xyz
+    return np.asarray(np.linalg.solve(to_xyz, source_to_xyz), np.float64)
 
 
 def are_same(a: Sequence[float] | None, b: Sequence[float] | None) -> bool:

@@ -67,15 +67,15 @@ class WhiteRange:
         rgb = np.asarray(rgb, np.float64)
         lit = rgb.max(axis=1) > 0
         uv = uv_of(np.where(lit[:, None], rgb, 1.0) @ rgb_to_xyz(REC709).T)
-        way = np.diff(self._uv, axis=0)
-        beside = uv[:, None] - self._uv[:-1]
-        part = np.clip((beside * way).sum(axis=2) / np.square(way).sum(axis=1), 0, 1)
-        distance = np.square(beside - part[..., None] * way).sum(axis=2)
+        segments = np.diff(self._uv, axis=0)
+        offsets = uv[:, None] - self._uv[:-1]
+        part = np.clip((offsets * segments).sum(axis=2) / np.square(segments).sum(axis=1), 0, 1)
+        distance = np.square(offsets - part[..., None] * segments).sum(axis=2)
         k = np.argmin(distance, axis=1)
         # Convert the fraction of the way in (u, v) to a fraction of the light.
         t = np.take_along_axis(part, k[:, None], axis=1)[:, 0]
-        one, other = (1 - t) / self._tristimulus[k], t / self._tristimulus[k + 1]
-        return np.where(lit, k + other / (one + other), self.last / 2)
+        first, second = (1 - t) / self._tristimulus[k], t / self._tristimulus[k + 1]
+        return np.where(lit, k + second / (first + second), self.last / 2)
 
     def at(self, places: Doubles) -> Doubles:
         """Return the whites at such places, (n,), as linear colours (n, 3) of luminance 1."""
@@ -117,9 +117,11 @@ class WhiteRange:
         first, last = window
         a, b = self.colors[first], self.colors[last]
         per_mired = (b - a) / (self.mireds[first] - self.mireds[last])
-        back = min(reach, float(self.mireds[0] - self.mireds[first]))
+        backwards = min(reach, float(self.mireds[0] - self.mireds[first]))
         ahead = min(reach, float(self.mireds[last] - self.mireds[-1]))
-        return np.stack([_moved(a, -back * per_mired), _moved(b, ahead * per_mired)])
+        return np.stack(
+            [_moved_color(a, -backwards * per_mired), _moved_color(b, ahead * per_mired)]
+        )
 
 
 @lru_cache(64)
@@ -130,7 +132,7 @@ def white_range(low: float, high: float, duv: float = 0.0) -> WhiteRange:
     return whites
 
 
-def _moved(color: Doubles, way: Doubles) -> Doubles:
+def _moved_color(color: Doubles, way: Doubles) -> Doubles:
     """Return a colour (3,) moved by `way`, (3,), or as much of it as leaves no channel below 0."""
     with np.errstate(divide="ignore"):
         room = np.where(way < 0, color / np.where(way < 0, -way, 1), np.inf)

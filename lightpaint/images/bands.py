@@ -33,14 +33,14 @@ def by_bands(make: Callable[..., npt.NDArray[Any]], *pictures: npt.NDArray[Any])
     if not others:
         return make(*pictures)
     first = make(*(x[top] for x in pictures))
-    made = np.empty((len(pictures[0]), *first.shape[1:]), first.dtype)
-    made[top] = first
+    result = np.empty((len(pictures[0]), *first.shape[1:]), first.dtype)
+    result[top] = first
 
     def fill(rows: slice) -> None:
-        made[rows] = make(*(x[rows] for x in pictures))
+        result[rows] = make(*(x[rows] for x in pictures))
 
     parallel_map(fill, others)
-    return made
+    return result
 
 
 def sum_by_bands(make: Callable[..., Any], *pictures: npt.NDArray[Any]) -> Any:

@@ -56,9 +56,9 @@ class Features:
     position: Floats | None = None
 
     def __post_init__(self) -> None:
-        known = [self.albedo, self.normal, *([] if self.position is None else [self.position])]
-        if any(x.shape != self.albedo.shape or x.shape[2:] != (3,) for x in known):
-            shapes = ", ".join(str(x.shape) for x in known)
+        planes = [self.albedo, self.normal, *([] if self.position is None else [self.position])]
+        if any(x.shape != self.albedo.shape or x.shape[2:] != (3,) for x in planes):
+            shapes = ", ".join(str(x.shape) for x in planes)
             raise SizeError(f"albedo, normals and positions {shapes} are not of one picture")
 
     @property
@@ -106,9 +106,11 @@ def oidn_is_installed() -> bool:
 
 def denoiser_text(features: Features | None, *, raw: str) -> dict[str, str]:
     """Return the text for a denoised PNG: the denoiser, and the file of the raw render."""
-    by = f"Open Image Denoise ({_version()})" if oidn_is_installed() else "joint bilateral filter"
+    denoiser = (
+        f"Open Image Denoise ({_version()})" if oidn_is_installed() else "joint bilateral filter"
+    )
     guided = " with albedo and normals" if features is not None else ""
-    return {DENOISED_KEY: f"{by}{guided}; raw: {raw}"}
+    return {DENOISED_KEY: f"{denoiser}{guided}; raw: {raw}"}
 
 
 def _version() -> str:
@@ -140,12 +142,12 @@ def _in_tiles(
     """Denoise as `pyoidn.denoise` does, in tiles that take `TILES_MB`, and keep nothing."""
     import pyoidn
 
-    made = np.empty_like(image)
+    denoised = np.empty_like(image)
     levels = {"fast": pyoidn.OIDN_QUALITY_FAST, "high": pyoidn.OIDN_QUALITY_HIGH}
     with pyoidn.Device() as device:
         device.commit()
         with pyoidn.Filter(device) as tiles:
-            pictures = {"color": image, **guides, "output": made}
+            pictures = {"color": image, **guides, "output": denoised}
             for name, picture in pictures.items():
                 tiles.set_image(name, picture, pyoidn.OIDN_FORMAT_FLOAT3)
             tiles.set_bool("hdr", hdr)
@@ -156,7 +158,7 @@ def _in_tiles(
             tiles.execute()
         if error := device.get_error():
             raise RuntimeError(error)
-    return made
+    return denoised
 
 
 def _denoise_with_filter(image: Floats, features: Features | None) -> Floats:

@@ -56,8 +56,8 @@ def pack_picture(image: Floats, *, dropped: int = DROPPED_BITS) -> PackedPicture
 
 def _predicted(planes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
     """Return the prediction of each number from its neighbours, (3, h, w); 0 beyond the border."""
-    around = np.pad(planes, ((0, 0), (1, 0), (1, 0)))
-    left, above, corner = around[:, 1:, :-1], around[:, :-1, 1:], around[:, :-1, :-1]
+    padded = np.pad(planes, ((0, 0), (1, 0), (1, 0)))
+    left, above, corner = padded[:, 1:, :-1], padded[:, :-1, 1:], padded[:, :-1, :-1]
     # JPEG-LS's: a plane through the three, clamped to the two neighbours.
     least, most = np.minimum(left, above), np.maximum(left, above)
     return np.asarray(np.clip(left + above - corner, least, most))

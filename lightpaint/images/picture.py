@@ -192,10 +192,12 @@ def _picture_of_bitmap(
         alpha, notes = _without_partial(alpha)
     if bitmap.codes is None:
         image = light_of_floats(bitmap, alpha)
-        saturated, used = None, None
+        saturated, chosen_transform = None, None
     else:
-        used = choice.over(None if choice.is_whole else transform_of(bitmap) or otherwise)
-        image = light_of_integers(bitmap, alpha, used)
+        chosen_transform = choice.over(
+            None if choice.is_whole else transform_of(bitmap) or otherwise
+        )
+        image = light_of_integers(bitmap, alpha, chosen_transform)
         saturated = _saturated(bitmap)
     return Picture(
         kind=bitmap.kind,
@@ -203,7 +205,7 @@ def _picture_of_bitmap(
         finite=_only_finite(image),
         alpha=alpha,
         saturated=saturated,
-        transform=used,
+        transform=chosen_transform,
         codes=bitmap.codes,
         lossy=bitmap.lossy,
         notes=notes,

@@ -70,8 +70,8 @@ class LightShares:
 
     def luminance(self) -> dict[str, float]:
         """Return the share of each light in the luminance of all these lights."""
-        its = np.maximum(luminance(self.sums), 0) if self.names else np.zeros(0)
-        return dict(zip(self.names, (its / max(its.sum(), 1e-300)).tolist(), strict=True))
+        values = np.maximum(luminance(self.sums), 0) if self.names else np.zeros(0)
+        return dict(zip(self.names, (values / max(values.sum(), 1e-300)).tolist(), strict=True))
 
 
 def with_power(
@@ -109,14 +109,16 @@ def detection_power(
     deviation = np.sqrt(squares.sum(axis=(0, 1)))
     blocks, weight = block_sums(squares), brightness_weights(magnitude)
     spread = float(np.square(weight * 2 * blocks.sum(axis=-1)).sum())
-    found = {}
+    power_of = {}
     for k, name in enumerate(lights.names):
-        off = float(np.max(np.abs(error * lights.sums[k]) / deviation))
-        by_sum = NORMAL.cdf(off - limit) + NORMAL.cdf(-off - limit)
-        its = (lights.blocks[k].astype(np.float64), lights.noise[k].astype(np.float64))
-        power: Doubles = error**2 * (np.square(its[0]) - np.square(its[1]))
+        deviation_of_light = float(np.max(np.abs(error * lights.sums[k]) / deviation))
+        by_sum = NORMAL.cdf(deviation_of_light - limit) + NORMAL.cdf(-deviation_of_light - limit)
+        blocks_and_noise = (lights.blocks[k].astype(np.float64), lights.noise[k].astype(np.float64))
+        power: Doubles = error**2 * (
+            np.square(blocks_and_noise[0]) - np.square(blocks_and_noise[1])
+        )
         mean = max(float((weight[..., None] * power).sum()), 0.0)
-        more = max(float((np.square(weight)[..., None] * 4 * blocks * power).sum()), 0.0)
-        by_pattern = NORMAL.cdf((mean - limit * spread**0.5) / (spread + more) ** 0.5)
-        found[name] = 1 - (1 - by_sum) * (1 - by_pattern)
-    return found
+        variance = max(float((np.square(weight)[..., None] * 4 * blocks * power).sum()), 0.0)
+        by_pattern = NORMAL.cdf((mean - limit * spread**0.5) / (spread + variance) ** 0.5)
+        power_of[name] = 1 - (1 - by_sum) * (1 - by_pattern)
+    return power_of

@@ -39,8 +39,8 @@ class Changes:
         if child is None:
             self._missing.append(text)
         else:
-            spelt = child.attributes["name"]
-            self.xml.replace(child, text.replace(f'name="{name}"', f'name="{spelt}"', 1))
+            spelling = child.attributes["name"]
+            self.xml.replace(child, text.replace(f'"{name}"', f'"{spelling}"', 1))
 
     def number(self, name: str, otherwise: float) -> float:
         """Return the present number of the child called `name`, or `otherwise`."""

@@ -104,10 +104,12 @@ def _exported(lighting: Lighting, source: Source) -> tuple[Lighting, str]:
     if source.scene is None:
         return lighting, ""
     tied = scene_of(source.scene, lighting)
-    made, names = with_own_colors(lighting, {light.name: light.emission for light in tied.lights})
+    tied_lighting, names = with_own_colors(
+        lighting, {light.name: light.emission for light in tied.lights}
+    )
     if not names:
-        return made, ""
-    return made, (
+        return tied_lighting, ""
+    return tied_lighting, (
         f"the painting does not tell the colour of {some_names(names)}: other programs get the "
         "one in the scene"
     )
@@ -130,12 +132,14 @@ def _writer_of(
         return lambda: scene_script(lighting.target, name, emitters)
 
     def overrides() -> str:
-        about = f"lightpaint: the lights of {name} as solved for {lighting.target}"
-        made = usd_overrides(emitters, source.stage, folder, about=about)
-        if made.left:
-            where = source.stage or "USD"
-            listen.say(f"no one light of {where} takes {some_names(made.left)}: set it by hand")
-        return made.text
+        comment = f"lightpaint: the lights of {name} as solved for {lighting.target}"
+        text = usd_overrides(emitters, source.stage, folder, about=comment)
+        if text.left:
+            stage_name = source.stage or "USD"
+            listen.say(
+                f"no one light of {stage_name} takes {some_names(text.left)}: set it by hand"
+            )
+        return text.text
 
     return overrides
 

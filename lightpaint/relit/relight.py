@@ -68,12 +68,12 @@ def relight(scene: Scene, lighting: Lighting, path: str | Path) -> Scene:
         else:
             write_rgb(file, content)
     relit = _loaded(path, scene)
-    taken = {emitter.name: emitter.emission for emitter in relit.emitters}
-    for emitter, wanted in settings_of(scene, lighting.emission):
+    emissions = {emitter.name: emitter.emission for emitter in relit.emitters}
+    for emitter, new_emission in settings_of(scene, lighting.emission):
         if emitter.kind is None or emitter.kind.scaling is not Scaling.COLOUR:
             continue  # a factor of 1 means as authored there
         if not np.array_equal(
-            np.asarray(wanted, np.float32), np.asarray(taken[emitter.name], np.float32)
+            np.asarray(new_emission, np.float32), np.asarray(emissions[emitter.name], np.float32)
         ):
             raise SceneError(f"{path} did not take the emission of light {emitter.name!r}")
     return relit
@@ -135,13 +135,14 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
     Raises LightingError unless it names exactly the emitters of `scene`, and gives each light
     in the unit that the scene has it in.
     """
-    given = {name for members in lighting.members.values() for name in members}
-    there = {emitter.name for emitter in scene.emitters}
-    if given != there:
+    emitter_names = {name for members in lighting.members.values() for name in members}
+    scene_names = {emitter.name for emitter in scene.emitters}
+    if emitter_names != scene_names:
         raise LightingError(
             f"the lighting does not fit {scene.path}: it lacks "
-            f"{some_names(sorted(there - given)) or 'no light'} and names "
-            f"{some_names(sorted(given - there)) or 'none'} that the scene does not have"
+            f"{some_names(sorted(scene_names - emitter_names)) or 'no light'} and names "
+            f"{some_names(sorted(emitter_names - scene_names)) or 'none'} that the scene does not "
+            "have"
         )
     tied = scene.with_lights(lighting.members, lighting.fixed)
     for setting in lighting.lights:
@@ -184,23 +185,23 @@ def relit_files(
     """
     root = scene.files[0]
     edits = {root.resolve(): _Edits(root)}
-    changed = dict(settings_of(scene, emission))
-    kept = [emitter for emitter in scene.emitters if emitter not in changed]
+    settings = dict(settings_of(scene, emission))
+    unchanged = [emitter for emitter in scene.emitters if emitter not in settings]
     # Mitsuba refuses a scene in which no emitter may be sampled.
-    sampled = any(any(rgb) and not emitter.hit_by_chance for emitter, rgb in changed.items())
-    sampled = sampled or any(emitter.sampling_weight for emitter in kept)
-    for emitter, rgb in changed.items():
+    sampled = any(any(rgb) and not emitter.hit_by_chance for emitter, rgb in settings.items())
+    sampled = sampled or any(emitter.sampling_weight for emitter in unchanged)
+    for emitter, rgb in settings.items():
         file = scene.files[emitter.file]
         setting = (emitter, rgb, _sampling_weight(emitter, rgb, sampled))
-        here = edits.setdefault(file.resolve(), _Edits(file)).settings
-        if emitter.offset in here and here[emitter.offset][1:] != setting[1:]:
-            raise _included_twice(file, here[emitter.offset][0], emitter)
-        here[emitter.offset] = setting
-    for emitter in kept:
+        edits_of_file = edits.setdefault(file.resolve(), _Edits(file)).settings
+        if emitter.offset in edits_of_file and edits_of_file[emitter.offset][1:] != setting[1:]:
+            raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
+        edits_of_file[emitter.offset] = setting
+    for emitter in unchanged:
         file = scene.files[emitter.file]
-        here = edits.get(file.resolve(), _Edits(file)).settings
-        if emitter.offset in here:
-            raise _included_twice(file, here[emitter.offset][0], emitter)
+        edits_of_file = edits.get(file.resolve(), _Edits(file)).settings
+        if emitter.offset in edits_of_file:
+            raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
 
     _edit_integrators(scene, edits)
     for file, offset, children in scene.moved_elements:
@@ -214,9 +215,9 @@ def relit_files(
         written |= {path.parent / name: image for name, image in images.items()}
         written[target] = content
     originals = {file.resolve() for file in scene.originals}
-    if taken := [file for file in written if file.resolve() in originals]:
+    if in_the_way := [file for file in written if file.resolve() in originals]:
         raise OutputError(
-            f"{taken[0]} belongs to the scene itself: write the relit scene to another folder"
+            f"{in_the_way[0]} belongs to the scene itself: write the relit scene to another folder"
         )
     return written
 
@@ -233,10 +234,10 @@ def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
         edits[scene.files[0].resolve()].integrators[None] = text
 
 
-def _included_twice(file: Path, one: Emitter, other: Emitter) -> SceneError:
+def _included_twice(file: Path, first: Emitter, second: Emitter) -> SceneError:
     return SceneError(
         f"{file} is included more than once, and its light would have to be both "
-        f"{one.name!r} and {other.name!r} with different emissions: "
+        f"{first.name!r} and {second.name!r} with different emissions: "
         "include two copies of it, or tie the two into a group"
     )
 

@@ -73,7 +73,7 @@ def stages_of(spp: int, block_pixels: int = 1) -> list[int]:
     """
     step = 2 * block_pixels
     looks = {max(spp // part // step * step, step) for part in PARTS if spp // part >= FEWEST}
-    return [*sorted(its for its in looks if its < spp), spp]
+    return [*sorted(samples for samples in looks if samples < spp), spp]
 
 
 def limit_of_looks(looks: int, *, once: float = LIMIT) -> float:

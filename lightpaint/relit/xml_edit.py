@@ -122,32 +122,32 @@ def _parse(text: bytes) -> tuple[Element, dict[int, Element]]:
     elements: dict[int, Element] = {}
     opened: list[Element] = []
     is_old = False
-    for found in markup(text):
-        if found["tag"] is not None:
-            given = attributes(found)
+    for piece in markup(text):
+        if piece["tag"] is not None:
+            values = attributes(piece)
             if not opened:
-                is_old = _is_old(given.get("version", ""))
-            name = given.get("name", "")
+                is_old = _is_old(values.get("version", ""))
+            name = values.get("name", "")
             element = Element(
-                tag=decoded(found["tag"]),
-                attributes=given,
+                tag=decoded(piece["tag"]),
+                attributes=values,
                 name=_snake_case(name) if is_old else name,
-                start=found.start(),
-                inner=found.end(),
+                start=piece.start(),
+                inner=piece.end(),
             )
             if opened:
                 opened[-1].children.append(element)
             opened.append(element)
             elements[element.start] = element
-        end = None if found["end"] is None else decoded(found["end"])
+        end = None if piece["end"] is None else decoded(piece["end"])
         if end is not None and (not opened or opened[-1].tag != end):
             raise ValueError(
-                f"line {line_of(text, found.start())}: </{end}> closes "
+                f"line {line_of(text, piece.start())}: </{end}> closes "
                 + (_opening(text, opened[-1]) if opened else "nothing")
             )
-        if end is not None or found["empty"]:
+        if end is not None or piece["empty"]:
             element = opened.pop()
-            element.end = found.end()
+            element.end = piece.end()
             if not opened:
                 return element, elements
     missing = f"{_opening(text, opened[-1])} has no end tag" if opened else "it has no element"

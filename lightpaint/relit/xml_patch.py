@@ -43,8 +43,8 @@ def scene_patch(scene: Scene, lighting: Lighting) -> str:
             raise OutputError(f"cannot read {name}: {error.strerror or error}") from error
         # A file that stays in its folder finds its meshes as before.
         origin = os.path.relpath((root.parent / name).parent, file.parent)
-        gone = r"\r?\n[ \t]*" + re.escape(tag("path", value=Path(origin).as_posix()))
-        new = re.sub(gone, "", content.decode("utf-8"), count=1)
+        path_line = r"\r?\n[ \t]*" + re.escape(tag("path", value=Path(origin).as_posix()))
+        new = re.sub(path_line, "", content.decode("utf-8"), count=1)
         lines += difflib.unified_diff(_lines(old), _lines(new), f"a/{name}", f"b/{name}")
     return "".join(lines)
 

@@ -129,8 +129,8 @@ def reduction(film: Film, resolution: str) -> int:
 
 def _possible(film: Film, width: int) -> str:
     """Return sizes that `film` can be reduced to: near a `width` > 0, and without remainder."""
-    near = film.pixels[0] // width if width else 2
-    factors = [*range(max(near, 2), near + 3), *even_reductions(film)[1 : LISTED_SIZES + 1]]
+    nearest = film.pixels[0] // width if width else 2
+    factors = [*range(max(nearest, 2), nearest + 3), *even_reductions(film)[1 : LISTED_SIZES + 1]]
     sizes = {
         k: f"{'x'.join(map(str, blocks_in(film.pixels, k)))} (1/{k})"
         for k in factors

@@ -51,13 +51,13 @@ class IntegratorChoice:
         """Read a choice like `path` or `path:max_depth=8,hide_emitters=true`. Raises SceneError."""
         match = _CHOICE.fullmatch(text)
         parts = [] if match is None or match[2] is None else match[2].split(",")
-        options = [_OPTION.fullmatch(one.strip()) for one in parts]
+        options = [_OPTION.fullmatch(part.strip()) for part in parts]
         if match is None or not all(options):
             raise SceneError(
                 f"{one_line(repr(text))} is not an integrator: expected the name of one of "
                 "Mitsuba's, with or without options, like 'path' or 'path:max_depth=8,rr_depth=5'"
             )
-        return cls(match[1], {one[1]: _value(one[2]) for one in options if one is not None})
+        return cls(match[1], {part[1]: _value(part[2]) for part in options if part is not None})
 
     def __str__(self) -> str:
         options = ",".join(f"{key}={_xml_value(value)}" for key, value in self.options.items())
@@ -115,13 +115,13 @@ def replace_integrator(state: Any, choice: IntegratorChoice) -> IntegratorChoice
     """
     import mitsuba as mi
 
-    own: dict[str, Any] = {}
+    present: dict[str, Any] = {}
     nodes = integrator_nodes(state)
     while nodes:
         props = state.nodes[nodes[0]].props
-        own = {**{key: props[key] for key in INHERITED["path"] if key in props}, **own}
+        present = {**{key: props[key] for key in INHERITED["path"] if key in props}, **present}
         nodes = nodes[1:] + integrator_nodes(state, nodes[0])
-    choice = choice.over(own)
+    choice = choice.over(present)
     node = mi.parser.SceneNode()
     node.type = mi.ObjectType.Integrator
     node.props = mi.Properties(choice.plugin)
@@ -148,8 +148,8 @@ def _references(state: Any, parent: int, kind: Any) -> list[tuple[str, int]]:
 
     props = state.nodes[parent].props
     resolved = mi.Properties.Type.ResolvedReference
-    found = [(key, int(props[key].index())) for key in props if props.type(key) == resolved]
-    return [(key, node) for key, node in found if state.nodes[node].type == kind]
+    references = [(key, int(props[key].index())) for key in props if props.type(key) == resolved]
+    return [(key, node) for key, node in references if state.nodes[node].type == kind]
 
 
 def _value(text: str) -> bool | int | float | str:

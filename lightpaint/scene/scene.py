@@ -418,7 +418,9 @@ def load_scene(
     with explain_old_scene(path), mitsuba_errors(path):
         parsed = ParsedScene(path, values, backend.variant, instead)
     index = sensor_index(sensor, parsed.sensor_names, path)
-    said = lights_file_for(path, lights_file, beside=use_lights_file).with_more(lights, groups)
+    said = lights_file_for(path, lights_file, beside_scene=use_lights_file).with_more(
+        lights, groups
+    )
     with explain_old_scene(path), mitsuba_errors(path):
         seen = _look_at(parsed, index)
     check_film(path, seen["film"], seen["spp"])

@@ -105,23 +105,23 @@ def read_record(
     """
     if not isinstance(data, dict):
         raise ValueError(f"{data!r} is not an object")
-    kinds, given = get_type_hints(kind), {}
-    known = fields(kind)  # type: ignore[arg-type]
-    names = {field.name for field in known}
+    kinds, values = get_type_hints(kind), {}
+    record_fields = fields(kind)  # type: ignore[arg-type]
+    names = {field.name for field in record_fields}
     if not others and (unknown := [key for key in data if key not in names]):
         raise ValueError(f"the key {unknown[0]!r} is unknown")
-    for field in known:
+    for field in record_fields:
         name = field.name
         if name in data:
             try:
-                given[name] = _read(kinds[name], data[name], is_exact)
+                values[name] = _read(kinds[name], data[name], is_exact)
             except TypeError:
                 raise ValueError(
                     f"{name} is {_expected(kinds[name])}, not {data[name]!r}"
                 ) from None
         elif name in required or (field.default is MISSING and field.default_factory is MISSING):
             raise ValueError(f"the key {name} is missing")
-    return kind(**given)
+    return kind(**values)
 
 
 def fields_of(record: Any, *optional: str) -> dict[str, Any]:
@@ -158,9 +158,12 @@ def _read(kind: Any, value: Any, is_exact: bool) -> Any:
         is_open = outer is Sequence or inner[-1] is ...
         kinds = inner[:1] * len(value) if is_open else inner
         if len(kinds) == len(value):
-            return tuple(_read(*its, is_exact) for its in zip(kinds, value, strict=True))
+            return tuple(
+                _read(*kind_and_value, is_exact)
+                for kind_and_value in zip(kinds, value, strict=True)
+            )
     if outer is Mapping and type(value) is dict:
-        return {key: _read(inner[1], one, is_exact) for key, one in value.items()}
+        return {key: _read(inner[1], entry, is_exact) for key, entry in value.items()}
     if isinstance(kind, type) and is_dataclass(kind):
         return read_record(kind, value, others=not is_exact, is_exact=is_exact)
     raise TypeError
@@ -182,7 +185,9 @@ def _expected(kind: Any) -> str:
     if outer is Literal:
         return ("one of " if inner[1:] else "") + ", ".join(map(repr, inner))
     if outer in UNIONS:
-        return " or ".join(_expected(one) for one in inner if one is not NoneType)
+        return " or ".join(
+            _expected(alternative) for alternative in inner if alternative is not NoneType
+        )
     if outer in (tuple, Sequence):
         number = "" if outer is Sequence or inner[-1] is ... else f"{len(inner)} of: "
         return f"a list ({number}{_expected(inner[0])})"

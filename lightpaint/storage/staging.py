@@ -133,11 +133,11 @@ def _discard(stage: Path, parents: Iterable[Path]) -> None:
 def _hidden_folders(real: Path) -> list[Path]:
     """Return the hidden folders of `real` that exist."""
     parent, prefix = real.parent, f".{real.name}{MARK}"
-    found: list[Path] = []
+    folders: list[Path] = []
     for place, start in ((parent, prefix), (real, MARK)):
         with suppress(OSError):
-            found += [place / name for name in os.listdir(place) if name.startswith(start)]
-    return [path for path in found if path.is_dir() and not path.is_symlink()]
+            folders += [place / name for name in os.listdir(place) if name.startswith(start)]
+    return [path for path in folders if path.is_dir() and not path.is_symlink()]
 
 
 def _files_in(folder: Path) -> set[str]:

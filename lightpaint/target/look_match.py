@@ -28,11 +28,11 @@ BIN = 0.04
 
 
 def view_of_look(
-    path: Path, picture: Picture, look: Floats, asked: TransformChoice
+    path: Path, picture: Picture, look: Floats, choice: TransformChoice
 ) -> ViewTransform | None:
     """Return the view through which most of `picture` is `look`; None if most of it is not.
 
-    path: the file of the picture. look: (h, w, 3) linear. asked: the part of
+    path: the file of the picture. look: (h, w, 3) linear. choice: the part of
     the view that is given; the rest is searched, the exposure, too. A file that holds light has no
     view, and is compared in sRGB.
     """
@@ -41,18 +41,20 @@ def view_of_look(
     views = [ViewTransform()]
     display = (picture.transform or views[0]).encode(picture.image)
     if picture.transform is not None:
-        views = list(_plausible(display, look, asked))
-    found = [_agreement(path, picture, display, view.encode(look)) for view in views]
-    best = max(range(len(views)), key=found.__getitem__)
-    return views[best] if found[best][0] > MOST else None
+        views = list(_plausible(display, look, choice))
+    agreements = [_agreement(path, picture, display, view.encode(look)) for view in views]
+    best = max(range(len(views)), key=agreements.__getitem__)
+    return views[best] if agreements[best][0] > MOST else None
 
 
-def _plausible(display: Floats, look: Floats, asked: TransformChoice) -> Iterator[ViewTransform]:
+def _plausible(display: Floats, look: Floats, choice: TransformChoice) -> Iterator[ViewTransform]:
     """Yield views, each at the exposure that maps the look to most of the display values."""
-    for name in [asked.name] if asked.name is not None else [n for n in BUILT_IN if n != "linear"]:
-        view = TransformChoice(name, asked.stops or 0.0).over(None)
+    for name in (
+        [choice.name] if choice.name is not None else [n for n in BUILT_IN if n != "linear"]
+    ):
+        view = TransformChoice(name, choice.stops or 0.0).over(None)
         yield view
-        if asked.stops is None:
+        if choice.stops is None:
             stops = _stops_between(view, display, look)
             # People choose round numbers.
             for digits in (1, 2, 4):
@@ -61,35 +63,42 @@ def _plausible(display: Floats, look: Floats, asked: TransformChoice) -> Iterato
 
 def _stops_between(view: ViewTransform, display: Floats, look: Floats) -> float:
     """Return the approximate exposure at which that view shows most of `look` as displayed."""
-    light, there = luminance(view.decode(display)), luminance(look)
+    light, look_brightness = luminance(view.decode(display)), luminance(look)
     low, high = TELLING
-    known = (display > low).all(axis=-1) & (display < high).all(axis=-1)
-    known &= (light > 0) & (there > 0)
-    if not known.any():
+    is_unclipped = (display > low).all(axis=-1) & (display < high).all(axis=-1)
+    is_unclipped &= (light > 0) & (look_brightness > 0)
+    if not is_unclipped.any():
         return 0.0
-    stops = np.log2(light[known] / there[known])
+    stops = np.log2(light[is_unclipped] / look_brightness[is_unclipped])
     # Unpainted pixels share the most common exposure; paint has many.
     counts = np.bincount(np.floor((stops - stops.min()) / BIN).astype(np.intp))
-    around = np.convolve(counts, [1, 1, 1], "same")
-    commonest = stops.min() + BIN * (np.argmax(around) + 0.5)
+    smoothed = np.convolve(counts, [1, 1, 1], "same")
+    commonest = stops.min() + BIN * (np.argmax(smoothed) + 0.5)
     return float(np.clip(np.median(stops[np.abs(stops - commonest) < 1.5 * BIN]), -60, 60))
 
 
-def _agreement(path: Path, picture: Picture, display: Floats, shown: Floats) -> tuple[float, float]:
+def _agreement(
+    path: Path, picture: Picture, display: Floats, encoded_look: Floats
+) -> tuple[float, float]:
     """Return the share of telling pixels that are the same, and their closeness; larger is better.
 
-    display, shown: (h, w, 3), display values of the picture and of the look.
+    display, encoded_look: (h, w, 3), display values of the picture and of the look.
     """
     low, high = TELLING
-    tells = (largest(shown) > low) & (shown.min(axis=-1) < high)
-    if tells.mean() < ENOUGH:
+    is_informative = (largest(encoded_look) > low) & (encoded_look.min(axis=-1) < high)
+    if is_informative.mean() < ENOUGH:
         return 0.0, 0.0
     if picture.lossy:
-        off, tolerance = lossy_difference(display, compressed_like(path, shown)), LOSSY
+        difference, tolerance = (
+            lossy_difference(display, compressed_like(path, encoded_look)),
+            LOSSY,
+        )
     else:
-        off, tolerance = largest(np.abs(display - shown)), ROUNDING
-    is_same = off[tells] <= tolerance
+        difference, tolerance = largest(np.abs(display - encoded_look)), ROUNDING
+    is_same = difference[is_informative] <= tolerance
     if not is_same.any():
         return 0.0, 0.0
     # In fiftieths, and tenths of a code: of equals the first one wins.
-    return round(50 * float(is_same.mean())) / 50, -round(2550 * float(off[tells][is_same].mean()))
+    return round(50 * float(is_same.mean())) / 50, -round(
+        2550 * float(difference[is_informative][is_same].mean())
+    )

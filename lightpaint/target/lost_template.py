@@ -18,36 +18,36 @@ SMOOTH = 0.1
 PIXELS, WHITE = 20_000, 0.998
 
 
-def explain_mismatch(mine: Floats, its: Floats) -> str:
+def explain_mismatch(picture: Floats, template: Floats) -> str:
     """Return a clause on why the whole template differs; empty if it was painted over.
 
-    mine, its: (h, w, 3), display values of painting and template.
+    picture, template: (h, w, 3), display values of painting and template.
     """
-    if _is_function(mine, its):
+    if _is_function(picture, template):
         return (
             "all of it by one change of colours: unless you graded it, it was saved "
             "through another view or profile (transform=..., mask=...)"
         )
-    for how, turned in _turned(its):
-        if _is_function(mine, turned):
+    for how, turned in _turned(template):
+        if _is_function(picture, turned):
             return f"it is the template {how}: turn it back"
-    down, right = _moved(mine, its)
-    if (down or right) and _is_function(*_overlap(mine, its, down, right)):
+    down, right = _offset(picture, template)
+    if (down or right) and _is_function(*_overlap(picture, template, down, right)):
         return f"it is the template moved by {right} pixels to the right and {down} down: undo that"
     return ""
 
 
-def _is_function(mine: Floats, its: Floats) -> bool:
-    """Return whether `mine` is a smooth function of the colours `its`, except where clipped."""
-    mine, its = (x.reshape(-1, 3).astype(np.float64) for x in (mine, its))
-    known = np.flatnonzero((mine < WHITE).all(axis=-1) & (its < WHITE).all(axis=-1))
-    known = known[:: max(1, known.size // PIXELS)]
-    terms = _terms(its[known])
-    if known.size < 2 * terms.shape[1]:
+def _is_function(picture: Floats, template: Floats) -> bool:
+    """Return whether `picture` is a smooth function of `template`, except where clipped."""
+    picture, template = (x.reshape(-1, 3).astype(np.float64) for x in (picture, template))
+    unclipped = np.flatnonzero((picture < WHITE).all(axis=-1) & (template < WHITE).all(axis=-1))
+    unclipped = unclipped[:: max(1, unclipped.size // PIXELS)]
+    terms = _terms(template[unclipped])
+    if unclipped.size < 2 * terms.shape[1]:
         return False  # too few to tell
-    found, *_ = np.linalg.lstsq(terms, mine[known], rcond=None)
-    missed = np.square(mine[known] - terms @ found).mean()
-    return bool(missed <= SMOOTH**2 * mine[known].var(axis=0).mean())
+    solution, *_ = np.linalg.lstsq(terms, picture[unclipped], rcond=None)
+    missed = np.square(picture[unclipped] - terms @ solution).mean()
+    return bool(missed <= SMOOTH**2 * picture[unclipped].var(axis=0).mean())
 
 
 def _terms(rgb: Doubles) -> Doubles:
@@ -58,27 +58,27 @@ def _terms(rgb: Doubles) -> Doubles:
     return np.stack(terms, axis=-1)
 
 
-def _turned(its: Floats) -> Iterator[tuple[str, Floats]]:
-    yield "mirrored", its[:, ::-1]
-    yield "upside down and mirrored", its[::-1]
-    yield "upside down", its[::-1, ::-1]
+def _turned(template: Floats) -> Iterator[tuple[str, Floats]]:
+    yield "mirrored", template[:, ::-1]
+    yield "upside down and mirrored", template[::-1]
+    yield "upside down", template[::-1, ::-1]
 
 
-def _moved(mine: Floats, its: Floats) -> tuple[int, int]:
+def _offset(picture: Floats, template: Floats) -> tuple[int, int]:
     """Return the shift in pixels (down, right) at which phases of the two correlate most."""
-    size = mine.shape[:2]
-    one, other = (np.fft.rfft2(x.mean(axis=-1) - x.mean()) for x in (mine, its))
-    cross = one * np.conj(other)
+    size = picture.shape[:2]
+    first, second = (np.fft.rfft2(x.mean(axis=-1) - x.mean()) for x in (picture, template))
+    cross = first * np.conj(second)
     peaks = np.fft.irfft2(cross / np.maximum(np.abs(cross), 1e-12), s=size)
-    at = np.unravel_index(int(np.argmax(peaks)), size)
-    down, right = (int(k) if k <= n // 2 else int(k) - n for k, n in zip(at, size, strict=True))
+    peak = np.unravel_index(int(np.argmax(peaks)), size)
+    down, right = (int(k) if k <= n // 2 else int(k) - n for k, n in zip(peak, size, strict=True))
     return down, right
 
 
-def _overlap(mine: Floats, its: Floats, down: int, right: int) -> tuple[Floats, Floats]:
+def _overlap(picture: Floats, template: Floats, down: int, right: int) -> tuple[Floats, Floats]:
     """Return the parts that both pictures share with one shifted over the other."""
-    height, width = mine.shape[0] - abs(down), mine.shape[1] - abs(right)
+    height, width = picture.shape[0] - abs(down), picture.shape[1] - abs(right)
     top, left = max(down, 0), max(right, 0)
-    here = mine[top : top + height, left : left + width]
+    part = picture[top : top + height, left : left + width]
     top, left = max(-down, 0), max(-right, 0)
-    return here, its[top : top + height, left : left + width]
+    return part, template[top : top + height, left : left + width]

@@ -68,11 +68,11 @@ def _difference(path: Path, picture: Picture, template: Template) -> tuple[Float
     if picture.codes is None:
         # Its template may be an EXR, or the PNG, which ends at white.
         looks = [*template.looks, template.transform.decode(template.shown)]
-        found = [_difference_of_light(picture, look, template) for look in looks]
-        return _closest(found, ROUNDING), ROUNDING
-    found = [_difference_of_codes(path, picture, look) for look in template.looks]
+        differences = [_difference_of_light(picture, look, template) for look in looks]
+        return _closest(differences, ROUNDING), ROUNDING
+    differences = [_difference_of_codes(path, picture, look) for look in template.looks]
     tolerance = LOSSY if picture.lossy else ROUNDING
-    return _closest(found, tolerance), tolerance
+    return _closest(differences, tolerance), tolerance
 
 
 def _closest(differences: Sequence[Floats], tolerance: float) -> Floats:
@@ -86,10 +86,10 @@ def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:
     """Return the difference as the painting's own display shows it."""
     transform = picture.transform
     assert transform is not None  # A file of integers always has one.
-    mine, its = transform.encode(picture.image), transform.encode(look)
+    codes, look_codes = transform.encode(picture.image), transform.encode(look)
     if picture.lossy:
-        return lossy_difference(mine, compressed_like(path, its))
-    return np.asarray(largest(np.abs(mine - its)), np.float64)
+        return lossy_difference(codes, compressed_like(path, look_codes))
+    return np.asarray(largest(np.abs(codes - look_codes)), np.float64)
 
 
 def _difference_of_light(picture: Picture, look: Floats, template: Template) -> Floats:
@@ -101,14 +101,14 @@ def _difference_of_light(picture: Picture, look: Floats, template: Template) -> 
     return np.asarray(largest(np.maximum(shown, relative)), np.float64)
 
 
-def lossy_difference(mine: Floats, its: Floats) -> Floats:
+def lossy_difference(codes: Floats, look_codes: Floats) -> Floats:
     """Return the difference of display values (h, w, 3) beyond the effect of compression, (h,
     w)."""
-    rough = np.asarray(mine - its, np.float64)
-    near, wide = (
+    rough = np.asarray(codes - look_codes, np.float64)
+    small, large = (
         largest(np.abs(box_mean(rough, radius))) for radius in (SHARP_RADIUS, LOSSY_RADIUS)
     )
-    return np.asarray(np.minimum(near, wide))
+    return np.asarray(np.minimum(small, large))
 
 
 def compressed_like(path: Path, display: Floats) -> Floats:

@@ -43,8 +43,8 @@ class Painted:
 
 def write_painting(path: Path, target: Target) -> None:
     """Write a target as an EXR, from which `read_target` restores it to the last bit."""
-    seen = target.transform
-    name, stops = ("", 0.0) if seen is None else (seen.name, seen.stops)
+    transform = target.transform
+    name, stops = ("", 0.0) if transform is None else (transform.name, transform.stops)
     painted = Painted(FORMAT, target.over_look, target.through_view, name, stops)
     channels = rgb_channels(target.image) | {"W": target.importance.astype(np.float32)}
     if target.at_least is not None and target.at_least.any():

@@ -292,11 +292,11 @@ def spoken_share(share: float) -> str:
 
 def _patches(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Return `mask` (h, w, n) without parts less than three pixels wide: its opening by 3 x 3."""
-    core = ~_around(~mask)
-    return _around(core) & mask
+    core = ~_grown(~mask)
+    return _grown(core) & mask
 
 
-def _around(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+def _grown(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Return whether each pixel or one of its eight neighbours is set."""
     for axis in (0, 1):
         lines = np.moveaxis(mask, axis, 0)

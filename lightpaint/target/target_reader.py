@@ -132,12 +132,12 @@ def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint =
     """Find the painted pixels and make a target. For the arguments see `read_target`. Arguments as
     of `read_target`.
     """
-    picture, made = reading.picture, reading.template
+    picture, template = reading.picture, reading.template
     importance, notes = _importance(reading, mask)
     # Pixels that the file does not store were not painted, whatever a mask says.
-    there = picture.finite if picture.stored is None else picture.finite & picture.stored
-    counted = np.where(there, 1 if importance is None else importance, 0)
-    image, own = picture.image, painted_of(picture.attributes, reading.path)
+    is_there = picture.finite if picture.stored is None else picture.finite & picture.stored
+    counted = np.where(is_there, 1 if importance is None else importance, 0)
+    image, painted = picture.image, painted_of(picture.attributes, reading.path)
     if paint == "light":
         image, counted, note = _lit(reading, counted)
     else:
@@ -150,13 +150,14 @@ def _target_of(reading: _Reading, mask: str | Path | None = None, paint: Paint =
         not_finite=int(picture.finite.size - picture.finite.sum()),
         at_least=picture.saturated,
         notes=(*picture.notes, *reading.notes, *notes, *note),
-        content="" if made is None else made.content,
-        sensor="" if made is None else made.sensor,
+        content="" if template is None else template.content,
+        sensor="" if template is None else template.sensor,
         transform=reading.transform,
-        through_view=picture.transform is not None or (own is not None and own.through_view),
+        through_view=picture.transform is not None
+        or (painted is not None and painted.through_view),
         # A layer that was saved alone lay over something. Pixels outside a mask do not count.
-        over_look=made is not None
-        or (own is not None and own.over_look)
+        over_look=template is not None
+        or (painted is not None and painted.over_look)
         or (picture.transform is not None and picture.alpha is not None and mask is None),
         files=(
             reading.path,
@@ -178,18 +179,18 @@ def _opened(
     """Open the picture, and the template it was painted on. For the arguments see `read_target`.
     Arguments as in `read_target`.
     """
-    asked, made = TransformChoice.of(transform), None
+    choice, made = TransformChoice.of(transform), None
     notes: tuple[str, ...] = ()
     folder = None if template is None else Path(template)
     if folder is not None:
         # A file in it stands for the folder.
         folder = folder.parent if folder.is_file() else folder
         made = read_template(folder)
-        asked = TransformChoice.of(asked.over(made.transform))
+        choice = TransformChoice.of(choice.over(made.transform))
     elif find and (folder := find_template(path)) is not None:
         made = read_template(folder)
     otherwise = None if made is None else made.transform
-    picture = read_picture(path, layer=layer, transform=asked, otherwise=otherwise)
+    picture = read_picture(path, layer=layer, transform=choice, otherwise=otherwise)
     if made is not None and folder is not None and made.size != picture.size:
         if template is not None:
             raise SizeError(
@@ -199,11 +200,11 @@ def _opened(
         notes = (f"not compared with {folder / SHOWN}, which has another size",)
         # The painting has another template, and so another transform.
         made, otherwise = None, None
-        picture = read_picture(path, layer=layer, transform=asked)
-    own = painted_of(picture.attributes, path)
-    if own is not None:
-        otherwise = own.transform
-    shown = picture.transform or (otherwise if asked.is_open else asked.over(otherwise))
+        picture = read_picture(path, layer=layer, transform=choice)
+    own_marks = painted_of(picture.attributes, path)
+    if own_marks is not None:
+        otherwise = own_marks.transform
+    shown = picture.transform or (otherwise if choice.is_open else choice.over(otherwise))
     return _Reading(path, picture, made, folder, shown, notes)
 
 
@@ -227,8 +228,8 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
     is_opaque = picture.alpha is None or bool((picture.alpha == 1).all())
     if template is None and picture.alpha is None and picture.transform is not None:
         # Display values without a known meaning, which a template would tell.
-        seen = f"{picture.transform.name} at {picture.transform.stops:+g} stops"
-        return None, [f"no template is known: all of it counts, as seen through {seen}"]
+        view = f"{picture.transform.name} at {picture.transform.stops:+g} stops"
+        return None, [f"no template is known: all of it counts, as seen through {view}"]
     if template is None or not is_opaque:
         return picture.alpha, []
     importance = painted_where(path, picture, template)
@@ -242,18 +243,18 @@ def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | No
             "find=False if all of it counts"
         )
     note = f"{spoken_share(share)} painted: what differs from {reading.painted_on}"
-    if share > NEARLY_ALL and (said := _of_all(picture, template)):
-        note += f"; {said}"
+    if share > NEARLY_ALL and (remark := _of_all(picture, template)):
+        note += f"; {remark}"
     return importance, [note]
 
 
 def _of_all(picture: Picture, template: Template) -> str:
     """Return a clause on what happened to a template of which little remains, other than paint."""
     transform = picture.transform or template.transform
-    mine, its = (transform.encode(x) for x in (picture.image, template.image))
+    codes, template_codes = (transform.encode(x) for x in (picture.image, template.image))
     if picture.lossy:  # which leaves the means of a few pixels as they are
-        mine, its = (box_mean(x, SHARP_RADIUS) for x in (mine, its))
-    return explain_mismatch(mine, its)
+        codes, template_codes = (box_mean(x, SHARP_RADIUS) for x in (codes, template_codes))
+    return explain_mismatch(codes, template_codes)
 
 
 def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]:
@@ -266,12 +267,12 @@ def _lit(reading: _Reading, counted: Floats) -> tuple[Floats, Floats, list[str]]
     albedo = reading.template.albedo
     # Metals, glass and the background reflect no diffuse light, which leaves their light open.
     blind = (largest(albedo) <= 0) & (counted > 0)
-    seen = np.where(blind, 0, counted)
-    if not seen.any():
+    counted_light = np.where(blind, 0, counted)
+    if not counted_light.any():
         raise TargetError(f"{reading.path}: no painted pixel shows a surface that reflects light")
     lost = int(blind.sum())
     note = [f"{lost} painted pixels show no surface that reflects light"] if lost else []
-    return (reading.picture.image * albedo).astype(np.float32), seen, note
+    return (reading.picture.image * albedo).astype(np.float32), counted_light, note
 
 
 def _beyond(reading: _Reading, counted: Floats) -> list[str]:
@@ -285,11 +286,13 @@ def _beyond(reading: _Reading, counted: Floats) -> list[str]:
     if not painted.any():
         return []
     light = np.maximum(reading.picture.image, 0) / albedo
-    there = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
-    bright = float(np.percentile(there[there_is], 95))
+    light_needed = np.asarray(luminance(np.maximum(template.image, 0) / albedo))
+    bright = float(np.percentile(light_needed[there_is], 95))
     # Nearly black pixels need little light, whatever the ratio.
-    asks = (light > BEYOND * bright) & (reading.picture.image > 0.02 * template.transform.white)
-    share = float((asks.any(axis=-1) & painted).sum() / painted.sum())
+    is_beyond = (light > BEYOND * bright) & (
+        reading.picture.image > 0.02 * template.transform.white
+    )
+    share = float((is_beyond.any(axis=-1) & painted).sum() / painted.sum())
     if share <= FEW:
         return []
     return [

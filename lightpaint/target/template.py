@@ -112,16 +112,16 @@ def write_template(
     [0, 1]; None is not written. lights: by name, (h', w', 3) linear, each light alone. texts: for
     the headers of pictures, under SHOWN and LIGHTS.
     """
-    said, mattes = texts or {}, mattes or {}
+    all_texts, mattes = texts or {}, mattes or {}
     matte_files = [f"{MATTES}/{name}.png" for name in file_names(mattes)]
     light_files = [f"{LIGHTS}/{name}.png" for name in file_names(lights)]
-    given = {
+    arrays = {
         ALBEDO: template.albedo,
         CLEAN: template.clean,
         NORMALS: normals,
         DEPTH: depth,
     }
-    optional = [name for name, image in given.items() if image is not None]
+    optional = [name for name, image in arrays.items() if image is not None]
     written = [LIGHT, SHOWN, *optional, ABOUT, *matte_files, *light_files]
     with staged(folder, earlier_files(folder)) as stage:
         write_look(
@@ -129,10 +129,10 @@ def write_template(
             template.image,
             template.transform,
             clean=template.clean,
-            texts=said.get(SHOWN),
+            texts=all_texts.get(SHOWN),
         )
         if template.clean is not None:
-            write_rgb(stage / CLEAN, template.clean, attributes=said.get(SHOWN))
+            write_rgb(stage / CLEAN, template.clean, attributes=all_texts.get(SHOWN))
         if template.albedo is not None:
             write_rgb(stage / ALBEDO, template.albedo)
         if normals is not None:
@@ -142,7 +142,9 @@ def write_template(
         for file, matte in zip(matte_files, mattes.values(), strict=True):
             write_bytes(stage / file, png_bytes(to_8_bit(matte)))
         for file, look in zip(light_files, lights.values(), strict=True):
-            write_bytes(stage / file, _thumbnail(look, template.transform.name, said.get(LIGHTS)))
+            write_bytes(
+                stage / file, _thumbnail(look, template.transform.name, all_texts.get(LIGHTS))
+            )
         write_text(stage / ABOUT, _about(template, written))
     return [folder / name for name in written]
 
@@ -157,8 +159,8 @@ def _thumbnail(look: Floats, transform: str, texts: Mapping[str, str] | None) ->
 def _about(template: Template, files: Iterable[str]) -> str:
     height, width = template.size
     shown = _Shown(template.transform.name, template.transform.stops)
-    of = (template.scene, template.content, template.sensor)
-    about = fields_of(_About(FORMAT, *of, (width, height), shown, tuple(files)))
+    identity = (template.scene, template.content, template.sensor)
+    about = fields_of(_About(FORMAT, *identity, (width, height), shown, tuple(files)))
     return json.dumps(about, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -167,11 +169,11 @@ def earlier_files(folder: Path) -> list[Path]:
     if not (folder / ABOUT).is_file():
         return []
     try:
-        named = _read_about(folder).files
+        names = _read_about(folder).files
     except (ValueError, LightpaintError):
-        named = ()
-    if named:
-        return [folder / name for name in named if is_below(name)]
+        names = ()
+    if names:
+        return [folder / name for name in names if is_below(name)]
     plain = [folder / name for name in PLAIN]
     return [*plain, *(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
 
@@ -181,8 +183,8 @@ def files_in_the_way(folder: Path) -> list[Path]:
     plain = [folder / name for name in PLAIN]
     # The names of objects and lights are not known yet.
     pictures = [*(folder / MATTES).glob("*.png"), *(folder / LIGHTS).glob("*.png")]
-    there = [*earlier_files(folder), *plain, *pictures]
-    return list(dict.fromkeys(file for file in there if os.path.lexists(file)))
+    existing = [*earlier_files(folder), *plain, *pictures]
+    return list(dict.fromkeys(file for file in existing if os.path.lexists(file)))
 
 
 def template_files(folder: Path) -> list[Path]:
@@ -221,9 +223,9 @@ def read_template(folder: Path) -> Template:
         )
     except (OSError, ValueError, MemoryError, LightpaintError) as error:
         # Errors name its files relative to the folder.
-        said = (str(error) or type(error).__name__).replace(f"{folder}{os.sep}", "")
+        message = (str(error) or type(error).__name__).replace(f"{folder}{os.sep}", "")
         raise TargetError(
-            f"{folder} is no template: {one_line(said)}; make one with lightpaint template"
+            f"{folder} is no template: {one_line(message)}; make one with lightpaint template"
         ) from None
     return Template(image, transform, about.scene, about.content, about.sensor, albedo, clean)
 
@@ -255,16 +257,16 @@ def find_template(painting: Path) -> Path | None:
 
 def file_names(names: Iterable[str]) -> list[str]:
     """Return a file name for each name, valid on any system, unique even without case."""
-    made: list[str] = []
-    taken: set[str] = set()
+    files: list[str] = []
+    used: set[str] = set()
     for name in names:
         stem = re.sub(r"[^\w.+-]", "_", name).strip("._")[:80] or "_"
         unique, k = stem, 2
-        while unique.lower() in taken:
+        while unique.lower() in used:
             unique, k = f"{stem}-{k}", k + 1
-        taken.add(unique.lower())
-        made.append(unique)
-    return made
+        used.add(unique.lower())
+        files.append(unique)
+    return files
 
 
 def texts_of(transform: ViewTransform) -> dict[str, str]:

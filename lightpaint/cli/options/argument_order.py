@@ -72,18 +72,18 @@ def _split(
     parser: argparse.ArgumentParser, words: Sequence[str], plain: list[str]
 ) -> Iterator[tuple[argparse.Action | None, list[str], bool]]:
     """Yield each option, its words, and whether it lacks its value; others go to `plain`."""
-    left = [*words]
-    while left:
-        word = left.pop(0)
+    remaining = [*words]
+    while remaining:
+        word = remaining.pop(0)
         if word == "--":
-            plain += left
+            plain += remaining
             return
         if _is_plain(word):
             plain.append(word)
             continue
         option = _option(parser, word)
-        words = _with_value(option, word, left)
-        yield option, words, option is not None and option.nargs is None and words == [word]
+        parts = _with_value(option, word, remaining)
+        yield option, parts, option is not None and option.nargs is None and parts == [word]
 
 
 def _is_plain(word: str) -> bool:

@@ -13,8 +13,8 @@ def lattice_of(transform: ViewTransform, side: int, low: float, high: float) -> 
     """
     axis = _axis(side, low, high)
     light = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
-    shown = transform.encode(light.reshape(1, -1, 3))
-    return np.asarray(shown.reshape(side, side, side, 3), np.float32)
+    encoded = transform.encode(light.reshape(1, -1, 3))
+    return np.asarray(encoded.reshape(side, side, side, 3), np.float32)
 
 
 def curve_of(transform: ViewTransform, side: int, low: float, high: float) -> Floats:

@@ -148,9 +148,9 @@ def _check_pages(file: Any, first: Any) -> None:
         if not file.seek_subimage(page, 0):
             file.geterror()
             return
-        other = file.spec()
-        is_small = other.get_int_attribute("tiff:subfiletype", 0) & 1
-        if (other.width, other.height) == size and not is_small:
+        spec = file.spec()
+        is_small = spec.get_int_attribute("tiff:subfiletype", 0) & 1
+        if (spec.width, spec.height) == size and not is_small:
             raise ImageError("has several pages or layers: flatten it and export it again")
 
 

@@ -74,11 +74,11 @@ def _decoder(
     by_table: True to decode integers with a table; otherwise it takes values in [0, 1].
     """
 
-    def curve(of: Callable[[Floats], Floats]) -> Callable[[npt.NDArray[Any]], Floats]:
+    def curve(function: Callable[[Floats], Floats]) -> Callable[[npt.NDArray[Any]], Floats]:
         if not by_table:
-            return of
+            return function
         # The same numbers occur again and again.
-        table = np.asarray(of(np.arange(codes + 1) / codes), np.float32)
+        table = np.asarray(function(np.arange(codes + 1) / codes), np.float32)
         return lambda values: table[values]
 
     if profile is None and transform.is_per_channel:
@@ -86,10 +86,12 @@ def _decoder(
     if profile is None:
         display = curve(lambda values: values)
         return lambda values: transform.decode(display(values))
-    curves = [curve(own) for own in profile.curves]
+    curves = [curve(curve_of_channel) for curve_of_channel in profile.curves]
 
     def through_profile(values: npt.NDArray[Any]) -> Floats:
-        light = np.stack([own(values[..., k]) for k, own in enumerate(curves)], axis=-1)
+        light = np.stack(
+            [curve_of_channel(values[..., k]) for k, curve_of_channel in enumerate(curves)], axis=-1
+        )
         shown = converted(light, profile.matrix)
         return _through(transform, shown, is_linear=profile.is_linear, name=profile.name)
 

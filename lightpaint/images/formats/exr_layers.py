@@ -65,11 +65,11 @@ def colour_channels(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
 
 def vector_channels(names: Iterable[str]) -> dict[str, tuple[str, str, str]]:
     """Return layer (prefix) → its x, y and z channels, for layers with all three."""
-    made = {}
+    vectors = {}
     for layer, channels in _by_layer(names).items():
         if {"x", "y", "z"} <= channels.keys():
-            made[layer] = (channels["x"], channels["y"], channels["z"])
-    return made
+            vectors[layer] = (channels["x"], channels["y"], channels["z"])
+    return vectors
 
 
 def channel_named(names: Iterable[str], layer: str, *lasts: str) -> str | None:

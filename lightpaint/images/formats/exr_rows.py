@@ -123,7 +123,7 @@ class RowFile:
         return tuple(parts)
 
     def read_rows(
-        self, part: PartLayout, top: int, bottom: int, names: Sequence[str], into: Floats
+        self, part: PartLayout, top: int, bottom: int, names: Sequence[str], out: Floats
     ) -> None:
         """Read rows of some channels of a part into (channels, bottom - top, w) float32.
 
@@ -135,7 +135,7 @@ class RowFile:
             for lines, begin in self._lines(part, first, min(first + step, last)):
                 rows = slice(max(top, begin), min(bottom, begin + len(lines)))
                 inner = lines[rows.start - begin : rows.stop - begin]
-                for target, name in zip(into, names, strict=True):
+                for target, name in zip(out, names, strict=True):
                     values = _values(part, inner, starts, name)
                     copy_as_singles(values, target[rows.start - top : rows.stop - top])
 
@@ -237,9 +237,11 @@ def _layout(
         raise RowsUnsupportedError("lines in any order")
     texts = {name: value.decode() for name, (kind, value) in attributes.items() if kind == "string"}
     is_packed = values["compression"] != b"\0"
-    shown = windows[1][3] - windows[1][1] + 1, windows[1][2] - windows[1][0] + 1
-    where = offsets.astype(np.int64)
-    return PartLayout(number, size, shown, channels, texts, lines, is_packed, where)
+    display_size = windows[1][3] - windows[1][1] + 1, windows[1][2] - windows[1][0] + 1
+    offsets_of_rows = offsets.astype(np.int64)
+    return PartLayout(
+        number, size, display_size, channels, texts, lines, is_packed, offsets_of_rows
+    )
 
 
 def _values(

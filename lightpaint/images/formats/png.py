@@ -125,21 +125,21 @@ def read_png_head(path: Path) -> tuple[str | None, Profile | None]:
     """
     chunks = dict(_chunks(path))
     text = chunks.get(b"tEXt", b"")
-    shown = text.partition(b"\0")[2].decode("latin-1") or None
+    transform_text = text.partition(b"\0")[2].decode("latin-1") or None
     if b"cICP" in chunks:
-        return shown, _of_cicp(chunks[b"cICP"])
+        return transform_text, _of_cicp(chunks[b"cICP"])
     gamma, colours = chunks.get(b"gAMA", b""), chunks.get(b"cHRM", b"")
     if chunks.keys() & {b"iCCP", b"sRGB"} or len(gamma) != 4:
-        return shown, None
+        return transform_text, None
     primaries = None
     if len(colours) == 32:
         wx, wy, *rgb = (v / 1e5 for v in struct.unpack(">8I", colours))
         primaries = (*rgb, wx, wy)
     encoding = int.from_bytes(gamma, "big") / 1e5
     if not encoding or (abs(encoding - 1 / 2.2) < 1e-3 and is_rec709(primaries)):
-        return shown, None  # these chunks describe sRGB
+        return transform_text, None  # these chunks describe sRGB
     try:
-        return shown, gamma_profile(1 / encoding, primaries)
+        return transform_text, gamma_profile(1 / encoding, primaries)
     except ValueError as error:
         raise ImageError(f"declares impossible colours: {error}") from error
 

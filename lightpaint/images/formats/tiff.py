@@ -34,8 +34,8 @@ def check_tiff(path: Path) -> None:
         raise ImageError("is cut off or damaged") from None
     if not {WIDTH, HEIGHT, BITS} <= fields.keys():
         raise ImageError("is damaged: its header lacks width, height or bits: export it again")
-    width, height = _one(fields, WIDTH), _one(fields, HEIGHT)
-    samples, planar = _one(fields, SAMPLES, 1), _one(fields, PLANAR, 1)
+    width, height = _single_value(fields, WIDTH), _single_value(fields, HEIGHT)
+    samples, planar = _single_value(fields, SAMPLES, 1), _single_value(fields, PLANAR, 1)
     bits = fields[BITS]
     if len(set(bits)) != 1 or len(bits) not in (1, samples):
         raise ImageError(f"has {len(bits)} depths for {samples} channels: expected one for all")
@@ -50,10 +50,10 @@ def _check_chunks(
     """Check that all strips or tiles exist, lie in the file, and hold all their pixels."""
     height, width = image
     if TILE_WIDTH in fields:
-        chunk = _one(fields, TILE_HEIGHT), _one(fields, TILE_WIDTH)
+        chunk = _single_value(fields, TILE_HEIGHT), _single_value(fields, TILE_WIDTH)
         names = TILES if TILES[0] in fields else STRIPS
     else:
-        chunk = min(_one(fields, ROWS_PER_STRIP, height), height), width
+        chunk = min(_single_value(fields, ROWS_PER_STRIP, height), height), width
         names = STRIPS
     if min(*chunk, width, height, samples) < 1 or planar not in (1, 2):
         raise ImageError("is damaged: the numbers in its header are impossible")
@@ -66,7 +66,7 @@ def _check_chunks(
         )
     if any(start + length > size for start, length in zip(offsets, lengths, strict=True)):
         raise ImageError("is cut off")
-    if _one(fields, COMPRESSION, 1) != 1:
+    if _single_value(fields, COMPRESSION, 1) != 1:
         return
     row = -(-chunk[1] * bits * (samples if planar == 1 else 1) // 8)
     for k, length in enumerate(lengths):
@@ -78,7 +78,7 @@ def _check_chunks(
             raise ImageError("is damaged: a strip or tile is too short for its pixels")
 
 
-def _one(fields: Fields, name: int, default: int = 0) -> int:
+def _single_value(fields: Fields, name: int, default: int = 0) -> int:
     return fields.get(name, (default,))[0]
 
 

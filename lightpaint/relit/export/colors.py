@@ -25,36 +25,36 @@ def with_own_colors(
 
     present: emission in the scene, by name, in the same units.
     """
-    changed = []
+    names = []
     for light in lighting.lights:
-        rgb = _own(light, present[light.name])
+        rgb = _own_color(light, present[light.name])
         if rgb is not None:
-            changed.append(light.name)
+            names.append(light.name)
             lighting = lighting.with_emission(light.name, rgb)
-    return lighting, tuple(changed)
+    return lighting, tuple(names)
 
 
-def _own(light: LightSetting, present: RGB) -> RGB | None:
+def _own_color(light: LightSetting, present: RGB) -> RGB | None:
     """Return the emission in the light's own colour; None if the painting determines another."""
-    own, found = np.array(present, np.float64), np.array(light.emission, np.float64)
+    color, solved = np.array(present, np.float64), np.array(light.emission, np.float64)
     ends = light.interval
-    if light.is_fixed or light.constraint or ends is None or not own.any() or not found.any():
+    if light.is_fixed or light.constraint or ends is None or not color.any() or not solved.any():
         return None
-    known = [x for x in ends if x is not None]
-    if len(known) < 3 or max(high - low for low, high in known) <= WIDE * found.max():
+    ends_known = [x for x in ends if x is not None]
+    if len(ends_known) < 3 or max(high - low for low, high in ends_known) <= WIDE * solved.max():
         return None
     if np.allclose(
-        found * own.max(), own * found.max(), rtol=0, atol=1e-6 * own.max() * found.max()
+        solved * color.max(), color * solved.max(), rtol=0, atol=1e-6 * color.max() * solved.max()
     ):
         return None  # it has its own colour already
     # The range of factors for the present emission that fit all channels.
     least, most = 0.0, np.inf
-    for (low, high), its in zip(known, own, strict=True):
-        if its == 0:
+    for (low, high), value in zip(ends_known, color, strict=True):
+        if value == 0:
             least = least if low <= 0 else np.inf
         else:
-            least, most = max(least, low / its), min(most, high / its)
+            least, most = max(least, low / value), min(most, high / value)
     if least > most:
         return None
-    times = float(luminance(found)) / float(luminance(own))
-    return as_rgb(own * min(max(times, least), most))
+    times = float(luminance(solved)) / float(luminance(color))
+    return as_rgb(color * min(max(times, least), most))

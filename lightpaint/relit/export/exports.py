@@ -93,11 +93,13 @@ def lights_table(groups: LightGroups, lighting: Lighting) -> str:
         stops = f"{round(math.log2(y), 3) + 0.0:+.3f}" if y > 0 else "off"
         stops = "unknown" if light.name in unreached else stops
         numbers = [f"{v:.9g}" for v in (*light.weight, y)]
-        kept = "yes" if light.is_fixed else "no"
+        fixed = "yes" if light.is_fixed else "no"
         # Undetermined channels, whose multiplier stays as it was.
-        untold = "".join(c for c, told in zip("RGB", light.reached, strict=True) if not told)
+        untold = "".join(
+            c for c, is_reached in zip("RGB", light.reached, strict=True) if not is_reached
+        )
         names = map(plain_cell, (light.name, layers.get(light.name, "")))
-        rows.append(_row(*names, *numbers, stops, kept, untold))
+        rows.append(_row(*names, *numbers, stops, fixed, untold))
     return "".join(rows)
 
 

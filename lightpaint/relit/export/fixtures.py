@@ -70,20 +70,20 @@ def fixtures_of(lighting: Lighting) -> list[Fixture]:
 
 
 def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float]) -> Fixture:
-    seen = lighting.photometry(light)
+    measured = lighting.photometry(light)
     dmx = None if light.is_fixed else dmx_of(light.emission, full[light.unit])
     return Fixture(
         light.name,
         light.members,
         light.unit,
         *light.emission,
-        seen.y,
-        seen.hex,
-        seen.kelvin,
-        seen.duv,
-        seen.luminous,
-        seen.luminous_unit,
-        seen.flux_lm,
+        measured.y,
+        measured.hex,
+        measured.kelvin,
+        measured.duv,
+        measured.luminous,
+        measured.luminous_unit,
+        measured.flux_lm,
         dmx,
     )
 
@@ -108,24 +108,24 @@ def fixtures_csv(lighting: Lighting) -> str:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)
-    for one in fixtures_of(lighting):
-        its = asdict(one)
-        sent = its.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
-        its["emitters"] = " ".join(one.emitters)
-        table.writerow([_cell(value) for value in (*its.values(), *sent.values())])
+    for fixture in fixtures_of(lighting):
+        record = asdict(fixture)
+        sent = record.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
+        record["emitters"] = " ".join(fixture.emitters)
+        table.writerow([_cell(value) for value in (*record.values(), *sent.values())])
     return text.getvalue()
 
 
 def fixtures_json(lighting: Lighting) -> str:
     """Return the fixtures as an object of JSON."""
-    told: dict[str, Any] = {
+    document: dict[str, Any] = {
         "format": FORMAT,
         "lightpaint": __version__,
         "target": lighting.target,
         "cd_per_unit": lighting.cd_per_unit,
-        "fixtures": [asdict(one) for one in fixtures_of(lighting)],
+        "fixtures": [asdict(fixture) for fixture in fixtures_of(lighting)],
     }
-    return json.dumps(told, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _cell(value: Any) -> str:

@@ -88,19 +88,19 @@ def spoken_unreadable(groups: LightGroups, folder: Path) -> list[str]:
     if not (bad := [file for file in files if _is_evaluated(file)]):
         return []
     # What the path holds may be on its way to a terminal.
-    which = one_line(str(bad[0])) + (f" and {len(bad) - 1} more" if len(bad) > 1 else "")
-    found = "".join(sorted({c for file in bad for c in EVALUATED.findall(_path(file))}))
+    listed = one_line(str(bad[0])) + (f" and {len(bad) - 1} more" if len(bad) > 1 else "")
+    characters = "".join(sorted({c for file in bad for c in EVALUATED.findall(_path(file))}))
     return [
-        f"Nuke would evaluate {one_line(found)} in the path {which}: relit.nk leaves it out, to be "
-        "chosen by hand in its Read nodes; or rename it"
+        f"Nuke would evaluate {one_line(characters)} in the path {listed}: relit.nk leaves it "
+        "out, to be chosen by hand in its Read nodes; or rename it"
     ]
 
 
 def needs_copy(groups: LightGroups) -> bool:
     """Return whether Nuke would read two layers of a file as one, or not as red, green and blue."""
     layers = [*dict.fromkeys((x.file, x.part, x.channels) for x in _read(groups))]
-    called = {(x.file, nuke_layer(x)) for x in _read(groups)}
-    return len(called) < len(layers) or any(x.channels[0].count(".") > 2 for x in _read(groups))
+    sources = {(x.file, nuke_layer(x)) for x in _read(groups)}
+    return len(sources) < len(layers) or any(x.channels[0].count(".") > 2 for x in _read(groups))
 
 
 def copied_part(groups: LightGroups) -> ExrPart:
@@ -110,8 +110,8 @@ def copied_part(groups: LightGroups) -> ExrPart:
     for name, image in zip(names, groups.basis.planes, strict=False):
         channels |= rgb_channels(image, name)
     if groups.beauty is not None:
-        there = np.where(groups.holes[..., None], np.float32(0), groups.beauty.image)
-        channels |= rgb_channels(groups.beauty.in_rec709(there), beauty)
+        light = np.where(groups.holes[..., None], np.float32(0), groups.beauty.image)
+        channels |= rgb_channels(groups.beauty.in_rec709(light), beauty)
         if groups.beauty.alpha is not None:
             channels[f"{beauty}.A"] = groups.beauty.alpha.astype(np.float32)
     return ExrPart("layers", channels)
@@ -148,9 +148,9 @@ def _sources(groups: LightGroups, folder: Path) -> tuple[list[_Source], _Source 
         file = Path(folder) / LAYERS
         *lights, beauty = (_Source(file, name) for name in _copied_names(groups))
         return lights, beauty if groups.beauty is not None else None
-    found = [_Source(x.file, nuke_layer(x)) for x in groups.layers]
+    sources = [_Source(x.file, nuke_layer(x)) for x in groups.layers]
     whole = groups.beauty
-    return found, None if whole is None else _Source(whole.file, nuke_layer(whole))
+    return sources, None if whole is None else _Source(whole.file, nuke_layer(whole))
 
 
 def _file_knobs(file: Path) -> dict[str, str]:

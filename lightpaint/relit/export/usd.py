@@ -62,24 +62,24 @@ def usd_overrides(
     check_usd()
     from pxr import Sdf, Tf, Usd
 
-    there = None if stage is None else _lights_of(stage)
+    stage_lights = None if stage is None else _lights_of(stage)
     layer = Sdf.Layer.CreateAnonymous(".usda")
-    over = Usd.Stage.Open(layer)
+    override_stage = Usd.Stage.Open(layer)
     layer.comment = about
     left = []
     for name, parameter, emission in emitters:
         identifier = Tf.MakeValidIdentifier(name)
         places = {f"{SCOPE}/{identifier}": "SphereLight"}
-        if there is not None:
-            places = there.get(name) or there.get(identifier) or {}
+        if stage_lights is not None:
+            places = stage_lights.get(name) or stage_lights.get(identifier) or {}
         if parameter not in NORMALIZED or len(places) != 1:
             left.append(name)
             continue
         [(path, kind)] = places.items()
-        _override(over.OverridePrim(path), kind, parameter, emission)
+        _override(override_stage.OverridePrim(path), kind, parameter, emission)
     if stage is not None:
         # As soon as it is there, an open stage would look for it, from a layer that is nowhere yet.
-        del over
+        del override_stage
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
         _like(layer, stage)
     return Overrides(layer.ExportToString(), tuple(left))
@@ -109,15 +109,15 @@ def _lights_of(stage: Path) -> Mapping[str, dict[str, str]]:
     try:
         opened = Usd.Stage.Open(str(stage))
     except Tf.ErrorException as error:
-        said = one_line(str(error), limit=200)
-        raise OutputError(f"{stage} is no stage of USD: {said}") from None
-    found: dict[str, dict[str, str]] = {}
+        message = one_line(str(error), limit=200)
+        raise OutputError(f"{stage} is no stage of USD: {message}") from None
+    by_path: dict[str, dict[str, str]] = {}
     for prim in opened.Traverse():
         if prim.HasAPI(UsdLux.LightAPI):
             for name in dict.fromkeys((prim.GetName(), prim.GetDisplayName())):
                 if name:
-                    found.setdefault(name, {})[str(prim.GetPath())] = str(prim.GetTypeName())
-    return found
+                    by_path.setdefault(name, {})[str(prim.GetPath())] = str(prim.GetTypeName())
+    return by_path
 
 
 def _like(layer: Any, stage: Path) -> None:

@@ -25,8 +25,8 @@ def check_required(path: Path, state: Any) -> None:
         names, form = REQUIRED.get(plugin, ((), ""))
         if names and not any(name in node.props for name in names):
             kind = str(node.type).rpartition(".")[2].lower()
-            given = [name for name in node.props if not name.startswith("_")]
-            has = f", which has {one_line(', '.join(given))}," if given else ""
+            given_names = [name for name in node.props if not name.startswith("_")]
+            has = f", which has {one_line(', '.join(given_names))}," if given_names else ""
             place = place_of_node(state, node)
             raise SceneError(
                 f"{path}: {place}the {kind} {plugin!r}{has} needs {names[0]!r}: write {form} in it"

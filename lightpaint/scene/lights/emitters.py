@@ -245,10 +245,10 @@ def belongs_to(parsed: ParsedScene, emitter: int) -> str:
     materials = parsed.children_of(shape, mi.ObjectType.BSDF)
     # Include materials inside a twosided or a mask.
     materials += [k for m in materials for k in parsed.children_of(m, mi.ObjectType.BSDF)]
-    named = (_id(parsed, node) for node in (*parents, *materials))
+    names = (_id(parsed, node) for node in (*parents, *materials))
     props = parsed.state.nodes[shape].props
     file = Path(str(props["filename"])).stem if "filename" in props else ""
-    return next(filter(None, named), file)
+    return next(filter(None, names), file)
 
 
 def _id(parsed: ParsedScene, node: int) -> str:

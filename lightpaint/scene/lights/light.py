@@ -44,10 +44,10 @@ class Light:
 
     def __repr__(self) -> str:
         emission = " ".join(f"{v:.4g}" for v in self.emission)
-        kept = ", kept" if self.is_fixed else ""
+        note = ", kept" if self.is_fixed else ""
         count_text = "" if len(self.members) == 1 else f", {len(self.members)} emitters"
         description = f"{self.plugin} {self.parameter} {emission} {self.unit}"
-        return f"Light({self.name!r}, {description}{count_text}{kept})"
+        return f"Light({self.name!r}, {description}{count_text}{note})"
 
     @property
     def member_names(self) -> tuple[str, ...]:
@@ -87,20 +87,20 @@ class Light:
         bright they are; "" where a member stands in no file.
         """
         if self.is_fixed:
-            own = [m.digest and m.digest.as_is for m in self.members]
+            digests = [m.digest and m.digest.as_is for m in self.members]
         elif self.unit == MULTIPLE:
-            own = [m.digest and f"{m.digest.unit} {m.emission}" for m in self.members]
+            digests = [m.digest and f"{m.digest.unit} {m.emission}" for m in self.members]
         else:
-            own = [m.digest and m.digest.unit for m in self.members]
-        if None in own:
+            digests = [m.digest and m.digest.unit for m in self.members]
+        if None in digests:
             return ""
-        return combined_identity(unlit_content, self.is_fixed, self.unit, sorted(map(str, own)))
+        return combined_identity(unlit_content, self.is_fixed, self.unit, sorted(map(str, digests)))
 
     def emission_of(self, member: Emitter, emission: RGB) -> RGB:
         """Return the emission of `member`, in its own unit, if this light has `emission`."""
         if self.unit != MULTIPLE:
             return emission
-        r, g, b = (w * own for w, own in zip(emission, member.emission, strict=True))
+        r, g, b = (w * factor for w, factor in zip(emission, member.emission, strict=True))
         return r, g, b
 
 
@@ -187,10 +187,15 @@ def settings_for(
             raise SceneError(
                 f"the kept light can be loaded black or unchanged, not multiplied by {rgb}"
             )
-    own = {emitter.node: emitter.sampling_weight for emitter in emitters}
-    if not any((own | {node: x.sampling_weight for node, x in settings.items()}).values()):
+    sampling_weights = {emitter.node: emitter.sampling_weight for emitter in emitters}
+    if not any(
+        (sampling_weights | {node: x.sampling_weight for node, x in settings.items()}).values()
+    ):
         # Mitsuba refuses a scene in which no emitter may be sampled.
-        return {node: replace(x, sampling_weight=own[node] or 1.0) for node, x in settings.items()}
+        return {
+            node: replace(x, sampling_weight=sampling_weights[node] or 1.0)
+            for node, x in settings.items()
+        }
     return settings
 
 

@@ -85,8 +85,8 @@ def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Li
     left = [emitter for emitter in emitters if emitter.name not in adjusted]
     if not left:
         return tuple(lights)
-    name, taken = REST, {light.name for light in lights} | {e.name for e in emitters}
-    while name in taken:
+    name, used_names = REST, {light.name for light in lights} | {e.name for e in emitters}
+    while name in used_names:
         name += "_"
     return (*lights, keep(name, left))
 
@@ -109,10 +109,10 @@ def _members_of_groups(
                 members = [e for e in members if not e.obstacle] or members
             check_adjustable(members)
             for name in (emitter.name for emitter in members):
-                other = group_of.setdefault(name, group)
-                if other != group:
+                other_group = group_of.setdefault(name, group)
+                if other_group != group:
                     raise SceneError(
-                        f"light {name!r} is in two groups, {other!r} and {group!r}: "
+                        f"light {name!r} is in two groups, {other_group!r} and {group!r}: "
                         "an emitter has one weight; remove one of the groups, or give it other "
                         "members (groups of the lights file count too)"
                     )
@@ -145,7 +145,7 @@ def _chosen(
     return chosen
 
 
-def _matching(pattern: str, names: Sequence[str], where: str, scene: str) -> set[str]:
+def _matching(pattern: str, names: Sequence[str], place: str, scene: str) -> set[str]:
     """Return the name itself, else all names that match the pattern. Raises SceneError if none."""
     if pattern in names:
         return {pattern}
@@ -154,17 +154,17 @@ def _matching(pattern: str, names: Sequence[str], where: str, scene: str) -> set
         close = difflib.get_close_matches(pattern, names, n=1)
         hint = f"did you mean {close[0]!r}? It" if close else "it"
         raise SceneError(
-            f"{where}: {scene} has no light {pattern!r}; {hint} has {some_names(names)}"
+            f"{place}: {scene} has no light {pattern!r}; {hint} has {some_names(names)}"
         )
     return matches
 
 
-def _as_list(names: Iterable[str], where: str) -> list[str]:
+def _as_list(names: Iterable[str], place: str) -> list[str]:
     """Return names as a list, after checking that there is at least one."""
     # A string would otherwise count as a list of its letters.
     listed = [names] if isinstance(names, str) else list(names)
     if len(listed) > MAX_LISTED:
-        raise SceneError(f"{where} lists {len(listed)} names: expected at most {MAX_LISTED}")
+        raise SceneError(f"{place} lists {len(listed)} names: expected at most {MAX_LISTED}")
     if not listed or not all(isinstance(name, str) and name for name in listed):
-        raise SceneError(f"{where}: expected a list of at least one name")
+        raise SceneError(f"{place}: expected a list of at least one name")
     return listed

@@ -20,7 +20,7 @@ SUFFIX = ".lights.toml"
 CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
 #: Older key for `prefer_current`, as in `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
-KNOWN = ("lights", "groups", "group_alike", *CONSTRAINTS)
+KNOWN_KEYS = ("lights", "groups", "group_alike", *CONSTRAINTS)
 
 #: Longest lights file that is read, in bytes.
 MAX_BYTES = 2**20
@@ -77,12 +77,14 @@ def lights_file_beside(scene: Path) -> Path:
     return scene.with_name(scene.stem + SUFFIX)
 
 
-def lights_file_for(scene: Path, named: str | Path | None, *, beside: bool) -> LightsFile:
-    """Return the content of the file `named`, else of the one beside `scene` if allowed."""
-    if named is not None:
-        return read_lights_file(Path(named))
+def lights_file_for(
+    scene: Path, path_given: str | Path | None, *, beside_scene: bool
+) -> LightsFile:
+    """Return the content of the file `path_given`, else of the one beside `scene` if allowed."""
+    if path_given is not None:
+        return read_lights_file(Path(path_given))
     path = lights_file_beside(scene)
-    return read_lights_file(path) if beside and path.is_file() else LightsFile()
+    return read_lights_file(path) if beside_scene and path.is_file() else LightsFile()
 
 
 def read_lights_file(path: Path) -> LightsFile:
@@ -118,9 +120,9 @@ def read_keys(path: Path) -> dict[str, Any]:
         end = f"at line {text.rstrip().count(chr(10)) + 1}, the end"
         reason = one_line(str(error).replace("at end of document", end))
         raise SceneError(f"{path} is not TOML: {reason}") from None
-    if unknown := [key for key in data if key not in (*KNOWN, *OLDER)]:
+    if unknown := [key for key in data if key not in (*KNOWN_KEYS, *OLDER)]:
         raise SceneError(
-            f"{path}: unknown key {one_line(repr(unknown[0]))}; known are {', '.join(KNOWN)}"
+            f"{path}: unknown key {one_line(repr(unknown[0]))}; known are {', '.join(KNOWN_KEYS)}"
         )
     if any(not -(2**63) <= number < 2**63 for number in _integers(data)):
         raise SceneError(f"{path} is not TOML: it has an integer of more than 64 bits")
@@ -138,8 +140,8 @@ def _texts(value: Any) -> Iterator[str]:
     elif isinstance(value, dict):
         yield from _texts(value.get("lights"))
     elif isinstance(value, list):
-        for one in value:
-            yield from _texts(one)
+        for text in value:
+            yield from _texts(text)
 
 
 def _texts_in(value: Any) -> Iterator[str]:
@@ -148,19 +150,19 @@ def _texts_in(value: Any) -> Iterator[str]:
         yield value
     elif isinstance(value, dict):
         yield from value
-        for one in value.values():
-            yield from _texts_in(one)
+        for entry in value.values():
+            yield from _texts_in(entry)
     elif isinstance(value, list):
-        for one in value:
-            yield from _texts_in(one)
+        for entry in value:
+            yield from _texts_in(entry)
 
 
 def _integers(value: Any) -> Iterator[int]:
     if isinstance(value, int):
         yield value
     elif isinstance(value, dict | list):
-        for one in value.values() if isinstance(value, dict) else value:
-            yield from _integers(one)
+        for number in value.values() if isinstance(value, dict) else value:
+            yield from _integers(number)
 
 
 def _names(path: Path, key: str, value: Any) -> tuple[str, ...]:
