@@ -21,6 +21,10 @@ from lightpaint.report import clean_pictures
 BYTES_A_PIXEL = 480
 
 
+#: Noise of a light, relative to it, at which blocks of pixels are fitted.
+NOISY = 1.0
+
+
 def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
     """Let planes stay in their file, and pictures of so many pixels be large."""
     patch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
@@ -33,13 +37,15 @@ def stay_in_the_file(patch: pytest.MonkeyPatch, large: int) -> None:
         patch.setattr(module, "LARGE_PICTURE", large)
 
 
-def written(folder: Path, make_basis: Any, size: tuple[int, int], n: int = 3) -> dict[str, Path]:
+def written(
+    folder: Path, make_basis: Any, size: tuple[int, int], n: int = 3, grain: float = 0.02
+) -> dict[str, Path]:
     """Write pools of light with their noise, and a painting of other strengths of them."""
     rng, (height, width) = np.random.default_rng(1), size
     y, x = np.mgrid[:height, :width] / np.reshape(size, (2, 1, 1))
     far = [np.square(x - a) + np.square(y - b) for a, b in rng.uniform(0.2, 0.8, (n, 2))]
     pools = (np.exp(-20 * np.stack(far)) + 0.01)[..., None] * rng.uniform(0.3, 1, (n, 1, 1, 3))
-    noise = 0.02 * pools * rng.standard_normal(pools.shape)
+    noise = grain * pools * rng.standard_normal(pools.shape)
     basis = make_basis(images=pools + noise, half_differences=noise)
     lp.write_basis(folder / "it.basis.exr", basis)
     painted = np.einsum("nhwc,nc->hwc", pools, rng.uniform(0.1, 0.9, (n, 3)))
@@ -49,15 +55,17 @@ def written(folder: Path, make_basis: Any, size: tuple[int, int], n: int = 3) ->
     return {"painting": folder / "painting.png", "basis": folder / "it.basis.exr"}
 
 
+@pytest.mark.parametrize("grain", [0.02, NOISY])
 def test_results_are_those_of_planes_in_memory(
-    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, grain: float
 ) -> None:
-    files = written(tmp_path, make_basis, (67, 90))
+    files = written(tmp_path, make_basis, (67, 90), grain=grain)
     monkeypatch.chdir(tmp_path)
     lp.paint_with_light(None, files["painting"], "memory", basis=files["basis"])
     stay_in_the_file(monkeypatch, 2**9)
     look = lp.paint_with_light(None, files["painting"], "file", basis=files["basis"])
     assert isinstance(look.basis.planes, file_planes.FilePlanes)
+    assert (look.solution.problem.block_side > 1) == (grain == NOISY)
 
     def numbers(folder: str, name: str) -> list[Any]:
         found: list[Any] = []

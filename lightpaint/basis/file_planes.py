@@ -33,10 +33,17 @@ class RowPlanes(PlanesBase):
         """Return some rows of all planes, (n, bottom - top, w, 3)."""
         raise NotImplementedError
 
+    @property
+    def chunk_rows(self) -> int:
+        """Rows that are read together, whichever of them is asked for."""
+        return 1
+
     @cached_property
     def _strips(self) -> "_Strips":
         height, width = self.size
         step = max(1, STRIP_CACHE_BYTES // (STRIP_CACHE_COUNT * 12 * self.count * width))
+        # Whole chunks of the file, which would else be unpacked for two strips each.
+        step = max(step // self.chunk_rows, 1) * self.chunk_rows
         return _Strips(step, lambda k: self.rows(k * step, min((k + 1) * step, height)))
 
     def pixels(self, where: slice | Indices) -> Floats:
@@ -147,6 +154,11 @@ class FilePlanes(RowPlanes):
         """(height, width) in pixels."""
         return self._parts[0].size
 
+    @property
+    def chunk_rows(self) -> int:
+        """Rows that are read together, whichever of them is asked for."""
+        return max(part.lines for part in self._parts)
+
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
         height, width = self.size
@@ -218,6 +230,11 @@ class ReplacedPlanes(RowPlanes):
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         return self._whole.size
+
+    @property
+    def chunk_rows(self) -> int:
+        """Rows that are read together, whichever of them is asked for."""
+        return self._whole.chunk_rows
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""

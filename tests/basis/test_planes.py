@@ -1,6 +1,7 @@
 """Planes: the same numbers wherever they are kept, and nobody else indexes them."""
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,15 @@ import pytest
 import lightpaint
 import lightpaint as lp
 from lightpaint.basis import basis_file, file_planes
+from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means, in_one_row
 from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
+from lightpaint.images.formats import exr_rows
 from lightpaint.images.formats.exr_rows import RowFile
+from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.loss.pixel_bins import bin_pixels
+from lightpaint.lighting.problem import Problem
 
 PACKAGE = Path(lightpaint.__file__).parent
 N, SIZE = 3, (7, 5)
@@ -132,6 +138,142 @@ def test_planes_of_a_file_are_those_in_memory(
     other = found.planes.replaced({0: np.zeros((*size, 3), np.float32)})
     assert not other.rows(3, 5)[0].any()
     assert other.rows(3, 5)[1].any()
+
+
+class CountedPlanes(file_planes.RowPlanes):
+    """Planes of an array, which count the most bytes that are asked of them at a time."""
+
+    def __init__(self, images: np.ndarray) -> None:
+        self._images, self.largest = images, 0
+
+    @property
+    def count(self) -> int:
+        return len(self._images)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self._images.shape[1], self._images.shape[2]
+
+    def plane(self, i: int) -> np.ndarray:
+        self.largest = max(self.largest, self._images[i].nbytes)
+        return self._images[i].copy()
+
+    def rows(self, top: int, bottom: int) -> np.ndarray:
+        made = self._images[:, top:bottom].copy()
+        self.largest = max(self.largest, made.nbytes)
+        return made
+
+
+@pytest.mark.parametrize("side", [1, 2, 3])
+def test_means_over_blocks_are_the_same_wherever_planes_lie(
+    monkeypatch: pytest.MonkeyPatch, side: int
+) -> None:
+    """Of a pixel's weight, with smaller blocks at the ends and none where nothing counts."""
+    rng = np.random.default_rng(8)
+    images = rng.random((N, 67, 90, 3), np.float32)
+    weight = rng.random((65, 89))
+    weight[side : 2 * side, :side] = 0
+    rows, columns = -(-65 // side), -(-89 // side)
+    expected = np.zeros((N, rows, columns, 3))
+    for row, column in np.ndindex(rows, columns):
+        its = np.s_[row * side : min(65, (row + 1) * side), column * side : (column + 1) * side]
+        w = np.zeros((67, 90))
+        w[:65, :89] = weight
+        w = w[its]
+        if w.sum() > 0:
+            expected[:, row, column] = np.einsum("yx,nyxc->nc", w, images[:, *its]) / w.sum()
+    in_memory = block_means(MemoryPlanes(images), weight, side)
+    assert isinstance(in_memory, MemoryPlanes)
+    np.testing.assert_allclose(in_memory.array(), expected, rtol=1e-6)
+    assert not in_memory.plane(0)[1, 0].any()
+    monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
+    on_request = block_means(CountedPlanes(images), weight, side)
+    assert isinstance(on_request, BlockPlanes)
+    check_alike(on_request, in_memory.array())
+
+
+def test_no_more_rows_are_averaged_at_a_time_than_a_chunk_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    images = np.ones((N, 128, 40, 3), np.float32)
+    for limit in (0, 2**27):
+        monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", limit)
+        whole = CountedPlanes(images)
+        made = block_means(whole, np.ones((128, 40)), 2)
+        assert (made.array() == 1).all()
+        assert whole.largest == images[:, :16].nbytes
+
+
+def test_a_fit_of_blocks_reads_strips_of_noisy_planes(
+    monkeypatch: pytest.MonkeyPatch, make_basis: Any
+) -> None:
+    """And sums what a fit of blocks that are kept in memory sums."""
+    rng = np.random.default_rng(10)
+    images = rng.random((N, 128, 40, 3), np.float32)
+    basis = make_basis(images=images, half_differences=rng.normal(0, 0.1, images.shape))
+    target = lp.Target.of(basis.present_look * np.float32(0.7))
+    fit = Fit(transform=lp.ViewTransform("srgb"))
+    counted = CountedPlanes(images), CountedPlanes(basis.half_differences)
+    monkeypatch.setattr(file_planes, "PICKED_MAX_BYTES", 0)
+    monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", 1)
+    found = []
+    for its in (basis, replace(basis, planes=counted[0], noise=counted[1])):
+        problem = Problem.of(its, target, fit=fit)
+        for planes in counted:
+            planes.largest = 0
+        blocks = bin_pixels(problem.views, problem.loss, 2)
+        assert blocks is not None
+        found.append((blocks.equations.M, blocks.equations.b, blocks.prior.M, blocks.prior.b))
+    for mine, expected in zip(*found, strict=True):
+        np.testing.assert_allclose(mine, expected, rtol=1e-12)
+    assert 0 < max(planes.largest for planes in counted) <= images[:, :16].nbytes
+
+
+def test_several_pictures_in_one_row(monkeypatch: pytest.MonkeyPatch, images: np.ndarray) -> None:
+    others = images[:, :2, :4] + 1
+    flat = [x.reshape(N, 1, -1, 3) for x in (images, others)]
+    expected = np.concatenate(flat, axis=2)
+    in_memory = in_one_row([MemoryPlanes(images), MemoryPlanes(others)])
+    assert isinstance(in_memory, MemoryPlanes)
+    np.testing.assert_array_equal(in_memory.array(), expected)
+    on_request = in_one_row([CountedPlanes(images), MemoryPlanes(others)])
+    assert isinstance(on_request, JoinedRow)
+    monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", 1)
+    np.testing.assert_array_equal(on_request.array(), expected)
+    np.testing.assert_array_equal(on_request.plane(1), expected[1])
+    n = on_request.size[1]
+    for where in (slice(30, 40), slice(36, n), slice(0, 0), slice(1, n, 3), np.array([0, 34, 35])):
+        np.testing.assert_array_equal(on_request.pixels(where), expected[:, 0, where])
+    w = np.random.default_rng(9).random((N, 3))
+    np.testing.assert_allclose(on_request.mix(w), in_memory.mix(w), rtol=1e-6)
+    for mine, its in zip(
+        on_request.sums(expected[0, ..., 0], expected[1]),
+        in_memory.sums(expected[0, ..., 0], expected[1]),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(mine, its)
+
+
+def test_a_chunk_of_a_packed_file_is_unpacked_once_for_a_walk(
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "it.basis.exr"
+    written(path, make_basis, smooth=True, size=PLAIN)
+    monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
+    planes = lp.read_basis(path).planes
+    unpacked = []
+    plain = exr_rows._unpacked
+
+    def counted(compressed: bytes, size: int) -> bytes:
+        unpacked.append(size)
+        return plain(compressed, size)
+
+    monkeypatch.setattr(exr_rows, "_unpacked", counted)
+    # Strips of seven rows, of which a chunk has sixteen.
+    strips = 7 * file_planes.STRIP_CACHE_COUNT * 12 * N * PLAIN[1]
+    monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", strips)
+    planes.squares()
+    assert len(unpacked) == N * -(-PLAIN[0] // 16)
 
 
 @pytest.mark.parametrize("how", [{}, {"transform": lp.ViewTransform("srgb")}])

@@ -15,7 +15,7 @@ from lightpaint.arrays import Bools
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, IndirectLight
 from lightpaint.basis.basis_file import is_large
-from lightpaint.basis.composed_planes import PlaneReference, compose_planes
+from lightpaint.basis.derived_planes import PlaneReference, compose_planes
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.planes import Planes
 from lightpaint.basis.render.basis_render import ONE_PASS, basis_lights, method_of, origin_of

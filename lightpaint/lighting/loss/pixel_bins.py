@@ -15,6 +15,8 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.derived_planes import block_means, in_one_row
+from lightpaint.basis.planes import BLOCK_PIXELS, Planes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.lighting.loss.lit_pixels import LitPixels
@@ -68,8 +70,11 @@ class BinnedPixels:
         present = self.basis.present_weights
         present_picture = LitPixels.whole(self.basis, self.loss).predicted(present)
         _, weight = self.loss.pixels.squares(present_picture, from_clipping=False)
-        halves = self.basis.noise.pixels(slice(None)).astype(np.float64)
-        power = np.einsum("cp,npc->nc", weight, np.square(halves))
+        power = np.zeros(present.shape)
+        for start in range(0, weight.shape[1], BLOCK_PIXELS):
+            where = slice(start, start + BLOCK_PIXELS)
+            halves = self.basis.noise.pixels(where).astype(np.float64)
+            power += np.einsum("cp,npc->nc", weight[:, where], np.square(halves))
         return pull_to_present(PRIOR_STRENGTH * power, present)
 
 
@@ -128,7 +133,8 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
 
     None for a loss that only fits single pixels.
     """
-    planes: list[list[Floats]] = [[], []]
+    images: list[Planes] = []
+    halves: list[Planes] = []
     parts: list[tuple[Cut, Doubles]] = []
     for k, basis in enumerate(views.bases):
         cut = partial(views.part, k=k)
@@ -138,18 +144,11 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
         glows = basis.emitters_seen & view_loss.exceeds(np.inf).all(axis=-1)
         weights = enlarged(block_sums(np.where(glows, 0, counts), side), side)
         counts[glows & (weights[: counts.shape[0], : counts.shape[1]] > 0)] = 0
-        total = block_sums(counts, side)
-        safe = np.where(total > 0, total, 1)
-        for block_planes, pictures in zip(planes, (basis.planes, basis.noise), strict=True):
-            means = np.empty((len(basis.lights), *total.shape, 3), np.float32)
-            for mean, image in zip(means, pictures, strict=True):
-                mean[...] = block_sums(image * counts[..., None], side) / safe[..., None]
-            block_planes.append(means.reshape(len(means), -1, 3))
+        images.append(block_means(basis.planes, counts, side))
+        halves.append(block_means(basis.noise, counts, side))
         parts.append((cut, counts))
     if (blocks := loss.block_means(parts, side)) is None:
         return None
-    images, halves = (x[0] if len(x) == 1 else np.concatenate(x, axis=1) for x in planes)
-    images, halves = images[:, None], halves[:, None]
-    none_seen = np.zeros(images.shape[1:3], dtype=bool)
-    basis = views.bases[0].on_pixels(images, halves, none_seen)
+    row, noise = in_one_row(images), in_one_row(halves)
+    basis = views.bases[0].on_pixels(row, noise, np.zeros(row.size, dtype=bool))
     return BinnedPixels(basis, blocks, side)

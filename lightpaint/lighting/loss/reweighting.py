@@ -185,6 +185,7 @@ def run_rounds(
         if from_clipping and (done or part == 0):
             from_clipping = False
             if part == 0:
+                del image, weight, ahead
                 continue
             done = False
         if done or part == 0 or count >= MAX_ROUNDS:
@@ -194,6 +195,7 @@ def run_rounds(
                 weights, w, x, from_clipping, image, weight, equations, count, step, small
             )
         w, x, value = interpolate(w, best, part), interpolate(x, ahead, part), reached
+        del image, weight, ahead  # as large as pictures, and the next ones are made first
 
 
 def relative_change(equations: NormalEquations, w: Doubles, best: Doubles) -> float:

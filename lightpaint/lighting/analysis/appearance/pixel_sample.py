@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.derived_planes import block_means
 from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
@@ -222,13 +223,9 @@ def _average_blocks(views: Views, side: int) -> Views:
     for basis, target, (height, width) in zip(views.bases, views.targets, sizes, strict=True):
         averaged = target.cropped(height, width).reduced(side)
         unseen = ~basis.emitters_seen[:height, :width]
-        total = block_sums(unseen.astype(np.float64), side)
-        counts, safe = unseen[..., None], np.where(total > 0, total, 1)[..., None]
-        images, halves = np.empty((2, len(basis.lights), *total.shape, 3), np.float32)
-        for means, planes in ((images, basis.planes), (halves, basis.noise)):
-            for mean, image in zip(means, planes, strict=True):
-                mean[...] = block_sums(image[:height, :width] * counts, side) / safe
-        bases.append(basis.on_pixels(images, halves, total == 0))
+        counts = unseen.astype(np.float64)
+        images, halves = (block_means(x, counts, side) for x in (basis.planes, basis.noise))
+        bases.append(basis.on_pixels(images, halves, block_sums(counts, side) == 0))
         targets.append(averaged)
     return Views(tuple(bases), tuple(targets))
 
