@@ -5,7 +5,9 @@ empty afterwards. So do XFS and btrfs, and ext4 where a folder is renamed.
 """
 
 import os
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -101,5 +103,23 @@ def test_so_is_a_session_that_is_written_anew(tmp_path: Path) -> None:
         path.unlink()
         store.append(step(2))
         held = content(store)
+    with Store.open(path, IDENTITY) as store:
+        assert content(store) == held
+
+
+@pytest.mark.usefixtures("_unsafe")
+def test_so_is_a_damaged_session_that_is_recovered(tmp_path: Path) -> None:
+    from stored_sessions import IDENTITY, content, step
+
+    path = tmp_path / "session.db"
+    with Store.open(path, IDENTITY) as store:
+        for number in range(4):
+            store.append(step(number))
+    with closing(sqlite3.connect(path)) as other, other:
+        other.execute("UPDATE pixels SET change = x'00' WHERE step = 3")
+    with Store.open(path, IDENTITY) as store:
+        store.recover()
+        held = content(store)
+        assert len(held[1]) == 3
     with Store.open(path, IDENTITY) as store:
         assert content(store) == held
