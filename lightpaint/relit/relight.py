@@ -6,7 +6,7 @@ survive and a diff shows the lights and nothing else.
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -187,12 +187,10 @@ def relit_files(
     edits = {root.resolve(): _Edits(root)}
     settings = dict(settings_of(scene, emission))
     unchanged = [emitter for emitter in scene.emitters if emitter not in settings]
-    # Mitsuba refuses a scene in which no emitter may be sampled.
-    sampled = any(any(rgb) and not emitter.hit_by_chance for emitter, rgb in settings.items())
-    sampled = sampled or any(emitter.sampling_weight for emitter in unchanged)
+    sampled = _sampled_emitters(settings, unchanged)
     for emitter, rgb in settings.items():
         file = scene.files[emitter.file]
-        setting = (emitter, rgb, _sampling_weight(emitter, rgb, sampled))
+        setting = (emitter, rgb, _sampling_weight(emitter, is_sampled=emitter in sampled))
         edits_of_file = edits.setdefault(file.resolve(), _Edits(file)).settings
         if emitter.offset in edits_of_file and edits_of_file[emitter.offset][1:] != setting[1:]:
             raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
@@ -242,14 +240,27 @@ def _included_twice(file: Path, first: Emitter, second: Emitter) -> SceneError:
     )
 
 
-def _sampling_weight(emitter: Emitter, rgb: RGB, sampled: bool) -> float | None:
-    """Return the sampling weight to write, or None to leave it as it is.
+def _sampled_emitters(
+    settings: Mapping[Emitter, RGB], unchanged: Sequence[Emitter]
+) -> set[Emitter]:
+    """Return those of `settings` that a render may sample: the lit ones that are not only hit by
+    chance.
 
-    sampled: whether any emitter is sampled: Mitsuba refuses a scene in which none may be.
+    Mitsuba refuses a scene in which no emitter may be sampled: black ones may where there are no
+    others, and at last those that are hit by chance.
     """
-    if any(rgb) and not (emitter.hit_by_chance and sampled):
-        return 1.0 if emitter.sampling_weight == 0 else None
-    return 0.0 if sampled else None
+    can_be_sampled = {emitter for emitter in settings if not emitter.hit_by_chance}
+    lit = {emitter for emitter in can_be_sampled if any(settings[emitter])}
+    if lit or any(emitter.sampling_weight for emitter in unchanged):
+        return lit
+    return can_be_sampled or set(settings)
+
+
+def _sampling_weight(emitter: Emitter, *, is_sampled: bool) -> float | None:
+    """Return the sampling weight to write, or None to leave it as it is."""
+    if not is_sampled:
+        return 0.0
+    return 1.0 if emitter.sampling_weight == 0 else None
 
 
 def _place_of_include(file: Path, root: Path) -> Path:

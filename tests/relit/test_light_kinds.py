@@ -16,6 +16,7 @@ from lightpaint.lighting.solve import solve
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.emission import MULTIPLE, Scaling
+from lightpaint.scene.lights.light import settings_for
 from lightpaint.scene.scene import load_scene
 from lightpaint.target.target import Target
 
@@ -216,3 +217,21 @@ def test_images_of_lights_with_nearly_the_same_name_stay_apart(assets: Path) -> 
     relight(scene, other, assets / "out" / "b.xml")
     assert len(list((assets / "out").glob("*.exr"))) == 3
     assert verify(predicted, relit, spp=64).agrees
+
+
+def test_what_is_hit_by_chance_is_not_sampled_though_all_else_is_off(assets: Path) -> None:
+    """Mitsuba wants an emitter that may be sampled: it gets a black one."""
+    scene = load_scene(write_room(assets, lights=KINDS["painted mesh"][0] + LIGHTS["bulb"]))
+    emission = {"it": (1.0, 1.0, 1.0), "bulb": (0.0, 0.0, 0.0)}
+    settings = settings_for(scene.lights, scene.emitters, emission, scene="room")
+    its = {x.name: settings[x.node].sampling_weight for x in scene.emitters}
+    assert its == {"it": 0, "bulb": 1}
+    basis = render_basis(scene, spp=256)
+    alone = Lighting.present(basis).with_emission("bulb", (0.0, 0.0, 0.0))
+    relit = relight(scene, alone, assets / "out" / "relit.xml")
+    assert {x.name: x.sampling_weight for x in relit.emitters} == {"it": 0, "bulb": 1}
+    assert verify(combine(basis, alone), relit, spp=256).agrees
+    # And where it is all there is, Mitsuba has to sample it.
+    only = load_scene(write_room(assets, lights=KINDS["painted mesh"][0]))
+    relit = relight(only, Lighting.present(render_basis(only, spp=2)), assets / "2" / "relit.xml")
+    assert [x.sampling_weight for x in relit.emitters] == [1]

@@ -103,7 +103,9 @@ def _outcome(planned: Plan, outcome: BatchOutcome) -> CommandOutcome:
     if len(outcome.failed) > LISTED:
         terminal.complain("batch", f"and {len(outcome.failed) - LISTED} more, in summary.csv")
     if outcome.skipped:
-        terminal.say(f"{len(outcome.skipped)} looks were done earlier and are unchanged")
+        count = len(outcome.skipped)
+        done = "1 look was" if count == 1 else f"{count} looks were"
+        terminal.say(f"{done} done earlier and {'is' if count == 1 else 'are'} unchanged")
     if outcome.waiting:
         terminal.complain("batch", f"stopped before {some_of(outcome.waiting)}")
     if outcome.rows:

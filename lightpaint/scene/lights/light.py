@@ -191,11 +191,11 @@ def settings_for(
     if not any(
         (sampling_weights | {node: x.sampling_weight for node, x in settings.items()}).values()
     ):
-        # Mitsuba refuses a scene in which no emitter may be sampled.
-        return {
-            node: replace(x, sampling_weight=sampling_weights[node] or 1.0)
-            for node, x in settings.items()
-        }
+        # Mitsuba refuses a scene in which no emitter may be sampled: black ones may, or the one
+        # that is hit by chance, where there are no others.
+        by_chance = {emitter.node for emitter in emitters if emitter.hit_by_chance}
+        for node in settings.keys() - by_chance or settings.keys():
+            settings[node] = replace(settings[node], sampling_weight=sampling_weights[node] or 1.0)
     return settings
 
 
