@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import RGB, Floats, Position, as_rgb
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.basis_render import render_planes_only
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.errors import SceneError
 from lightpaint.images.pixel_blocks import whole_factor
@@ -171,7 +171,7 @@ def _render(small: Scene, places: Floats, seed: int) -> Basis:
     height, width = small.size
     spp = max(4, SAMPLES // (height * width))
     lit = small.lit_by_points([as_position(place) for place in places])
-    return render_basis(lit, spp=spp, seed=seed)
+    return render_planes_only(lit, spp=spp, seed=seed)
 
 
 def _suggestions(

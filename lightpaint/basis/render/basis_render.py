@@ -103,6 +103,14 @@ def render_basis(
     return with_first_hits(made, scene, seed)
 
 
+def render_planes_only(scene: Scene, *, spp: int, seed: int) -> Basis:
+    """Render a basis without features and objects, for work that never looks at them."""
+    check_memory(scene)
+    render_all = _render_together if method_of(scene) == ONE_PASS else _render_one_by_one
+    with render_errors(scene.path):
+        return render_all(scene, Budget(spp, None), seed, None, Keeper(None), silent)
+
+
 def with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
     """Return `basis` with its features: one from an earlier version may lack them."""
     if basis.features is not None and basis.objects is not None:
