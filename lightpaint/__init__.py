@@ -90,7 +90,7 @@ if TYPE_CHECKING:
     from lightpaint.scene.pose import Pose as Pose
     from lightpaint.scene.runtime.variant import use_variant as use_variant
     from lightpaint.scene.scene import Scene as Scene
-    from lightpaint.scene.scene import load_scene as load_scene
+    from lightpaint.scene.scene_reader import load_scene as load_scene
     from lightpaint.target.target import Target as Target
     from lightpaint.target.target_reader import read_target as read_target
 
@@ -130,7 +130,7 @@ _HOMES = {
     "diagnose": "lighting.analysis.diagnosis",
     "display_picture": "images.formats.png",
     "error_bars": "lighting.analysis.noise.uncertainty",
-    "load_scene": "scene.scene",
+    "load_scene": "scene.scene_reader",
     "paint_with_light": "pipeline.one_call",
     "read_basis": "basis.basis_file",
     "read_constraints": "lighting.constraints.constraints_file",

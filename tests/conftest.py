@@ -21,7 +21,8 @@ from threadpoolctl import threadpool_limits
 from lightpaint.basis.basis import Basis, Origin
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 # Shared machines are slow now and then, which is no failure; a fixed choice of examples makes
 # a run repeatable.

@@ -64,7 +64,7 @@ class Reader:
 
             found = read_light_groups(path)
             return found.basis.names, found.basis.images.tobytes()
-        from lightpaint.scene.scene import load_scene
+        from lightpaint.scene.scene_reader import load_scene
 
         scene = load_scene(path)
         return scene.film, scene.spp, scene.integrator, scene.emitters

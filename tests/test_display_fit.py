@@ -18,7 +18,7 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import LightpaintError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import write_png_16
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.template import Template, write_template
 
 TRUTH = np.array([[5.0, 3, 2], [0.2, 0.9, 0.4], [1, 2, 0.5]])

@@ -27,7 +27,7 @@ from lightpaint.paint.server.http_connections import MAX_UNAUTHENTICATED
 from lightpaint.paint.server.session_clients import MAX_PAGES
 from lightpaint.scene.lights.similar_emitters import MAX_SEPARATE
 from lightpaint.scene.quality_presets import PRESETS
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.template import PLAIN
 from lightpaint.validation import MAX_NAME
 

@@ -28,7 +28,7 @@ from lightpaint.errors import (
 )
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.pipeline.sources import BasisFile, GroupsFile
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
 SIDE = """<sensor type="perspective" id="side"><transform name="to_world">

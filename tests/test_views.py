@@ -34,7 +34,7 @@ from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
 CLOSE = """<sensor type="perspective" id="close"><float name="fov" value="40"/>

@@ -26,7 +26,7 @@ from lightpaint.relit.relight import relight
 from lightpaint.relit.sequential_verification import verify_in_stages
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.verdict import agreement
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.painting_file import write_painting
 from lightpaint.target.template import texts_of
 

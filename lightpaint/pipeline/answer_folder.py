@@ -15,7 +15,8 @@ from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.pipeline.result_folder import ResultFolder
 from lightpaint.relit.export.exports import EXPORTS, write_exports
 from lightpaint.relit.relight import check_relightable, relight, settle
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 #: Files of every answer; a scene may add files that it includes, light groups those for other
 #: programs.

@@ -32,7 +32,8 @@ from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream
 from lightpaint.scene.surfaces import render_features
 from lightpaint.screen import some_names

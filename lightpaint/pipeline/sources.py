@@ -17,7 +17,8 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.pipeline.settings import Settings
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 from lightpaint.target.target_reader import Paint, read_over_look, read_target
 

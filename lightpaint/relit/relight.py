@@ -23,7 +23,8 @@ from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.screen import some_names
 
 #: A parameter in Mitsuba's list of unused ones.

@@ -6,7 +6,7 @@ time, and no reference to one of its emitters may outlive it.
 
 import gc
 import hashlib
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,24 +16,19 @@ import numpy as np
 
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
-from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
-from lightpaint.scene.checks.old_scenes import explain_old_scene
-from lightpaint.scene.checks.xml_limits import MAX_XML
-from lightpaint.scene.emission import ENVIRONMENTS, EmitterSetting
-from lightpaint.scene.film import Film, camera_named, check_film, reduced, reduction, sensor_index
+from lightpaint.scene.emission import EmitterSetting
+from lightpaint.scene.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.integrator import Integrator, IntegratorChoice
-from lightpaint.scene.lights.emitters import Emitter, check_emitters, find_emitters, point_emitter
+from lightpaint.scene.lights.emitters import Emitter, point_emitter
 from lightpaint.scene.lights.light import Light, free_names, light_named, lights_of, settings_for
-from lightpaint.scene.lights.light_choice import REST, choose_lights
-from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside, lights_file_for
+from lightpaint.scene.lights.light_choice import REST
+from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside
 from lightpaint.scene.mitsuba_errors import mitsuba_errors, render_errors
-from lightpaint.scene.plane_identity import SceneHasher
 from lightpaint.scene.pose import Pose, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
-from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.scene_inspection import inspect_scene, shape_names
 from lightpaint.scene.scene_tree import ParsedScene
-from lightpaint.scene.shape_names import shape_names
 from lightpaint.screen import Listed, Shown, some_names, some_of
 
 _Made = TypeVar("_Made")
@@ -258,15 +253,15 @@ class Scene(Shown):
             motions[emitter.node] = motion_of(emitter.name, emitter.plugin, emitter.site, pose)
         parsed = self._parsed.with_motions(motions)
         with mitsuba_errors(self.path):
-            seen = _look_at(parsed, self.sensor)
+            facts = inspect_scene(parsed, self.sensor)
         members = {light.name: light.member_names for light in self.lights}
         lights = lights_of(
-            seen["emitters"], members, [light.name for light in self.lights if light.is_fixed]
+            facts["emitters"], members, [light.name for light in self.lights if light.is_fixed]
         )
         found = {light.name for light in self.lights if light.is_found}
         return replace(
             self,
-            **seen | {"film": self.film},
+            **facts | {"film": self.film},
             lights=tuple(replace(x, is_found=x.name in found) for x in lights),
             _parsed=parsed,
         )
@@ -362,118 +357,3 @@ class Scene(Shown):
             bitmap.set_srgb_gamma(False)
         rgb = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
         return np.array(rgb)
-
-
-@keywords()
-@MITSUBA.taken()
-def load_scene(
-    path: str | Path,
-    *,
-    sensor: int | str | None = None,
-    parameters: Mapping[str, object] | None = None,
-    variant: str | None = None,
-    lights: Iterable[str] | None = None,
-    groups: Mapping[str, Iterable[str]] | None = None,
-    lights_file: str | Path | None = None,
-    use_lights_file: bool = True,
-    group_alike: bool = True,
-    integrator: str | None = None,
-) -> Scene:
-    """Read a Mitsuba scene XML and find its lights.
-
-    Args:
-        path: Mitsuba XML.
-        sensor: Index or id of the sensor to look through (the first by default).
-        parameters: Values for the `$name` parameters of the XML (Mitsuba's `-D`).
-        variant: Mitsuba variant to run, where the process has none yet.
-        lights: Names or patterns (`window_*`) of those to adjust, all by default; others are kept.
-        groups: Name → names or patterns of emitters that are adjusted as one light.
-        lights_file: TOML with such lights and groups, instead of the one beside the scene. `lights`
-            replaces what it lists, `groups` are added to its own or replace namesakes; without
-            `lights` they are adjusted beside what it lists.
-        use_lights_file: False leaves the one beside the scene alone.
-        group_alike: Whether more than 24 emitters that are alike and have no names are one light,
-            unless they are asked for by the names that they get here. The lights file may say no.
-        integrator: To render with instead of the scene's own, like `path`, `direct` or
-            `path:max_depth=8`. What its own says of max_depth, rr_depth and hide_emitters stays.
-
-    Raises:
-        SceneError: With Mitsuba's own message where it refuses the scene.
-        BackendError: If Mitsuba cannot run.
-
-    Examples:
-        >>> [light.name for light in lp.load_scene("room.xml").lights]
-        ['panel', 'bulb']
-        >>> lp.load_scene("room.xml", lights=["bulb"]).lights
-        (Light('bulb', ...),
-         Light('rest', ..., kept))
-    """
-    backend = use_variant(variant)
-    path = Path(path)
-    file_length(path, "scene file", SceneError, limit=MAX_XML)
-    if path.suffix.lower() in (".exr", ".json", ".png"):
-        raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")
-    values = {key: str(value) for key, value in (parameters or {}).items()}
-    instead = None if integrator is None else IntegratorChoice.of(integrator)
-    with explain_old_scene(path), mitsuba_errors(path):
-        parsed = ParsedScene(path, values, backend.variant, instead)
-    index = sensor_index(sensor, parsed.sensor_names, path)
-    said = lights_file_for(path, lights_file, beside_scene=use_lights_file).with_more(
-        lights, groups
-    )
-    with explain_old_scene(path), mitsuba_errors(path):
-        seen = _look_at(parsed, index)
-    check_film(path, seen["film"], seen["spp"])
-    emitters = seen["emitters"]
-    check_emitters(path, emitters)
-    return Scene(
-        path=path,
-        parameters=values,
-        lights=choose_lights(
-            emitters,
-            scene=str(path),
-            lights=said.lights,
-            groups=said.groups,
-            group_alike=group_alike and said.group_alike,
-            named=said.requests.names,
-        ),
-        lights_file=said.path,
-        requests=said.requests,
-        _parsed=parsed,
-        **seen,
-    )
-
-
-def _look_at(parsed: ParsedScene, sensor: int) -> dict[str, Any]:
-    """Return the facts that only the loaded and the parsed scene tell, as fields of a `Scene`."""
-    loaded, hasher = parsed.instantiate({}), SceneHasher(parsed)
-    camera = camera_named(loaded, parsed.sensor_names[sensor])
-    emitters, film = find_emitters(parsed, loaded, hasher), Film.of(camera, sensor)
-    seen = {
-        "emitters": emitters,
-        "film": film,
-        "spp": int(camera.sampler().sample_count()),
-        "has_null": (has_null := _has_null_surfaces(loaded)),
-    }
-    del loaded, camera
-    gc.collect()
-    has_environment = any(emitter.plugin in ENVIRONMENTS for emitter in emitters)
-    return {
-        **seen,
-        "sensor_names": parsed.sensor_names,
-        "integrator": parsed.integrator(),
-        "instead": parsed.instead,
-        "has_media": parsed.has_media(),
-        "files": parsed.files,
-        "content": parsed.content(sensor),
-        "unlit_content": hasher.unlit_content(
-            film, has_environment=has_environment, has_null=has_null
-        ),
-    }
-
-
-def _has_null_surfaces(loaded: Any) -> bool:
-    import mitsuba as mi
-
-    bsdfs = (shape.bsdf() for shape in loaded.shapes())
-    return any(b is not None and mi.has_flag(b.flags(), mi.BSDFFlags.Null) for b in bsdfs)

@@ -26,7 +26,8 @@ from lightpaint.errors import LightpaintError, OutputError, SceneError
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 #: What one is called that no program has written to its end.
 DAMAGED = "da" * 16

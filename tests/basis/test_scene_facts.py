@@ -17,7 +17,8 @@ from lightpaint.basis import cache, cache_folder, scene_facts
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import basis_lights
 from lightpaint.basis.scene_facts import SceneFacts, facts_key, recall_facts, remember_facts
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 SCENE = """<scene version="3.0.0">
   <include filename="parts/lamp.xml"/>

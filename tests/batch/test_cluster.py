@@ -326,7 +326,7 @@ def test_a_batch_that_was_killed_goes_on_with_the_parts_that_it_has(
 
 
 def plan_of_parts(here: Path) -> list[Any]:
-    from lightpaint.scene.scene import load_scene
+    from lightpaint.scene.scene_reader import load_scene
 
     with pytest.MonkeyPatch.context() as patch:
         in_small_parts(patch, here / "none")

@@ -13,7 +13,7 @@ from lightpaint.batch import task_bases
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 
 #: A look, and the frame that begins with it.
 NAMED = ("bright-camera", "path-0")

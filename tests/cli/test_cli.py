@@ -25,7 +25,7 @@ from lightpaint.images.estimate import read_estimate
 from lightpaint.images.formats.exr import ExrPart, read_parts, rgb_channels, write_parts, write_rgb
 from lightpaint.pipeline.results import verify_result
 from lightpaint.scene.quality_presets import PRESETS
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
 CORNELL = REPOSITORY / "scenes" / "cornell" / "scene.xml"

@@ -14,7 +14,7 @@ from lightpaint import Constraints, paint_with_light, read_basis
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 
 FILE = """
 sparse = 3

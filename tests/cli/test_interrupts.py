@@ -16,7 +16,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.basis_file import read_basis
 from lightpaint.basis.render.basis_render import ONE_PASS, SEPARATE
 from lightpaint.basis.render.cached_render import obtain_basis
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 
 SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
 INTEGRATORS = {ONE_PASS: PATH, SEPARATE: SEPARATELY}

@@ -19,7 +19,7 @@ from lightpaint.images.denoiser import (
     denoiser_text,
     oidn_is_installed,
 )
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.surfaces import render_features, render_surfaces
 
 HEIGHT, WIDTH = 48, 64

@@ -26,7 +26,8 @@ from lightpaint.placement.light_search import (
 )
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.report.page.suggestion_section import spoken_suggestions, suggestion_section
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
 #: A light that the scene to solve does not have.

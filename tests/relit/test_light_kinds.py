@@ -17,7 +17,7 @@ from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.scene.emission import MULTIPLE, Scaling
 from lightpaint.scene.lights.light import settings_for
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
 PLACE = """<transform name="to_world"><lookat origin="0.5 1.8 1.5" target="0 0.3 0" up="0 1 0"/>

@@ -20,7 +20,8 @@ from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.relight import check_relightable, relight
 from lightpaint.relit.verification_render import verify
 from lightpaint.relit.xml_patch import scene_patch
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 
 def lighting_of(scene: Scene, emission: dict[str, tuple[float, float, float]]) -> Lighting:

@@ -24,7 +24,7 @@ from lightpaint.relit.sequential_verification import (
     verify_in_stages,
 )
 from lightpaint.relit.verification import LIMIT
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 
 SIZE = (24, 32)
 

@@ -18,7 +18,8 @@ from lightpaint.lighting.solve import solve
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.relit.relight import check_relightable, relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
 TWIN = LIGHTS["bulb"].replace('"bulb"', '"twin"').replace("-0.5", "0.6")

@@ -17,7 +17,8 @@ from lightpaint.lighting.answer.lighting import Lighting, LightSetting
 from lightpaint.relit.relight import relight
 from lightpaint.relit.xml_edit import Element, XmlFile, _parse
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 BULB = LIGHTS["bulb"]
 COLOUR = (0.25, 1.5, 3.0)

@@ -17,7 +17,8 @@ from lightpaint.scene.emission import EmissionKind, Scaling
 from lightpaint.scene.lights.emitters import Emitter, point_emitter
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.similar_emitters import MAX_SEPARATE, SIZE_TOLERANCE, alike_groups
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 GLASS = '<bsdf type="twosided" id="glass"><bsdf type="diffuse" id="inner"/></bsdf>'
 BARE = '<bsdf type="mask"><ref id="inner"/></bsdf>'

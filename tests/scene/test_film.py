@@ -18,7 +18,7 @@ from lightpaint.progress import silent
 from lightpaint.scene.film import Film, even_reductions, reduced, reduction, reduction_to
 from lightpaint.scene.quality_presets import PRESETS, on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 from lightpaint.scene.surfaces import render_surfaces
 from lightpaint.target.target import Target

@@ -17,7 +17,8 @@ from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relight import relit_files
 from lightpaint.scene.integrator import IntegratorChoice
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 #: Of Mitsuba 0.6, which Mitsuba 3 lacks.
 LACKING = '<integrator type="bdpt" id="mine"><integer name="max_depth" value="6"/></integrator>'

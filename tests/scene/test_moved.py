@@ -10,7 +10,8 @@ import lightpaint as lp
 from lightpaint.errors import SceneError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.scene.pose import rotation_between
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 #: Poses of lights without a shape, whose planes are theirs alone.
 POSES = {

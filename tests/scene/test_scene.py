@@ -10,7 +10,8 @@ from renderer import CORNELL, LIGHTS, mitsuba_render, write_room
 
 from lightpaint.errors import BackendError, SceneError
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 
 def test_lights_in_document_order_with_what_they_emit(small_room: Scene) -> None:

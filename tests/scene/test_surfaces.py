@@ -7,7 +7,7 @@ import pytest
 from renderer import LIGHTS, write_room
 
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.surfaces import BACKGROUND, Surfaces, render_first_hits, render_surfaces
 
 
@@ -60,7 +60,7 @@ def test_one_picture_in_every_variant(seen: Surfaces, tmp_path: Path) -> None:
     room = write_room(tmp_path, lights=LIGHTS["panel"])
     code = f"""
 import numpy as np
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.scene.surfaces import BACKGROUND, Surfaces, render_first_hits, render_surfaces
 seen = render_surfaces(load_scene({str(room)!r}, variant="scalar_rgb"))

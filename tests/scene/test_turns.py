@@ -11,7 +11,7 @@ import pytest
 import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.scene.runtime.render_lock import MAX_WAIT_S, MITSUBA, Turns
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 
 #: Seconds of a piece of work, and in which a thread surely comes to its turn.

@@ -23,7 +23,8 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.settings import Settings
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
 #: Types that can be painted.

@@ -14,7 +14,7 @@ from lightpaint.basis.render.basis_render import _render_one_by_one, render_basi
 from lightpaint.basis.render.render_budget import Budget, Keeper
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 
 #: Two spots that each light one end of the floor, and a lamp behind the wall.
 SPOTS = "".join(

@@ -27,7 +27,8 @@ from lightpaint.pipeline.job_bases import obtain
 from lightpaint.pipeline.settings import Settings
 from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import Interrupted, listener, silent
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 #: Edits of the XML of the test room.
 MOVED = ('x="-0.5" y="1" z="0.5"', 'x="-0.2" y="1.2" z="0.4"')

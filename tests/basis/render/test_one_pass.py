@@ -21,7 +21,8 @@ from lightpaint.errors import SceneError
 from lightpaint.pipeline.remarks import remarks_of_scene
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, Stream, pass_seed, plan_passes, render
 
 INTEGRATORS = {

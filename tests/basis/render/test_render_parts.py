@@ -18,7 +18,8 @@ from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_parts import Part, PartRenderer, PartSums, plan_parts
 from lightpaint.errors import SceneError
 from lightpaint.scene.runtime.kernel_threads import limit_threads
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 SPP = 32
 

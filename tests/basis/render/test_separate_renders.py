@@ -19,7 +19,8 @@ from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
 SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="4"/></integrator>'

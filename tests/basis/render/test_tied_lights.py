@@ -12,7 +12,8 @@ from lightpaint.basis.render.basis_render import SEPARATE, is_of, render_basis
 from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.scene.emission import MULTIPLE
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 #: A lamp of the kind and the colour of `bulb`.
 TWIN = LIGHTS["bulb"].replace('"bulb"', '"twin"').replace("-0.5", "0.6")

@@ -16,7 +16,8 @@ from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene.runtime.variant import use_variant
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.scene_render import Stream, render
 
 #: Samples per pixel of the basis and of the renders that it is compared with.

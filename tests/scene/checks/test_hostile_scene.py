@@ -18,7 +18,7 @@ from renderer import GLOSSY, LIGHTS, PATH, ROOM, write_room
 
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 
 ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", wall=GLOSSY, lights=LIGHTS["bulb"])
 DEVICES = ("/dev/zero", "/dev/random", "/dev/stdin", "/proc/self/mem", "/", "pipe", "gone")

@@ -12,7 +12,7 @@ from renderer import GLOSSY, LIGHTS, PATH, ROOM
 
 from lightpaint.errors import SceneError
 from lightpaint.scene.runtime.plugins import IN_PYTHON
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 
 ROOM_TEXT = ROOM.format(integrator=PATH, film="", sensors="", wall=GLOSSY, lights=LIGHTS["bulb"])
 

@@ -17,7 +17,7 @@ from lightpaint.scene.checks.tokens import (
     line_of,
     markup,
 )
-from lightpaint.scene.scene import load_scene
+from lightpaint.scene.scene_reader import load_scene
 
 
 def _tags(text: str) -> list[tuple[str, dict[str, str]]]:

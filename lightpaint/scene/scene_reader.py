@@ -1,0 +1,101 @@
+"""Reading a Mitsuba scene, and choosing the lights to adjust."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from lightpaint.errors import SceneError
+from lightpaint.file_reading import file_length
+from lightpaint.keywords import keywords
+from lightpaint.scene.checks.old_scenes import explain_old_scene
+from lightpaint.scene.checks.xml_limits import MAX_XML
+from lightpaint.scene.film import check_film, sensor_index
+from lightpaint.scene.integrator import IntegratorChoice
+from lightpaint.scene.lights.emitters import check_emitters
+from lightpaint.scene.lights.light_choice import choose_lights
+from lightpaint.scene.lights.lights_file import lights_file_for
+from lightpaint.scene.mitsuba_errors import mitsuba_errors
+from lightpaint.scene.runtime.render_lock import MITSUBA
+from lightpaint.scene.runtime.variant import use_variant
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_inspection import inspect_scene
+from lightpaint.scene.scene_tree import ParsedScene
+
+
+@keywords()
+@MITSUBA.taken()
+def load_scene(
+    path: str | Path,
+    *,
+    sensor: int | str | None = None,
+    parameters: Mapping[str, object] | None = None,
+    variant: str | None = None,
+    lights: Iterable[str] | None = None,
+    groups: Mapping[str, Iterable[str]] | None = None,
+    lights_file: str | Path | None = None,
+    use_lights_file: bool = True,
+    group_alike: bool = True,
+    integrator: str | None = None,
+) -> Scene:
+    """Read a Mitsuba scene XML and find its lights.
+
+    Args:
+        path: Mitsuba XML.
+        sensor: Index or id of the sensor to look through (the first by default).
+        parameters: Values for the `$name` parameters of the XML (Mitsuba's `-D`).
+        variant: Mitsuba variant to run, where the process has none yet.
+        lights: Names or patterns (`window_*`) of those to adjust, all by default; others are kept.
+        groups: Name → names or patterns of emitters that are adjusted as one light.
+        lights_file: TOML with such lights and groups, instead of the one beside the scene. `lights`
+            replaces what it lists, `groups` are added to its own or replace namesakes; without
+            `lights` they are adjusted beside what it lists.
+        use_lights_file: False leaves the one beside the scene alone.
+        group_alike: Whether more than 24 emitters that are alike and have no names are one light,
+            unless they are asked for by the names that they get here. The lights file may say no.
+        integrator: To render with instead of the scene's own, like `path`, `direct` or
+            `path:max_depth=8`. What its own says of max_depth, rr_depth and hide_emitters stays.
+
+    Raises:
+        SceneError: With Mitsuba's own message where it refuses the scene.
+        BackendError: If Mitsuba cannot run.
+
+    Examples:
+        >>> [light.name for light in lp.load_scene("room.xml").lights]
+        ['panel', 'bulb']
+        >>> lp.load_scene("room.xml", lights=["bulb"]).lights
+        (Light('bulb', ...),
+         Light('rest', ..., kept))
+    """
+    backend = use_variant(variant)
+    path = Path(path)
+    file_length(path, "scene file", SceneError, limit=MAX_XML)
+    if path.suffix.lower() in (".exr", ".json", ".png"):
+        raise SceneError(f"{path} is not a scene: this command takes a Mitsuba XML first")
+    values = {key: str(value) for key, value in (parameters or {}).items()}
+    instead = None if integrator is None else IntegratorChoice.of(integrator)
+    with explain_old_scene(path), mitsuba_errors(path):
+        parsed = ParsedScene(path, values, backend.variant, instead)
+    index = sensor_index(sensor, parsed.sensor_names, path)
+    selection = lights_file_for(path, lights_file, beside_scene=use_lights_file).with_more(
+        lights, groups
+    )
+    with explain_old_scene(path), mitsuba_errors(path):
+        facts = inspect_scene(parsed, index)
+    check_film(path, facts["film"], facts["spp"])
+    emitters = facts["emitters"]
+    check_emitters(path, emitters)
+    return Scene(
+        path=path,
+        parameters=values,
+        lights=choose_lights(
+            emitters,
+            scene=str(path),
+            lights=selection.lights,
+            groups=selection.groups,
+            group_alike=group_alike and selection.group_alike,
+            named=selection.requests.names,
+        ),
+        lights_file=selection.path,
+        requests=selection.requests,
+        _parsed=parsed,
+        **facts,
+    )
