@@ -17,6 +17,7 @@ from lightpaint.lighting.analysis.noise.noise import (
     noise_sums,
     pseudo_inverse,
 )
+from lightpaint.lighting.analysis.noise.smooth_light import can_smooth, on_smooth_light
 from lightpaint.lighting.normal_equations import NormalEquations, block_diagonal
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve_again
@@ -33,6 +34,7 @@ SHARE_STEPS = 8
 def correct_noise(solution: Solution, *, share: float | None = None) -> Solution:
     """Solve the equations without a share of the noise power in M and b.
 
+    Those of many lights are of light that is averaged along surfaces (smooth_light.py).
     A fit of blocks of pixels has averaged most of the noise already, and its solution stays as it
     is.
     If squares stand for another loss, the share is lowered until this loss falls, too: far from the
@@ -59,21 +61,36 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
         )
     if solution.problem.block_side > 1:
         return solution
-    noise = noise_sums(solution)
-    e = solution.equations
-    least = denoised_matrix(e, noise.power)
+    noise, e = noise_sums(solution), solution.equations
+    if share is None and _has_noise_of_target(solution, noise):
+        return _solved(solution, e, 0.0)
+    base = e
+    if can_smooth(basis):
+        smooth = on_smooth_light(solution)
+        base, noise = smooth.equations, noise_sums(smooth)
+    least = denoised_matrix(base, noise.power)
     if share is None:
-        share = _best_share(solution, noise, least)
-    while True:
-        equations = NormalEquations(
-            (1 - share) * e.M + share * least, e.b - share * noise.target_noise, e.target_norm2
-        )
-        problem = replace(solution.problem, corrected=equations, noise_removed=share)
-        corrected = solve_again(solution, problem)
-        removed = NormalEquations(share * (e.M - least), share * noise.target_noise, np.zeros(3))
-        if problem.is_linear or share == 0 or _loss(corrected, removed) <= _loss(solution, removed):
-            return corrected
+        share = _best_share(solution, base, noise, least)
+    while share > 0:
+        M, b = (1 - share) * base.M + share * least, base.b - share * noise.target_noise
+        found = _solved(solution, NormalEquations(M, b, e.target_norm2), share)
+        taken = NormalEquations(e.M - M, e.b - b, np.zeros(3))
+        if solution.problem.is_linear or _loss(found, taken) <= _loss(solution, taken):
+            return found
         share = share / 2 if share > 1 / SHARE_STEPS else 0.0
+    return _solved(solution, e, 0.0)
+
+
+def _solved(solution: Solution, corrected: NormalEquations, share: float) -> Solution:
+    """Return the solution of equations without a share of the noise."""
+    problem = replace(solution.problem, corrected=corrected, noise_removed=share)
+    return solve_again(solution, problem)
+
+
+def _has_noise_of_target(solution: Solution, noise: Noise) -> bool:
+    """Return True for a target that is a sum of this basis, as a template is."""
+    left = solution.equations.objective(solution.weights).sum()
+    return bool(left < SAME_NOISE_SHARE * noise.objective_noise.sum())
 
 
 def _loss(solution: Solution, removed: NormalEquations) -> float:
@@ -87,18 +104,18 @@ def _loss(solution: Solution, removed: NormalEquations) -> float:
     return sum(solution.certificate.objective) + pulled - float(noise)
 
 
-def _best_share(solution: Solution, noise: Noise, least: Doubles) -> float:
+def _best_share(
+    solution: Solution, equations: NormalEquations, noise: Noise, least: Doubles
+) -> float:
     """Return the share s with the least expected excess of the objective, in steps of SHARES.
 
     The remaining bias costs (1 − s)² δᵀMδ, and the scatter costs tr(M Cov(w)), which grows as
-    M_s = M − s N becomes smaller. 0 for a target that is a sum of this basis, as a template is.
-    least: M without all noise.
+    M_s = M − s N becomes smaller. equations: M and b with all noise, least: M without it.
     """
-    e, n = solution.equations, len(solution.weights)
-    if e.objective(solution.weights).sum() < SAME_NOISE_SHARE * noise.objective_noise.sum():
-        return 0.0
+    e, n = equations, len(solution.weights)
     unbiased = NormalEquations(least, e.b - noise.target_noise, noise.objective_noise)
-    bias = solve_for(solution, unbiased) - solution.weights
+    biased = solution.weights if e is solution.equations else solve_for(solution, e)
+    bias = solve_for(solution, unbiased) - biased
     shares = np.linspace(0, 1, SHARE_STEPS + 1)
     cost = np.square(1 - shares) * np.einsum("ic,cij,jc->", bias, e.M, bias)
     # A pull keeps the weights from moving, and is no part of the error.

@@ -1,0 +1,101 @@
+"""Equations of many lights from indirect light that is averaged along surfaces.
+
+The more lights share the questions to emitters, the noisier is each plane, and the more of M is
+noise: its bias and its own noise then decide the answer. An average over 5 x 5 pixels
+(`SurfaceFilter`) takes most of both out and changes the sums little. It is linear and the same for
+both halves, so the noise that is left in M is the sum of averaged half differences.
+
+How far a pixel is averaged follows from the noise of all lights together and from what the average
+changes beyond it: t = V / (V + B), as for pictures. So with more samples the sums go to those of
+the basis, and reflections or caustics stay as they are once they are clean.
+"""
+
+from dataclasses import replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.images.estimate import box_mean
+from lightpaint.images.surface_filter import SurfaceFilter
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.solution import Solution
+
+#: Lights from which on sums are of averaged light: with a dozen the basis is as good.
+MIN_LIGHTS = 64
+
+#: Pixels on either side that light is averaged over.
+FILTER_RADIUS = 2
+
+#: Pixels on either side over which noise and change are compared.
+WINDOW_RADIUS = 3
+
+#: Bytes of the averaged planes and of their noise, at most.
+MAX_BYTES = 2**29
+
+
+def can_smooth(basis: Basis) -> bool:
+    """Return True for many lights whose indirect light and surfaces are known."""
+    height, width = basis.size
+    size = 2 * 12 * len(basis.lights) * height * width
+    is_known = basis.indirect is not None and basis.surface_filter is not None
+    return len(basis.lights) >= MIN_LIGHTS and is_known and size <= MAX_BYTES
+
+
+def on_smooth_light(solution: Solution) -> Solution:
+    """Return a solution with the same weights, whose equations and noise are of averaged planes."""
+    basis, problem = solution.basis, solution.problem
+    if basis.planes not in _averaged:
+        _averaged[basis.planes] = _average(basis)
+    planes, noise = _averaged[basis.planes]
+    smooth = replace(basis, planes=planes, noise=noise, indirect=None)
+    # Where the goal is the current look, it is that of the same planes.
+    moved = problem.squares.share * (smooth.present_look - basis.present_look)
+    squares = replace(problem.squares, image=problem.squares.image + moved)
+    equations = NormalEquations.of(smooth, squares.image, squares.weight)
+    return replace(
+        solution, problem=replace(problem, basis=smooth, squares=squares, equations=equations)
+    )
+
+
+#: Averaged planes and their noise, by the planes of a basis, as long as these are there.
+_averaged: WeakKeyDictionary[Planes, tuple[Planes, Planes]] = WeakKeyDictionary()
+
+
+def _average(basis: Basis) -> tuple[Planes, Planes]:
+    """Return averaged planes and their half differences."""
+    assert basis.features is not None
+    assert basis.indirect is not None
+    along = SurfaceFilter(basis.features, FILTER_RADIUS)
+    # What the average changes comes first, in place of the planes.
+    changed = [
+        np.stack([along(x) - x for x in planes])
+        for planes in (basis.indirect.planes, basis.indirect.noise)
+    ]
+    share = _share(basis.indirect.noise, *changed)
+    for values, planes in zip(changed, (basis.planes, basis.noise), strict=True):
+        for value, plane in zip(values, planes, strict=True):
+            value *= share
+            value += plane
+    return as_planes(changed[0]), as_planes(changed[1])
+
+
+def _share(noise: Planes, of_planes: Floats, of_noise: Floats) -> Floats:
+    """Return how far each pixel is averaged, (h, w, 1).
+
+    of_planes, of_noise: (n, h, w, 3), by how much the average changes either.
+    """
+    variance, left, change = np.zeros((3, *noise.size))
+    for half, of_plane, of_half in zip(noise, of_planes, of_noise, strict=True):
+        squares = np.square(half, dtype=np.float64).mean(axis=-1)
+        # Each light counts alike, by its noise.
+        unit = 1 / max(float(squares.mean()), np.finfo(np.float64).tiny)
+        variance += unit * squares
+        left += unit * np.square(of_half, dtype=np.float64).mean(axis=-1)
+        change += unit * np.square(of_plane, dtype=np.float64).mean(axis=-1)
+    V, B = (box_mean(x, WINDOW_RADIUS) for x in (variance, change - left))
+    total = V + np.maximum(B, 0)
+    share = np.divide(V, total, out=np.zeros_like(total), where=total > 0)
+    return share[..., None].astype(np.float32)
