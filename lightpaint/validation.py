@@ -61,6 +61,15 @@ def number(about: str, *, may_be_zero: bool = False) -> Check:
     return fits, f"{about} {'>= 0' if may_be_zero else '> 0'}, at most {BRIGHTEST:g}"
 
 
+def between(least: float, most: float, about: str) -> Check:
+    """Expect a number between the two, `most` not included. about: what it is."""
+
+    def fits(value: Any) -> bool:
+        return isinstance(value, Real) and not _is_bool(value) and least <= float(value) < most
+
+    return fits, f"{about} of at least {least:g} and less than {most:g}"
+
+
 def one_of(words: Any) -> Check:
     """Expect one of the words of a Literal."""
     words_known = get_args(words)

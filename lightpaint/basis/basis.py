@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Bools, Doubles, Floats, read_only
+from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis.lights import Lights
 from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
 from lightpaint.colour.color import luminance
@@ -43,6 +43,8 @@ class Origin:
     integrator: what was put in the place of the scene's own; "" where it rendered with that.
     is_composed: whether planes come from several renders, of which some were of another state of
     the scene, so that no other render comes to just the same.
+    extra_spp: samples per pixel beyond those, in the mean, where a painting needed them (see
+    `Basis.extra`).
     """
 
     scene: str
@@ -56,8 +58,11 @@ class Origin:
     each_light: tuple[tuple[int, int, int, int], ...] = ()
     integrator: str = ""
     is_composed: bool = False
+    extra_spp: float = 0.0
 
     def __post_init__(self) -> None:
+        if not 0 <= self.extra_spp <= MAX_SAMPLES:
+            raise BasisError(f"{self.extra_spp} extra samples are not 0 or more")
         if max(max(own) for own in (self.halves, self.passes, *self.each_light)) > MAX_SAMPLES:
             raise BasisError(f"{self.halves} samples are more than any render has")
 
@@ -65,6 +70,19 @@ class Origin:
     def spp(self) -> int:
         """Samples per pixel in all."""
         return sum(self.halves)
+
+    @property
+    def mean_spp(self) -> float:
+        """Samples per pixel in the mean, extra ones included."""
+        return self.spp + self.extra_spp
+
+    @property
+    def samples_text(self) -> str:
+        """Return how many samples pixels have, as `16 samples per pixel`."""
+        text = f"{self.spp} samples per pixel"
+        if not self.extra_spp:
+            return text
+        return f"{text} and, in the mean, {self.extra_spp:.3g} more where a painting needed them"
 
     @property
     def is_light_groups(self) -> bool:
@@ -105,6 +123,9 @@ class Basis(Shown):
         objects: Whose surfaces are seen, or None.
         indirect: The indirect part of `planes` and `noise`, to denoise pictures by; None where it
             was not kept apart.
+        extra: (h, w), samples of each half beyond those of the origin, where a painting needed
+            them; None if no pixel has any. Their number never depends on the light of their pixel,
+            so that the images are as unbiased as without them. Going on needs it, nobody else.
         source: Path of the file that it was read from, or of the scene that it was rendered of, for
             people; of memory only.
         sums: The undivided sums of both halves of the samples, (n or 2n, h, w, 3) float32 each, of
@@ -129,6 +150,7 @@ class Basis(Shown):
     features: Features | None = None
     objects: Objects | None = None
     indirect: IndirectLight | None = None
+    extra: Indices | None = None
     source: str = field(default="", compare=False)
     sums: tuple[Floats, Floats] | None = field(default=None, compare=False)
     render_s: float | None = field(default=None, compare=False)
@@ -154,12 +176,18 @@ class Basis(Shown):
             parts = self.indirect.planes, self.indirect.noise
             if any((part.count, part.size) != (n, self.size) for part in parts):
                 raise BasisError("indirect light and images differ in shape")
+        if (self.extra is None) != (self.origin.extra_spp == 0):
+            raise BasisError("extra samples go with a picture of their numbers")
+        if self.extra is not None and self.extra.shape != self.size:
+            raise BasisError("the numbers of extra samples have another size than the images")
         if len(self.origin.each_light) not in (0, n):
             raise BasisError(f"samples of {len(self.origin.each_light)} lights for {n} lights")
 
     def __repr__(self) -> str:
         (height, width), origin = self.size, self.origin
         samples = f"{origin.spp} spp" if self.knows_noise else "noise unknown"
+        if origin.extra_spp:
+            samples += f" and {origin.extra_spp:.3g} in the mean"
         about = f"{len(self.lights)} lights, {width}x{height}, {samples}, of {origin.scene}"
         return f"Basis({about}: {some_of(self.names, room=400)})"
 
@@ -251,6 +279,8 @@ class Basis(Shown):
             objects=None,
             indirect=None,
             sums=None,
+            extra=None,
+            origin=replace(self.origin, extra_spp=0.0),
         )
 
     def with_requests(self, requests: SceneRequests) -> "Basis":

@@ -20,6 +20,7 @@ from lightpaint.basis.file_parts import (
     PLANE_CHANNELS,
     checked_text,
     encodings_of_planes,
+    extra_of,
     features_of,
     guide_table_of,
     light_channels,
@@ -90,7 +91,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     if basis.guide_table is not None:
         guide_checksum = checksum("", others[1].channels)
     # Without what says no more than by default, as in files from before there was any.
-    later = ("each_light", "integrator", "is_composed")
+    later = ("each_light", "integrator", "is_composed", "extra_spp")
     of_origin = json.dumps(fields_of(basis.origin, *later), ensure_ascii=False)
     checksums = Checksums(sums, checksum(of_origin, {}), checksum("", seen), guide_checksum)
     head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
@@ -265,6 +266,7 @@ def _checked_basis(
             features=features_of(others, images.size),
             objects=objects_of(others, images.size),
             indirect=IndirectLight(planes(order, 2), planes(order, 3)) if has_indirect else None,
+            extra=extra_of(others, images.size),
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error

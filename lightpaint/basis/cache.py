@@ -182,7 +182,7 @@ def is_cached(basis: Basis) -> bool:
     """Return True if `basis`, or the same with more samples, is in the cache."""
     path = _path_of(basis)
     kept = _entry(path).origin if is_own(path) else None
-    return kept is not None and (kept == basis.origin or kept.spp > basis.origin.spp)
+    return kept is not None and (kept == basis.origin or kept.mean_spp > basis.origin.mean_spp)
 
 
 def _prune(path: Path) -> None:

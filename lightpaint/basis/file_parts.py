@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis, free_name
 from lightpaint.basis.checksums import Checksums, checksum
 from lightpaint.basis.half_floats import PlaneEncoding, encodings_of
@@ -24,6 +24,8 @@ GUIDE_PART = "learned"
 FEATURES_PART, FEATURES_KEY = "features", "lightpaint.features"
 OBJECTS_PART, OBJECTS_KEY, NAMES_KEY = "objects", "lightpaint.objects", "lightpaint.names"
 
+EXTRA_PART, EXTRA_KEY = "extra samples", "lightpaint.extra"
+
 LIGHT_KEY, SCALE_KEY = "lightpaint.light", "lightpaint.scale"
 
 #: Channels that each light has: of its image, and of its noise.
@@ -37,6 +39,9 @@ INDIRECT_CHANNELS = {*INDIRECT_IMAGE_CHANNELS, *INDIRECT_NOISE_CHANNELS}
 
 #: All planes that a light may have, by their channels.
 PLANE_CHANNELS = (IMAGE_CHANNELS, NOISE_CHANNELS, INDIRECT_IMAGE_CHANNELS, INDIRECT_NOISE_CHANNELS)
+
+#: Most extra samples of a pixel, which float32 tells apart.
+MAX_EXTRA = 2**24
 
 #: What a plane may be multiplied by.
 LEAST_SCALE, LARGEST_SCALE = 2.0**-126, 2.0**126
@@ -131,6 +136,10 @@ def other_parts(basis: Basis) -> Iterator[ExrPart]:
         index = {"index": basis.objects.index.astype(np.float32)}
         about_it = {NAMES_KEY: named, OBJECTS_KEY: checksum(named, index)}
         yield ExrPart(free_name(OBJECTS_PART, basis.names), index, about_it)
+    if basis.extra is not None:
+        counts = {"samples": basis.extra.astype(np.float32)}
+        about_it = {EXTRA_KEY: checksum("", counts)}
+        yield ExrPart(free_name(EXTRA_PART, basis.names), counts, about_it)
 
 
 def guide_table_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
@@ -182,4 +191,18 @@ def objects_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Objects | No
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
             return None
         return Objects(part.channels["index"].astype(np.int32), tuple(names))
+    return None
+
+
+def extra_of(others: Sequence[ExrPart], size: tuple[int, int]) -> Indices | None:
+    """Return the numbers of extra samples; None without a part of them.
+
+    Raises BasisError for a damaged one: means of samples are weighed by it.
+    """
+    for part in (p.in_display_window() for p in others if EXTRA_KEY in p.attributes):
+        counts = part.channels.get("samples", np.full(1, np.nan))
+        is_whole = checksum("", part.channels) == part.attributes[EXTRA_KEY] and part.size == size
+        if not (is_whole and (counts >= 0).all() and (counts <= MAX_EXTRA).all()):
+            raise BasisError("its numbers of extra samples are damaged")
+        return counts.astype(np.intp)
     return None

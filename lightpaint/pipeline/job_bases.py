@@ -12,7 +12,6 @@ from lightpaint.basis.render.cached_render import Render, obtain_basis
 from lightpaint.pipeline.job import Job, PaintedView
 from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Listener, Progress, labelled, listener
-from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene
 
 
@@ -47,12 +46,12 @@ def obtain(
             f"{left} {'is' if left == 1 else 'are'} rendered (use_cache=False renders all again)"
         )
 
-    spp = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+    spp, time_s = settings.basis_spp, None if settings.error else settings.time_s
     began_s = time.perf_counter()
     basis = obtain_basis(
         scene,
         spp=spp,
-        time_s=None if settings.time_s is None else settings.time_s / views,
+        time_s=None if time_s is None else time_s / views,
         seed=settings.seed,
         use_cache=settings.use_cache,
         exact_spp=settings.exact_spp,
@@ -88,9 +87,9 @@ def _remark_on_samples(
 
     spp: the requested samples per pixel; None for the scene's own.
     """
-    basis_text = f"basis of {basis.origin.spp} samples per pixel"
+    basis_text = f"basis of {basis.origin.samples_text}"
     requested_spp = scene.spp if spp is None else spp
-    if not is_rendered and basis.origin.spp > samples_for(scene, spp):
+    if not is_rendered and basis.origin.mean_spp > samples_for(scene, spp):
         listen.say(
             f"{basis_text} kept from an earlier run: more than the {requested_spp} requested, so "
             "the answer may differ a little from one with exactly these (exact_spp=True)"
@@ -104,8 +103,8 @@ def _remark_on_samples(
     origin, (height, width) = basis.origin, basis.size
     origin_text = "rendered" if is_rendered else "taken from the cache"
     listen.note(
-        f"basis {origin_text}: {len(basis.lights)} lights, {width}x{height} pixels, {origin.spp} "
-        f"samples per pixel, seed {origin.seed}, {origin.method}"
+        f"basis {origin_text}: {len(basis.lights)} lights, {width}x{height} pixels, "
+        f"{origin.samples_text}, seed {origin.seed}, {origin.method}"
     )
 
 

@@ -7,13 +7,12 @@ from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
-from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.answer_folder import AnswerFolder, new_answer, reload_relit
 from lightpaint.pipeline.job import Job, PaintedView
 from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
+from lightpaint.pipeline.needed_samples import add_needed_samples, problem_of, without_noise
 from lightpaint.pipeline.results import Look, write_predicted, write_report
 from lightpaint.pipeline.settings import Settings
 from lightpaint.placement.light_search import suggest_lights
@@ -26,7 +25,6 @@ from lightpaint.relit.verification import Verification
 from lightpaint.relit.verification_render import verify
 from lightpaint.report.basis_memo import make_ahead
 from lightpaint.report.page.page import prepare_page
-from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene
 
 
@@ -54,12 +52,11 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job.results.check()
     for remark in job.remarks:
         listen.say(remark)
-    problem = Problem.of(
-        obtain_bases_of(job, bases, listen),
-        [view.target for view in job.views],
-        constraints=job.all_constraints,
-        fit=job.fit,
-    )
+    obtained = obtain_bases_of(job, bases, listen)
+    if job.settings.error is not None:
+        obtained = add_needed_samples(job, obtained, listen)
+    problem = problem_of(job, obtained)
+    del obtained
     if job.settings.report:
         for basis in problem.views.bases:
             make_ahead(basis, prepare_page)
@@ -82,8 +79,7 @@ def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
         f"solved in {max(certificate.sweeps)} sweeps, to a KKT residual of "
         f"{max(certificate.kkt_residual):.1e}"
     )
-    if settings.corrects_noise(is_known=solution.basis.knows_noise):
-        solution = correct_noise(solution)
+    solution = without_noise(job, solution)
     pairs = zip((view.scene for view in job.views), solution.problem.views.bases, strict=True)
     scenes = [(scene, basis) for scene, basis in pairs if scene is not None]
     solution = refine_by_rendering(
@@ -180,10 +176,10 @@ def _verify(
 def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudget:
     """Return the budget for the verification of `relit`, on its whole film."""
     max_spp = None if settings.checks_as_basis else settings.spp or relit.spp
-    spp = basis.origin.spp
-    if settings.time_s is None:
+    spp = round(basis.origin.mean_spp)
+    if settings.time_s is None and settings.error is None:
         # A cached basis may have many times the requested samples.
-        spp = min(spp, samples(settings.quality, spp=settings.spp, time_s=None) or relit.spp)
+        spp = min(spp, settings.basis_spp or relit.spp)
     return verification_budget(
         relit, basis.size, spp, most_spp=max_spp, asked_spp=settings.verify_spp
     )

@@ -9,13 +9,17 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
 from lightpaint.scene.film import MAX_SPP, check_resolution
-from lightpaint.scene.quality_presets import Quality
-from lightpaint.validation import SWITCH, Check, a, number, one_of, whole
+from lightpaint.scene.quality_presets import Quality, samples
+from lightpaint.validation import SWITCH, Check, a, between, number, one_of, whole
 
 #: Most rounds of rendering and solving again: a larger number is a typing error.
 MAX_REFINE = 100
 #: Most suggested lights: a larger number is a typing error.
 MAX_SUGGEST = 100
+#: Least error that may be asked for: a smaller one is a typing error.
+MIN_ERROR = 1e-4
+#: Samples per pixel from which it is told where more are needed.
+PILOT_SPP = 16
 
 
 @keywords()
@@ -39,6 +43,9 @@ class Settings(Fit):
         resize: Whether to resample a target of another size.
         spp: Samples per pixel of the basis, and upper limit for the verification.
         time_s: Seconds to render the bases of all views, instead of spp.
+        error: Largest error of any light that shows, as a share of its luminance, at 95 %: samples
+            are added where the painting needs them until it is met, instead of spp; with time_s for
+            that many seconds at most.
         seed: Seed of the basis; the verification derives its own from it.
         resolution: `1/4` or `320x180`: size of the film for the basis. The verification uses the
             whole film, or as much of it as its samples allow.
@@ -74,6 +81,7 @@ class Settings(Fit):
     resize: bool = False
     spp: int | None = None
     time_s: float | None = None
+    error: float | None = None
     seed: int = 0
     resolution: str | None = None
     quality: Quality | None = None
@@ -95,6 +103,7 @@ class Settings(Fit):
         # The noise is estimated from two halves of the samples.
         "spp": whole(2, MAX_SPP),
         "time_s": number("seconds"),
+        "error": between(MIN_ERROR, 1, "a share"),
         "seed": whole(0),
         "resolution": a(str, "a part of the film like '1/4' or '320x180'"),
         "quality": one_of(Quality),
@@ -117,6 +126,12 @@ class Settings(Fit):
             raise LightpaintError(
                 f"spp is {self.spp} and time_s {self.time_s:g}: expected a number of samples or a "
                 "rendering time, not both"
+            )
+        if self.error is not None and (self.spp is not None or self.exact_spp):
+            given = f"spp {self.spp}" if self.exact_spp is False else "exact_spp True"
+            raise LightpaintError(
+                f"error is {self.error:g} and {given}: expected either the largest error of a "
+                "light, or a number of samples"
             )
         if self.exact_spp and self.time_s is not None:
             raise LightpaintError(
@@ -143,7 +158,16 @@ class Settings(Fit):
     @property
     def checks_as_basis(self) -> bool:
         """True if the verification takes as many samples as the basis, whatever their films."""
-        return self.spp is None and (self.time_s is not None or self.quality is not None)
+        return self.spp is None and (
+            self.time_s is not None or self.error is not None or self.quality is not None
+        )
+
+    @property
+    def basis_spp(self) -> int | None:
+        """Samples per pixel that the basis is rendered with at first; None for the scene's own."""
+        if self.error is not None:
+            return PILOT_SPP
+        return samples(self.quality, spp=self.spp, time_s=self.time_s)
 
 
 class SettingsByName(TypedDict, total=False):
@@ -162,6 +186,7 @@ class SettingsByName(TypedDict, total=False):
     resize: bool
     spp: int | None
     time_s: float | None
+    error: float | None
     seed: int
     resolution: str | None
     quality: Quality | None

@@ -23,7 +23,7 @@ from lightpaint.target.target import Target
 from lightpaint.target.target_reader import Paint, read_over_look, read_target
 
 #: Settings of sampling, of rendering, and those that light groups do not support.
-SAMPLED = ("spp", "exact_spp", "time_s", "quality", "resolution")
+SAMPLED = ("spp", "exact_spp", "time_s", "error", "quality", "resolution")
 RENDERED = (*SAMPLED, "refine", "suggest", "verify_spp")
 NOT_IN_GROUPS = (*RENDERED, "seed", "noise_correction", "cd_per_unit", "emitters")
 

@@ -11,6 +11,9 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 
+#: Share of a picture's light from which on a light's error counts in proportion to the light.
+LEAST_SHARE = 0.05
+
 
 def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
     """Return share of each light in the predicted image's energy, (n,) float64, in basis order.
@@ -110,6 +113,21 @@ def relative_errors(uncertainty: Uncertainty) -> Doubles:
         return np.where(side > 0, side / solved, 0.0)
 
 
+def picture_errors(basis: Basis, uncertainty: Uncertainty) -> Doubles:
+    """Return the half width of each light's 95 % interval, (n,), over what the light does.
+
+    All in luminance summed over the picture. A light that makes less than LEAST_SHARE of the
+    picture's light, or is off, counts as if it made that much: so an error is large only if it
+    shows. 0 where nothing is known.
+    """
+    low, high = uncertainty.interval
+    side = np.maximum(uncertainty.weights - low, high - uncertainty.weights)
+    side = np.where(np.isfinite(side), side, 0)
+    error, made = ((basis.totals * x) @ LUMINANCE for x in (side, uncertainty.weights))
+    whole = made.sum()
+    return np.asarray(error / np.maximum(made, LEAST_SHARE * whole) if whole > 0 else 0 * error)
+
+
 def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> int | None:
     """Return the light whose error changes the picture most, if it is determined; None if none
     is."""
@@ -129,6 +147,6 @@ def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
     # scatter / m + bias / m² = (scatter + bias) / 4
     total = scatter + bias
     times = 2 * (scatter + np.sqrt(scatter**2 + total * bias)) / total if total > 0 else 1.0
-    exact = times * basis.origin.spp
+    exact = times * basis.origin.mean_spp
     power = 2 ** int(np.floor(np.log2(exact)) - 2)
     return int(np.ceil(exact / power) * power) if power >= 1 else int(np.ceil(exact))

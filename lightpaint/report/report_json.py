@@ -106,6 +106,7 @@ def _basis(basis: Basis) -> dict[str, Any]:
         "method": origin.method,
         "lightpaint": origin.lightpaint,
         "spp": origin.spp if basis.knows_noise else None,
+        "extra_spp": origin.extra_spp,
         "seed": origin.seed if basis.knows_noise else None,
         "size": [width, height],
         "adjusted": int((~basis.is_fixed).sum()),

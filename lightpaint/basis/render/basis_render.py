@@ -11,7 +11,7 @@ from lightpaint.basis.basis import Basis, IndirectLight, Origin
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import as_planes
 from lightpaint.basis.render.guide_training import train
-from lightpaint.basis.render.half_sums import add_halves, mean_and_half_difference
+from lightpaint.basis.render.half_sums import HalfCounts, add_halves, mean_and_half_difference
 from lightpaint.basis.render.integrators import has_indirect_planes, why_not_one_pass
 from lightpaint.basis.render.render_budget import Budget, Keeper, half_of, steps
 from lightpaint.basis.render.separate_renders import (
@@ -157,6 +157,7 @@ def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
         origin_of(scene, seed, of.method, of.halves, of.passes),
         each_light=of.each_light,
         is_composed=of.is_composed,
+        extra_spp=of.extra_spp,
     )
     return of == mine and basis.size == scene.size
 
@@ -168,7 +169,7 @@ def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
     renders must not end elsewhere than passes do. spp: the scene's own number if None.
     """
     origin = basis.origin
-    if origin.is_composed or origin.method != method_of(scene):
+    if origin.is_composed or origin.extra_spp or origin.method != method_of(scene):
         return False
     wanted = samples_for(scene, spp)
     if origin.spp < wanted and basis.sums is None:
@@ -256,7 +257,7 @@ def basis_of_sums(
     all. start: what these sums do not include. is_finished: whether there are as many as were asked
     for; if not, the basis has a copy of its sums.
     """
-    n, spp = len(scene.lights), (half_spp, half_spp)
+    n, spp = len(scene.lights), half_counts(half_spp, start)
     keeps_sums = not is_finished and start is None
     kept = (halves[0].copy(), halves[1].copy()) if keeps_sums else None
     totals, indirect = [half[:n] for half in halves], [half[n:] for half in halves]
@@ -264,30 +265,37 @@ def basis_of_sums(
         total[: len(part)] += part
     is_split = len(indirect[0]) == n and (start is None or start.indirect is not None)
     if start is not None:
-        add_halves(totals, start.planes, start.noise, start.origin.halves)
+        begun = half_counts(start.origin.halves[0], start)
+        add_halves(totals, start.planes, start.noise, begun)
         seen = seen | start.emitters_seen
         if is_split and start.indirect is not None:
-            add_halves(indirect, start.indirect.planes, start.indirect.noise, start.origin.halves)
+            add_halves(indirect, start.indirect.planes, start.indirect.noise, begun)
     images, half_differences = map(as_planes, mean_and_half_difference(totals, spp))
+    origin = origin_of(
+        scene, seed, ONE_PASS, (half_spp, half_spp), FINISHED if is_finished else UNFINISHED
+    )
     return Basis(
         basis_lights(scene),
         images,
         half_differences,
         seen,
-        origin_of(
-            scene,
-            seed,
-            ONE_PASS,
-            (half_spp, half_spp),
-            FINISHED if is_finished else UNFINISHED,
-        ),
+        origin if start is None else replace(origin, extra_spp=start.origin.extra_spp),
         guide_table,
         indirect=IndirectLight(*map(as_planes, mean_and_half_difference(indirect, spp)))
         if is_split
         else None,
+        extra=None if start is None else start.extra,
         source=str(scene.path),
         sums=kept,
     )
+
+
+def half_counts(spp: int, basis: Basis | None) -> HalfCounts:
+    """Return the samples of both halves: `spp` of each, and the extra ones of a basis."""
+    if basis is None or basis.extra is None:
+        return spp, spp
+    its = (spp + basis.extra[..., None]).astype(np.float32)
+    return its, its
 
 
 @MITSUBA.taken()

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from lightpaint.arrays import Indices
 from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.basis_file import as_stored, is_large
@@ -22,6 +23,7 @@ from lightpaint.basis.render.plane_reuse import (
     merge,
     restrict,
 )
+from lightpaint.basis.render.top_up import top_up
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.progress import Progress, silent
@@ -88,7 +90,7 @@ def obtain_basis(
     is_composed = start is not None and start.origin.is_composed
 
     def keep(basis: Basis) -> bool:
-        return (kept is None or basis.origin.spp >= kept.origin.spp) and cache.keep(
+        return (kept is None or basis.origin.mean_spp >= kept.origin.mean_spp) and cache.keep(
             _marked(basis, is_composed=is_composed)
         )
 
@@ -146,6 +148,23 @@ def _marked(basis: Basis, *, is_composed: bool) -> Basis:
     if basis.origin.is_composed or not is_composed:
         return basis
     return replace(basis, origin=replace(basis.origin, is_composed=True))
+
+
+def top_up_basis(
+    scene: Scene,
+    basis: Basis,
+    counts: Indices,
+    *,
+    use_cache: bool = True,
+    progress: Progress = silent,
+    is_enough: Callable[[], bool] = lambda: False,
+) -> Basis:
+    """Return `basis` with further samples of some pixels, kept in its place. See `top_up`."""
+    keep = cache.keep if use_cache else None
+    made = top_up(scene, basis, counts, keep=keep, progress=progress, is_enough=is_enough)
+    if keep is not None:
+        keep(made)
+    return as_stored(made)
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:

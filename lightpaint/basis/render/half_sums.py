@@ -7,10 +7,11 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.basis.planes import Planes
 
+#: Samples per pixel of half A and of half B: numbers, or (h, w, 1) float32 where pixels differ.
+HalfCounts = Sequence[int] | Sequence[Floats]
 
-def add_halves(
-    halves: Sequence[Floats], planes: Planes, noise: Planes, spp: tuple[int, int]
-) -> None:
+
+def add_halves(halves: Sequence[Floats], planes: Planes, noise: Planes, spp: HalfCounts) -> None:
     """Add the undivided sums of both halves that made `planes`, up to round-off, to `halves`.
 
     halves: (n, h, w, 3) each. noise: half the differences of the halves. spp: samples per pixel of
@@ -18,13 +19,13 @@ def add_halves(
     """
     a, b = spp
     # The mean is (a A + b B) / (a + b), half the difference (A − B) / 2.
-    to_a, to_b = np.float32(2 * b / (a + b)), np.float32(2 * a / (a + b))
+    to_a, to_b = (np.asarray(2 * x / (a + b), np.float32) for x in (b, a))
     for k, (image, half_difference) in enumerate(zip(planes, noise, strict=True)):
         halves[0][k] += a * (image + half_difference * to_a)
         halves[1][k] += b * (image - half_difference * to_b)
 
 
-def mean_and_half_difference(halves: Sequence[Floats], spp: Sequence[int]) -> tuple[Floats, Floats]:
+def mean_and_half_difference(halves: Sequence[Floats], spp: HalfCounts) -> tuple[Floats, Floats]:
     """Return mean and half difference of undivided sums, which it overwrites.
 
     halves: two undivided sums, (n, h, w, 3). spp: samples per pixel of each.
@@ -37,5 +38,5 @@ def mean_and_half_difference(halves: Sequence[Floats], spp: Sequence[int]) -> tu
         plane_b += plane_a
         plane_b /= 2
         # A is the mean of all plus the share of B in them times the difference.
-        plane_a -= plane_b * np.float32(2 * b / (a + b))
+        plane_a -= plane_b * np.asarray(2 * b / (a + b), np.float32)
     return mean, half_difference

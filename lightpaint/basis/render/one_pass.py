@@ -19,8 +19,9 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.render.emitter_guide import EmitterGuide
 from lightpaint.basis.render.integrators import (
     depth_limit,
@@ -38,6 +39,9 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 #: emitters than that.
 FIRST_EMITTER_SAMPLES = 8
 LATER_EMITTER_SAMPLES = {32: 2, 128: 4, 2**32: 8}
+
+#: Streams of numbers; those below are of the halves of all pixels.
+TRAINING_STREAM, FIRST_TOP_UP_STREAM = 2, 3
 
 
 class Tracer:
@@ -67,8 +71,9 @@ class Tracer:
         if emitter_samples is None:
             emitter_samples = FIRST_EMITTER_SAMPLES, later_emitter_samples(self.guide.count)
         self._emitter_samples = emitter_samples
-        # One stream of numbers for each half and for the training, far from all others.
-        self._streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(3)]
+        # One stream of numbers for each half, for the training, and for each half of a top-up, far
+        # from all others.
+        self._streams = [pass_seed(seed, Stream.NUMBERS, k) for k in range(5)]
 
     def learn(self, rows: range, first: int, spp: int) -> None:
         """Learn from some samples of some rows, whose light is not kept.
@@ -77,7 +82,7 @@ class Tracer:
         """
         nowhere = LightPlanes.nowhere(self.light_of)
         with kernels():
-            self._trace(2, nowhere, rows, first, spp)
+            self._trace(TRAINING_STREAM, nowhere, *self._of_rows(rows, first, spp))
             self.guide.evaluate()
         self.guide.update()
 
@@ -102,36 +107,55 @@ class Tracer:
         lights = len(self.scene.lights)
         return LightPlanes(self.light_of, lights, size, is_split=is_split, start=start)
 
+    def pixel_planes(self, pixels: int) -> LightPlanes:
+        """Return planes of so many single pixels, to which nothing is added yet."""
+        is_split = has_indirect_planes(self.scene)
+        return LightPlanes(self.light_of, len(self.scene.lights), (1, pixels), is_split=is_split)
+
     def add(self, planes: LightPlanes, half: int, rows: range, first: int, spp: int) -> None:
         """Add the light of some samples of some rows, of one half, to `planes` of these rows.
 
         first: samples of a pixel of that half that come before.
         """
         with kernels():
-            self._trace(half, planes, rows, first, spp)
+            self._trace(half, planes, *self._of_rows(rows, first, spp))
+            planes.evaluate()
+
+    def top_up(
+        self, planes: LightPlanes, half: int, pixels: Indices, first: Indices, spp: Indices
+    ) -> None:
+        """Add the light of further samples of single pixels, of one half, to `planes` of these.
+
+        pixels: (p,), of the picture, counted along its rows, each once; `planes` are (1, p). first:
+        (p,), samples that such calls have taken before. spp: (p,), how many to take.
+        """
+        with kernels():
+            self._trace(FIRST_TOP_UP_STREAM + half, planes, pixels, first, spp)
             planes.evaluate()
 
     def close(self) -> None:
         """Release the scene and all that refers to it."""
         del self.loaded, self.light_of, self.guide
 
-    def _trace(self, stream: int, planes: LightPlanes, rows: range, first: int, spp: int) -> None:
+    def _of_rows(self, rows: range, first: int, spp: int) -> tuple[Indices, Indices, Indices]:
+        """Return the pixels of some rows, and for each of them the same samples."""
+        width = self.scene.size[1]
+        pixels = (np.array(rows)[:, None] * width + np.arange(width)).ravel()
+        return pixels, np.full(pixels.size, first), np.full(pixels.size, spp)
+
+    def _trace(
+        self, stream: int, planes: LightPlanes, pixels: Indices, first: Indices, spp: Indices
+    ) -> None:
         view = view_of(self.scene, self.loaded)
-        place = dr.arange(mi.UInt32, view.width * len(rows))
-        row = place // view.width
-        column = place - row * view.width
+        place = dr.arange(mi.UInt32, pixels.size)
         # What differs between calls is no constant of the kernel, which is compiled once.
-        start, step, begin, count = (
-            dr.opaque(mi.UInt32, x) for x in (rows.start, rows.step, first, spp)
-        )
-        pixel = (row * step + start) * view.width + column
+        pixel, begin, end = (mi.UInt32(x.astype(np.uint32)) for x in (pixels, first, first + spp))
         numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, self._streams[stream]))
-        first, later = self._emitter_samples
+        first_emitters, later = self._emitter_samples
         rules = rules_of(self.scene)._replace(
-            first_emitter_samples=dr.opaque(mi.UInt32, first),
+            first_emitter_samples=dr.opaque(mi.UInt32, first_emitters),
             later_emitter_samples=dr.opaque(mi.UInt32, later),
         )
-        end = begin + count
         trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
 
 

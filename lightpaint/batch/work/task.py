@@ -174,7 +174,7 @@ def key_of_basis(basis: BasisFile | GroupsFile) -> str:
 
 def key_of_scene(scene: SceneFile, settings: Settings) -> str:
     """Return the key of a rendered basis: the scene with its sensor, and the render settings."""
-    rendered = ("spp", "time_s", "seed", "resolution", "quality", "use_cache", "exact_spp")
+    rendered = ("spp", "time_s", "error", "seed", "resolution", "quality", "use_cache", "exact_spp")
     render_settings = {name: getattr(settings, name) for name in rendered}
     return json.dumps({"scene": asdict(scene), **render_settings})
 

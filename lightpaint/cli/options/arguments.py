@@ -122,6 +122,15 @@ class at_least:  # noqa: N801 (used as a function)
         return value
 
 
+def share(text: str) -> float:
+    """Parse a share, `2%` or `0.02`."""
+    number = text.strip().removesuffix("%")
+    try:
+        return float(number) / (1 if number == text.strip() else 100)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a share like 2% or 0.02") from None
+
+
 class number:  # noqa: N801 (used as a function)
     """A type for numbers > 0, or >= 0, up to `most`.
 

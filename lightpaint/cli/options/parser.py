@@ -24,6 +24,7 @@ from lightpaint.cli.options.option_groups import (
 )
 from lightpaint.cli.options.solve_options import (
     add_constraints,
+    add_error,
     add_fit,
     add_method,
     add_paintings,
@@ -140,6 +141,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
+    add_error(parser)
     add_cache(parser)
     add_view(parser)
 

@@ -59,6 +59,18 @@ def add_paintings(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_error(parser: argparse.ArgumentParser) -> None:
+    """Add the option for how sure the lights are to be."""
+    parser.add_argument(
+        "--error",
+        type=arguments.share,
+        metavar="SHARE",
+        help="instead of --spp: the largest error of any light that shows, like 2%%; after 16 "
+        "samples per pixel more are taken where the painting needs them, until that is met, or "
+        "for --time seconds",
+    )
+
+
 def add_pattern(parser: argparse.ArgumentParser) -> None:
     """Add the option for names of light groups."""
     parser.add_argument(

@@ -12,6 +12,7 @@ OPTIONS = {
     "emitters": "--emitters",
     "exact_spp": "--exact-spp",
     "folder": "-o",
+    "error": "--error",
     "force": "--force",
     "groups": "--group",
     "hold": "--hold",

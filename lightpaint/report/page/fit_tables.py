@@ -156,7 +156,7 @@ def _display_facts(solution: Solution, predicted: Estimate) -> list[tuple[str, s
 def _samples(basis: Basis) -> str:
     if not basis.knows_noise:
         return "which says nothing of its samples and noise"
-    return f"{basis.origin.spp} samples per pixel, seed {basis.origin.seed}"
+    return f"{basis.origin.samples_text}, seed {basis.origin.seed}"
 
 
 def _full_size(basis: Basis, verification: Verification | None) -> str:

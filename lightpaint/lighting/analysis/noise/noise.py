@@ -69,33 +69,18 @@ class Noise:
 
 def noise_sums(solution: Solution) -> Noise:
     """Sum over the pixels that count in one pass, by parts in parallel."""
-    basis, problem, weights = solution.basis, solution.problem, solution.weights
-    # (pixels, 1), or (pixels, 3) where channels differ.
-    squares = problem.squares
-    weight, share = (x.reshape(-1, x.shape[2]) for x in (squares.weight, squares.share))
-    residuals = Residuals.of(solution)
-    # The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by: of a
-    # pixel it adds Φᵢ hᵢ times this.
-    pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
-    unseen = ~basis.emitters_seen.ravel()
-    counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
-    pixels = _Pixels(
-        basis.planes,
-        basis.noise,
-        weight,
-        share,
-        residuals,
-        unseen,
-    )
+    problem, weights = solution.problem, solution.weights
+    pixels = NoisyPixels.of(solution)
+    counted, weight, residuals = pixels.counted, pixels.weight, pixels.residuals
     # A dimmer, a tie or a limit on luminance couples channels, as the one weight of a scalar light.
     is_coupled = len(problem.full.channel_groups) < 3
     # The same parts on every machine, added in order, give the same bits.
     length = BLOCK_PIXELS * max(1, -(-counted.size // (BLOCK_PIXELS * PARTS)))
     parts = [counted[k : k + length] for k in range(0, counted.size, length)]
     sums = [_Sums.zeros(len(weights))] + (
-        parallel_map(lambda part: pixels.sums(part, weights, pulled, is_coupled=is_coupled), parts)
+        parallel_map(lambda part: pixels.sums(part, is_coupled=is_coupled), parts)
         if len(weights) <= FEW_LIGHTS
-        else [pixels.sums(part, weights, pulled, is_coupled=is_coupled) for part in parts]
+        else [pixels.sums(part, is_coupled=is_coupled) for part in parts]
     )
     error, noise = np.zeros((2, 3))
     for start in range(0, len(weight), BLOCK_PIXELS):
@@ -130,31 +115,54 @@ class _Sums:
 
 
 @dataclass(frozen=True)
-class _Pixels:
-    """Data of all pixels.
+class NoisyPixels:
+    """Data of all pixels of a solution, from which the noise in its gradient follows.
 
-    planes, noise: of the basis. weight, share: (p, 1) or (p, 3). unseen: (p,), where no emitter is.
+    planes, noise: of the basis. weights: (n, 3). weight, share: (p, 1) or (p, 3). unseen: (p,),
+    where no emitter is. counted: the pixels that count. pulled: (n, 3), by how much noise moves the
+    pull on the weights.
     """
 
     planes: Planes
     noise: Planes
+    weights: Doubles
     weight: Floats
     share: Floats
     residuals: Residuals
     unseen: Bools
+    counted: Indices
+    pulled: Doubles
 
-    def sums(
-        self, counted: Indices, weights: Doubles, pulled: Doubles, *, is_coupled: bool
-    ) -> _Sums:
-        """Sum over some pixels. pulled: (n, 3), the effect of noise on the pull. pulled: (n, 3), by
-        how much noise moves the pull.
-        """
-        sums = _Sums.zeros(len(weights))
+    @classmethod
+    def of(cls, solution: Solution) -> "NoisyPixels":
+        """Return those of a solution."""
+        basis, problem, weights = solution.basis, solution.problem, solution.weights
+        # (pixels, 1), or (pixels, 3) where channels differ.
+        squares = problem.squares
+        weight, share = (x.reshape(-1, x.shape[2]) for x in (squares.weight, squares.share))
+        # The pull, λ ‖Φᵢ‖² (presentᵢ − wᵢ), is as noisy as the images that it is measured by: of a
+        # pixel it adds Φᵢ hᵢ times this.
+        pulled = 2 * problem.pull_strength * (basis.present_weights - weights)
+        unseen = ~basis.emitters_seen.ravel()
+        counted = np.flatnonzero((solution.importance.ravel() > 0) | (unseen & pulled.any()))
+        residuals = Residuals.of(solution)
+        planes = basis.planes, basis.noise
+        return cls(*planes, weights, weight, share, residuals, unseen, counted, pulled)
+
+    def gradient_noise(self, pixels: slice | Indices) -> Doubles:
+        """Return the half differences of the gradient that some pixels make, (3, n, pixels)."""
+        arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
+        missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
+        return np.stack([self._rows(None, pixels, arrays, missed, c) for c in range(3)])
+
+    def sums(self, counted: Indices, *, is_coupled: bool) -> _Sums:
+        """Sum over some pixels."""
+        sums = _Sums.zeros(len(self.weights))
         for start in range(0, counted.size, BLOCK_PIXELS):
             pixels = as_slice(counted[start : start + BLOCK_PIXELS])
             arrays = self.noise.pixels(pixels), self.planes.pixels(pixels)
             missed = self.residuals.residual(pixels), self.residuals.noise(pixels)
-            rows = [self._rows(sums, pixels, arrays, missed, c, weights, pulled) for c in range(3)]
+            rows = [self._rows(sums, pixels, arrays, missed, c) for c in range(3)]
             for c in range(3):
                 sums.gradient[c, :, c] += rows[c] @ rows[c].T
             if is_coupled:
@@ -167,13 +175,11 @@ class _Pixels:
 
     def _rows(
         self,
-        sums: _Sums,
+        sums: _Sums | None,
         pixels: slice | Indices,
         arrays: tuple[Floats, Floats],
         missed: tuple[Doubles, Doubles],
         c: int,
-        weights: Doubles,
-        pulled: Doubles,
     ) -> Doubles:
         """Return the noise in the gradient of a channel, (n, pixels); add all else to `sums`.
 
@@ -184,10 +190,13 @@ class _Pixels:
         h, lit = (x[..., c].astype(np.float64) for x in arrays)
         residual, mixed = (x[:, c] for x in missed)
         rows = D * (h * residual - lit * mixed)
-        size = np.abs(residual) + weights[:, c, None] * lit
-        sums.peaks[c].add(D * lit * size, rows)
-        if pulled.any():
-            rows += pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
+        if sums is not None:
+            size = np.abs(residual) + self.weights[:, c, None] * lit
+            sums.peaks[c].add(D * lit * size, rows)
+        if self.pulled.any():
+            rows += self.pulled[:, c, None] * np.where(self.unseen[pixels], lit, 0) * h
+        if sums is None:
+            return np.asarray(rows)
         sums.power[c] += (D * h) @ h.T
         if self.residuals.present is not None:
             shared = D * self.share[pixels, c % self.share.shape[1]]

@@ -161,6 +161,25 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     )
 
 
+def gradient_response(solution: Solution) -> Doubles:
+    """Return how noise of the gradient moves the weights, (3 n, 3 n): channel by channel.
+
+    It is the matrix whose product with the covariance of the gradient on both sides makes the
+    scatter of `error_bars`, but for bounds that hold.
+    """
+    noise = noise_sums(solution)
+    pulled = solution.problem.with_pull(solution.problem.solved)
+    gradient = pulled.gradient(solution.weights).T.ravel()
+    M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
+    made = np.zeros_like(M)
+    for room in block_freedoms(solution, pulled):
+        to = room.columns
+        _, free = _movable(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
+        along = to @ free
+        made += along @ pseudo_inverse(along.T @ M @ along) @ along.T
+    return made
+
+
 def _scatter(
     solution: Solution,
     noise: Noise,
@@ -241,7 +260,20 @@ def _propagate(
     k).
 
     M: (k, k); C: (k, k), covariance of the noise of the gradient, (k,). Cov(x) = M⁻¹ C M⁻¹ over
-    free directions, and over those of bounds that noise alone may have activated.
+    the directions of `_movable`.
+    """
+    ends, free = _movable(M, C, room, gradient)
+    inverse = free @ pseudo_inverse(free.T @ M @ free) @ free.T
+    return ends, inverse @ C @ inverse
+
+
+def _movable(
+    M: Doubles, C: Doubles, room: BlockFreedom, gradient: Doubles
+) -> tuple[Doubles, Doubles]:
+    """Return how far the active bounds may be left, (h,), and what noise may move, (k, m).
+
+    These are the free directions, and those of bounds that noise alone may have activated.
+    Arguments: as of `_propagate`.
     """
     free = room.free
     # Directions that leave a bound while the free unknowns adapt.
@@ -257,8 +289,7 @@ def _propagate(
     spread = np.where(counts, np.sqrt(noise), 0) / safe
     ends = [_one_sided(u, s) for u, s in zip(pushed.tolist(), spread.tolist(), strict=True)]
     free = np.hstack([free, ways[:, pushed < NORMAL_95 * spread]])
-    inverse = free @ pseudo_inverse(free.T @ M @ free) @ free.T
-    return np.minimum(ends, room.active.distances) / NORMAL_95, inverse @ C @ inverse
+    return np.minimum(ends, room.active.distances) / NORMAL_95, free
 
 
 def _one_sided(pushed: float, spread: float) -> float:

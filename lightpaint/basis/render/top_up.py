@@ -1,0 +1,166 @@
+"""A top-up: further samples of those pixels of a basis in which they matter.
+
+A plane holds means of samples, so a pixel with more of them has less noise, and nothing else
+changes. Both halves get as many in each pixel, so that half their difference stays the noise of
+their mean. The samples of a pixel are terms of a sequence of its own, far from that of the uniform
+samples: either can go on where it stopped, whatever was added of the other.
+"""
+
+import gc
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from lightpaint.arrays import Floats, Indices
+from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.basis.render.basis_render import ONE_PASS, is_of
+from lightpaint.basis.render.guide_training import train
+from lightpaint.basis.render.half_sums import add_halves, mean_and_half_difference
+from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
+from lightpaint.basis.render.render_budget import PASS_DIVISOR
+from lightpaint.basis.render.render_parts import PART_MAX_BYTES
+from lightpaint.errors import BasisError
+from lightpaint.progress import Interrupted, Progress, silent
+from lightpaint.scene.mitsuba_errors import render_errors
+from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import largest_pass, view_seed
+
+
+@MITSUBA.taken()
+def top_up(
+    scene: Scene,
+    basis: Basis,
+    counts: Indices,
+    *,
+    keep: Callable[[Basis], bool] | None = None,
+    progress: Progress = silent,
+    is_enough: Callable[[], bool] = lambda: False,
+) -> Basis:
+    """Return `basis` with further samples of its pixels.
+
+    scene: of which `basis` was rendered, in one pass. counts: (h, w), samples to add to each half;
+    they must not depend on the light of their own pixel. is_enough: asked between passes, whether
+    to leave the rest. keep: called with what there is when Ctrl-C ends the work early; returns
+    whether it could be kept.
+
+    Raises BasisError for a basis of something else, and Interrupted for Ctrl-C.
+    """
+    from lightpaint.basis.render.one_pass import Tracer
+
+    if basis.origin.method != ONE_PASS or not is_of(scene, basis, basis.origin.seed):
+        raise BasisError("the basis to top up is not a one-pass basis of this scene and film")
+    extra = np.zeros(basis.size, np.intp) if basis.extra is None else basis.extra.copy()
+    sums = _PlaneSums(scene, basis)
+    batches = list(pixel_batches(counts, 2 * plane_count(scene)))
+    with render_errors(scene.path):
+        tracer = Tracer(scene, view_seed(basis.origin.seed, scene.sensor), basis.guide_table)
+        try:
+            with tracing() as let_others_through:
+                if batches and not tracer.is_trained:
+                    train(tracer, let_others_through)
+                progress("top-up", 0, len(batches))
+                for k, pixels in enumerate(batches):
+                    if is_enough():
+                        break
+                    first, spp = (x.ravel()[pixels] for x in (extra, counts))
+                    halves = []
+                    for half in range(2):
+                        planes = tracer.pixel_planes(pixels.size)
+                        tracer.top_up(planes, half, pixels, first, spp)
+                        halves.append(planes.sums())
+                        let_others_through()
+                    sums.add(pixels, halves, first, spp)
+                    extra.ravel()[pixels] += spp
+                    progress("top-up", k + 1, len(batches))
+        except KeyboardInterrupt:
+            if keep is None or not keep(sums.basis(extra, tracer.guide_table)):
+                raise
+            raise Interrupted("the samples so far are kept; the same command goes on") from None
+        finally:
+            guide_table = tracer.guide_table
+            tracer.close()
+            gc.collect()
+    return sums.basis(extra, guide_table)
+
+
+def pixel_batches(counts: Indices, planes: int) -> Iterator[Indices]:
+    """Yield the pixels with samples to take, (p,) at a time, fewest samples first.
+
+    Neighbours in a batch have about as many, since they are traced side by side. Each batch is a
+    short pass, and its planes, so many for each pixel, take little memory.
+    """
+    flat = counts.ravel()
+    pixels = np.flatnonzero(flat)
+    pixels = pixels[np.argsort(flat[pixels], kind="stable")]
+    ends = np.cumsum(flat[pixels], dtype=np.int64)
+    largest, most = largest_pass(1, shorter=PASS_DIVISOR), max(1, PART_MAX_BYTES // (12 * planes))
+    start = 0
+    while start < pixels.size:
+        before = ends[start - 1] if start else 0
+        end = max(start + 1, int(np.searchsorted(ends, before + largest, side="right")))
+        end = min(end, start + most)
+        yield pixels[start:end]
+        start = end
+
+
+class _PlaneSums:
+    """Images and half differences of a basis, to which samples of some pixels are added."""
+
+    def __init__(self, scene: Scene, basis: Basis) -> None:
+        self._basis, self._lights = basis, len(scene.lights)
+        self._is_split = basis.indirect is not None and has_indirect_planes(scene)
+        self._all = [basis.planes.array().copy(), basis.noise.array().copy()]
+        if self._is_split and basis.indirect is not None:
+            self._all += [
+                its.array().copy() for its in (basis.indirect.planes, basis.indirect.noise)
+            ]
+
+    def add(self, pixels: Indices, halves: list[Floats], first: Indices, spp: Indices) -> None:
+        """Add undivided sums of both halves, (n or 2n, 1, p, 3). first, spp: as `Tracer.top_up`."""
+        n = self._lights
+        indirect = [half[n:] for half in halves]
+        totals = [half[:n] for half in halves]
+        for total, part in zip(totals, indirect, strict=True):
+            total[: len(part)] += part
+        for which, added in enumerate((totals, indirect)[: 1 + self._is_split]):
+            both = self._all[2 * which : 2 * which + 2]
+            for k, (a, b) in enumerate(self._half_spp()):
+                its = [half[k : k + 1] for half in added]
+                old, new = (
+                    [(x + y)[:, None].astype(np.float32) for x in (a, b)]
+                    for y in (first, first + spp)
+                )
+                there = [as_planes(flat(plane[k : k + 1])[:, pixels][:, None]) for plane in both]
+                add_halves(its, there[0], there[1], old)
+                for plane, made in zip(both, mean_and_half_difference(its, new), strict=True):
+                    flat(plane)[k, pixels] = made[0, 0]
+
+    def _half_spp(self) -> list[tuple[int, int]]:
+        """Return the uniform samples of each light in both halves."""
+        origin = self._basis.origin
+        if origin.each_light:
+            return [its[:2] for its in origin.each_light]
+        return [origin.halves] * self._lights
+
+    def basis(self, extra: Indices, guide_table: Floats | None) -> Basis:
+        """Return the basis with all that was added."""
+        planes: list[Planes] = [as_planes(x) for x in self._all]
+        mean = 2 * float(extra.mean(dtype=np.float64))
+        return replace(
+            self._basis,
+            planes=planes[0],
+            noise=planes[1],
+            indirect=IndirectLight(planes[2], planes[3]) if self._is_split else None,
+            extra=extra if mean else None,
+            origin=replace(self._basis.origin, extra_spp=mean),
+            guide_table=guide_table,
+            sums=None,
+        )
+
+
+def flat(planes: Floats) -> Floats:
+    """Return planes (n, h, w, 3) as (n, h w, 3), in the same memory."""
+    return planes.reshape(len(planes), -1, 3)

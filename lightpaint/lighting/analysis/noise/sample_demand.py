@@ -1,0 +1,104 @@
+"""Density of samples: where further ones make an answer surer.
+
+The variance of a weight is a sum over pixels, and a pixel with n samples has 1/n of the variance of
+one. For a given number of samples in all, Σ q/n is least with n in proportion to √q (Neyman
+allocation). q of a pixel is the mean over its neighbours, never itself: so how many samples it gets
+does not depend on those that it has, and their mean stays unbiased (docs/method.md).
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Doubles, Indices
+from lightpaint.basis.planes import BLOCK_PIXELS
+from lightpaint.lighting.analysis.noise.noise import NoisyPixels
+from lightpaint.lighting.analysis.noise.uncertainty import gradient_response
+from lightpaint.lighting.solution import Solution
+from lightpaint.threads import parallel_map
+
+#: Pixels on either side whose mean tells the variance of a pixel.
+AROUND = 2
+
+#: Least density of a pixel that counts, in parts of the mean.
+FLOOR = 0.1
+
+
+@dataclass(frozen=True)
+class SampleDemand:
+    """The worth of further samples in each pixel of a view.
+
+    variance: (h, w) float64, what a pixel with its present samples adds to the squared error, in
+    the mean of its neighbours. density: (h, w), samples that a pixel should have, in proportion.
+    """
+
+    variance: Doubles
+    density: Doubles
+
+
+def pixel_variances(solution: Solution, aims: Doubles) -> Doubles:
+    """Return what each pixel adds to Σ_k Var(aims_k · w), (h, w) float64, as its noise shows it.
+
+    aims: (k, 3 n), directions of the weights, channel by channel.
+    """
+    pixels = NoisyPixels.of(solution)
+    push = aims @ gradient_response(solution)
+    made = np.zeros(solution.importance.size)
+
+    def fill(its: Indices) -> None:
+        rows = pixels.gradient_noise(its).reshape(push.shape[1], -1)
+        made[its] = np.square(push @ rows).sum(axis=0)
+
+    counted = pixels.counted
+    parallel_map(
+        fill, [counted[k : k + BLOCK_PIXELS] for k in range(0, counted.size, BLOCK_PIXELS)]
+    )
+    return made.reshape(solution.importance.shape)
+
+
+def sample_demand(variances: Doubles, counted: Bools, have: Doubles) -> SampleDemand:
+    """Return the demand of a view.
+
+    variances: (h, w), its part of `pixel_variances`. counted: (h, w), pixels that count. have: (h,
+    w), samples that pixels have.
+    """
+    # Of a single sample, since neighbours may have other numbers of samples.
+    of_one = _sum_around(np.where(counted, variances * have, 0))
+    mean = np.where(counted, of_one / np.maximum(_sum_around(counted.astype(np.float64)), 1), 0)
+    density = np.sqrt(mean)
+    floor = FLOOR * density.sum() / max(np.count_nonzero(counted), 1)
+    density = np.where(counted, np.maximum(density, floor), 0)
+    return SampleDemand(mean / np.maximum(have, 1), density)
+
+
+def _sum_around(image: Doubles) -> Doubles:
+    """Return the sum over the neighbours of each pixel, without itself, (h, w)."""
+    height, width = image.shape
+    padded, made = np.pad(image, AROUND), np.zeros_like(image)
+    for down, right in product(range(2 * AROUND + 1), repeat=2):
+        if (down, right) != (AROUND, AROUND):
+            made += padded[down : down + height, right : right + width]
+    return made
+
+
+def top_up_counts(density: Doubles, have: Doubles, budget: float) -> Indices:
+    """Return whole numbers of samples to add to each pixel, (h, w), `budget` of them in all.
+
+    So that afterwards their numbers are as near to proportions of `density` as can be.
+    """
+    return np.rint(np.maximum(_level(density, have, budget) * density - have, 0)).astype(np.intp)
+
+
+def _level(density: Doubles, have: Doubles, budget: float) -> float:
+    """Return the level at which Σ max(level · density − have, 0) is the budget."""
+    its = density > 0
+    if not its.any():
+        return 0.0
+    wanted, there = density[its], have[its]
+    order = np.argsort(there / wanted)
+    wanted, there = wanted[order], there[order]
+    # With the k pixels that lack most, the level is (budget + Σ have) / Σ density.
+    levels = (budget + np.cumsum(there)) / np.cumsum(wanted)
+    reached = levels >= there / wanted
+    return float(levels[np.flatnonzero(reached)[-1]])

@@ -1,0 +1,208 @@
+"""Samples added where a painting needs them, until the lights are as sure as was asked for."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Indices
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.basis_render import ONE_PASS
+from lightpaint.basis.render.cached_render import obtain_basis, top_up_basis
+from lightpaint.colour.color import LUMINANCE
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.analysis.noise.sample_demand import (
+    pixel_variances,
+    sample_demand,
+    top_up_counts,
+)
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
+from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.job_bases import view_listener
+from lightpaint.pipeline.settings import PILOT_SPP
+from lightpaint.progress import Listener
+from lightpaint.report.measures import LEAST_SHARE, picture_errors
+from lightpaint.report.phrases import spoken_percent
+from lightpaint.scene.film import MAX_SPP
+
+#: Rounds of samples, each of which at most doubles their number.
+MAX_ROUNDS = 20
+
+#: Parts of the samples so far that a round may add, and the part of the squared error that is asked
+#: for to which the one that is taken is expected to lead.
+ROUND_SIZES, AIM = (1 / 8, 1 / 4, 1 / 2, 1), 0.8
+
+
+@dataclass(frozen=True)
+class State:
+    """An answer and its errors. light: the least sure one. errors: (n,), as `picture_errors`."""
+
+    solution: Solution
+    light: str
+    errors: Doubles
+
+    @property
+    def error(self) -> float:
+        """The error of the least sure light."""
+        return float(self.errors.max(initial=0))
+
+
+def problem_of(job: Job, bases: Sequence[Basis]) -> Problem:
+    """Return the problem of a job and the bases of its views."""
+    targets = [view.target for view in job.views]
+    return Problem.of(list(bases), targets, constraints=job.all_constraints, fit=job.fit)
+
+
+def without_noise(job: Job, solution: Solution) -> Solution:
+    """Return a solution whose noise is corrected, if the settings ask for it."""
+    is_known = solution.basis.knows_noise
+    return correct_noise(solution) if job.settings.corrects_noise(is_known=is_known) else solution
+
+
+def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[Basis]:
+    """Return the bases of a job with the samples that its error needs.
+
+    Rounds of a solve and of samples where they lower the errors of the lights most, until the
+    largest error is as small as was asked for, or the time is over.
+    """
+    settings, begin_s = job.settings, time.monotonic()
+    assert settings.error is not None
+    limit_s = np.inf if settings.time_s is None else settings.time_s
+
+    def is_over() -> bool:
+        return time.monotonic() - begin_s > limit_s
+
+    before = [basis.origin.mean_spp for basis in bases]
+    for _ in range(MAX_ROUNDS):
+        state = _state(job, bases)
+        most = max(basis.origin.mean_spp for basis in bases)
+        if state.error <= settings.error or is_over() or most >= MAX_SPP:
+            break
+        listen.note(_text(state, bases))
+        if all(basis.origin.method == ONE_PASS for basis in bases):
+            bases = _topped_up(job, bases, state, is_over, listen)
+        else:
+            bases = _doubled(job, bases, listen)
+    added = sum(x.origin.mean_spp for x in bases) > sum(before)
+    text = _text(state, bases)
+    if state.error > settings.error:
+        text += f"; ± {spoken_percent(settings.error)} was asked for"
+    if added or state.error > settings.error:
+        listen.say(text)
+    return bases
+
+
+def _state(job: Job, bases: Sequence[Basis]) -> State:
+    solution = without_noise(job, solution_of(problem_of(job, bases)))
+    uncertainty = error_bars(solution)
+    assert uncertainty is not None
+    errors = picture_errors(solution.basis, uncertainty)
+    return State(solution, solution.basis.names[int(np.argmax(errors))], errors)
+
+
+def _text(state: State, bases: Sequence[Basis]) -> str:
+    """Return how sure the lights are, after how many samples."""
+    mean = sum(basis.origin.mean_spp for basis in bases) / len(bases)
+    extra = sum(basis.origin.extra_spp for basis in bases) / len(bases)
+    where = f", {_spoken(extra)} of them where the painting needs them" if extra else ""
+    least = f"one below {spoken_percent(LEAST_SHARE)} of the picture's light counts as that"
+    return (
+        f"{_spoken(mean)} samples per pixel{where}: lights are known to "
+        f"± {spoken_percent(state.error)} (least sure: {state.light}; {least})"
+    )
+
+
+def _spoken(samples: float) -> str:
+    return f"{samples:.2g}" if samples < 10 else f"{samples:.0f}"
+
+
+def aims_of(state: State) -> Doubles:
+    """Return the directions of the weights whose errors are to fall, (n, 3 n), channel by channel.
+
+    Each is the error of a light as `picture_errors` counts it, times itself: so the largest error
+    counts most.
+    """
+    basis, weights = state.solution.basis, state.solution.weights
+    made = (basis.totals * weights) @ LUMINANCE
+    scale = state.errors / np.maximum(made, LEAST_SHARE * made.sum())
+    n = len(made)
+    aims = np.zeros((n, 3, n))
+    aims[np.arange(n), :, np.arange(n)] = basis.totals * LUMINANCE * scale[:, None]
+    return aims.reshape(n, -1)
+
+
+def needed_counts(state: State, bases: Sequence[Basis], error: float) -> list[Indices]:
+    """Return the samples to add to each half of each pixel of each view, (h, w) each."""
+    views, solution = state.solution.problem.views, state.solution
+    variances = pixel_variances(solution, aims_of(state))
+    have = [_half_samples(basis) for basis in bases]
+    its = [
+        sample_demand(views.part(variances, k), views.part(solution.importance, k) > 0, have[k])
+        for k in range(len(bases))
+    ]
+    variance = np.concatenate([x.variance.ravel() for x in its])
+    density = np.concatenate([x.density.ravel() for x in its])
+    there = np.concatenate([x.ravel() for x in have])
+    goal = AIM * (error / state.error) ** 2 * variance.sum()
+    for size in ROUND_SIZES:
+        counts = top_up_counts(density, there, size * there.sum())
+        if (variance * there / (there + counts)).sum() <= goal:
+            break
+    ends = np.cumsum([x.size for x in have])[:-1]
+    parts = zip(np.split(counts, ends), bases, strict=True)
+    return [part.reshape(basis.size) for part, basis in parts]
+
+
+def _half_samples(basis: Basis) -> Doubles:
+    """Return the samples of half A of each pixel, (h, w)."""
+    have = np.full(basis.size, float(basis.origin.halves[0]))
+    return have if basis.extra is None else have + basis.extra
+
+
+def _topped_up(
+    job: Job,
+    bases: Sequence[Basis],
+    state: State,
+    is_over: Callable[[], bool],
+    listen: Listener,
+) -> list[Basis]:
+    """Return the bases with a round of samples where they are needed."""
+    assert job.settings.error is not None
+    made = []
+    for view, basis, counts in zip(
+        job.views, bases, needed_counts(state, bases, job.settings.error), strict=True
+    ):
+        assert view.scene is not None
+        made.append(
+            top_up_basis(
+                view.scene,
+                basis,
+                counts,
+                use_cache=job.settings.use_cache,
+                progress=view_listener(job, view, listen),
+                is_enough=is_over,
+            )
+        )
+    return made
+
+
+def _doubled(job: Job, bases: Sequence[Basis], listen: Listener) -> list[Basis]:
+    """Return the bases with twice as many samples in all pixels, where lights render alone."""
+    made = []
+    for view, basis in zip(job.views, bases, strict=True):
+        assert view.scene is not None
+        spp = 2 * max(PILOT_SPP, basis.origin.spp)
+        made.append(
+            obtain_basis(
+                view.scene,
+                spp=spp,
+                seed=job.settings.seed,
+                use_cache=job.settings.use_cache,
+                progress=view_listener(job, view, listen),
+            )
+        )
+    return made

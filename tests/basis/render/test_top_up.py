@@ -1,0 +1,185 @@
+"""A basis with further samples of some pixels: means of all of them, and noise that says so."""
+
+import os
+import signal
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import SAME_SAMPLES, render_in_parts, same_basis, write_room
+
+import lightpaint.scene.scene_render
+from lightpaint.basis import cache
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.basis_file import read_basis, write_basis
+from lightpaint.basis.render import guide_training, top_up
+from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
+from lightpaint.basis.render.cached_render import obtain_basis, top_up_basis
+from lightpaint.errors import BasisError
+from lightpaint.progress import Interrupted
+from lightpaint.scene.scene import Scene, load_scene
+
+
+@pytest.fixture(autouse=True)
+def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A short training, and passes of some hundred samples of a pixel's half."""
+    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", 4 * 4 * 24 * 20)
+
+
+@pytest.fixture(scope="module")
+def counts() -> Any:
+    """None in the upper rows, and 1 to 24 below."""
+    rng = np.random.default_rng(0)
+    made = rng.integers(1, 25, (20, 24))
+    made[:6] = 0
+    return made
+
+
+def weighted(basis: Basis, samples: Any) -> Any:
+    """The sums that means of so many samples of each half stand for, (2, n, h, w, 3) float64."""
+    images, halves = (x.astype(np.float64) for x in (basis.images, basis.half_differences))
+    return np.stack([images + halves, images - halves]) * samples[..., None]
+
+
+def close(a: Any, b: Any) -> None:
+    """Assert that two arrays differ by the round-off of some sums."""
+    np.testing.assert_allclose(a, b, rtol=0, atol=8 * SAME_SAMPLES * np.abs(b).max())
+
+
+def test_pixels_without_further_samples_keep_their_bits(small_room: Scene, counts: Any):
+    basis = render_basis(small_room, spp=8)
+    topped = top_up.top_up(small_room, basis, counts)
+    for a, b in ((basis, topped), (basis.indirect, topped.indirect)):
+        np.testing.assert_array_equal(a.planes.rows(0, 6), b.planes.rows(0, 6))
+        np.testing.assert_array_equal(a.noise.rows(0, 6), b.noise.rows(0, 6))
+    assert (basis.planes.rows(6, 20) != topped.planes.rows(6, 20)).any(axis=(0, 3)).mean() > 0.5
+    np.testing.assert_array_equal(topped.extra, counts)
+    assert topped.origin.mean_spp == pytest.approx(8 + 2 * counts.mean())
+
+
+def test_in_two_goes_as_in_one(small_room: Scene, counts: Any, tmp_path: Path):
+    """Samples of a pixel are terms of a sequence, and means are weighed by their numbers."""
+    basis = render_basis(small_room, spp=8)
+    first = np.random.default_rng(1).integers(0, counts + 1)
+    in_one = top_up.top_up(small_room, basis, counts)
+    begun = top_up.top_up(small_room, basis, first)
+    same_basis(top_up.top_up(small_room, begun, counts - first), in_one)
+    write_basis(tmp_path / "b.exr", begun)
+    read = read_basis(tmp_path / "b.exr")
+    np.testing.assert_array_equal(read.extra, begun.extra)
+    same_basis(top_up.top_up(small_room, read, counts - first), in_one, of_file=True)
+
+
+def test_uniform_samples_go_on_after_a_top_up(small_room: Scene, counts: Any):
+    """Both kinds of samples come to the same, in whichever order they are taken."""
+    basis = render_basis(small_room, spp=8)
+    before = top_up.top_up(small_room, basis, counts)
+    after = render_basis(small_room, spp=24, start=before)
+    np.testing.assert_array_equal(after.extra, counts)
+    uniform = weighted(render_basis(small_room, spp=24), np.full(counts.shape, 12.0))
+    added = weighted(before, 4.0 + counts) - weighted(basis, np.full(counts.shape, 4.0))
+    close(weighted(after, 12.0 + counts), uniform + added)
+    same_basis(render_in_parts(small_room, spp=24, start=before), after)
+
+
+@pytest.mark.parametrize("most", [1, 7, 2**20])
+def test_batches_change_no_bit(
+    small_room: Scene, counts: Any, monkeypatch: pytest.MonkeyPatch, most: int
+):
+    basis = render_basis(small_room, spp=4)
+    whole = top_up.top_up(small_room, basis, counts)
+    monkeypatch.setattr(top_up, "PART_MAX_BYTES", 12 * 20 * most)
+    again = top_up.top_up(small_room, basis, counts * (counts > 18) if most == 1 else counts)
+    its = counts > 18 if most == 1 else counts >= 0
+    np.testing.assert_array_equal(again.images[:, its], whole.images[:, its])
+    np.testing.assert_array_equal(again.half_differences[:, its], whole.half_differences[:, its])
+
+
+def test_batches_have_every_pixel_once(counts: Any):
+    batches = list(top_up.pixel_batches(counts, 10))
+    its = np.concatenate(batches)
+    np.testing.assert_array_equal(np.sort(its), np.flatnonzero(counts))
+    taken = [int(counts.ravel()[pixels].sum()) for pixels in batches]
+    assert all(a <= lightpaint.scene.scene_render.SAMPLES_PER_PASS // 4 for a in taken)
+
+
+def test_noise_falls_with_the_samples(small_room: Scene):
+    """Half differences and true errors of pixels with 16 times the samples fall alike."""
+    counts = np.zeros((20, 24), int)
+    counts[::2] = 30
+    long = render_basis(small_room, spp=512, seed=90)
+    missed, told = np.zeros((2, 2))
+    for seed in range(1, 6):
+        basis = top_up.top_up(small_room, render_basis(small_room, spp=4, seed=seed), counts)
+        for k in range(2):
+            missed[k] += np.square(basis.images[:, k::2] - long.images[:, k::2]).sum()
+            told[k] += np.square(basis.half_differences[:, k::2]).sum()
+    # Evenly spread samples do better than independent ones, of which 16 times as many are.
+    assert missed[0] < missed[1] / 8
+    assert 0.7 < (told[0] / told[1]) / (missed[0] / missed[1]) < 1.4
+
+
+def test_an_interrupt_keeps_what_is_done(small_room: Scene, counts: Any):
+    basis, kept = render_basis(small_room, spp=4), []
+
+    def press_ctrl_c(_label: str, done: int, _total: int) -> None:
+        if done == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def keep(basis: Basis) -> bool:
+        kept.append(basis)
+        return True
+
+    with pytest.raises(Interrupted, match="the same command goes on"):
+        top_up.top_up(small_room, basis, counts, keep=keep, progress=press_ctrl_c)
+    assert 0 < kept[-1].extra.sum() < counts.sum()
+    rest = top_up.top_up(small_room, kept[-1], counts - kept[-1].extra)
+    same_basis(rest, top_up.top_up(small_room, basis, counts))
+
+
+def test_enough_is_enough(small_room: Scene, counts: Any):
+    basis = render_basis(small_room, spp=4)
+    same_basis(top_up.top_up(small_room, basis, counts, is_enough=lambda: True), basis)
+
+
+def test_what_is_kept_is_not_taken_for_uniform_samples(
+    small_room: Scene, counts: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path))
+    basis = obtain_basis(small_room, spp=8)
+    topped = top_up_basis(small_room, basis, counts)
+    found = obtain_basis(small_room, spp=8)
+    assert found.origin == topped.origin
+    np.testing.assert_array_equal(found.extra, counts)
+    assert not is_on_the_way(small_room, found, 16)
+    exact = obtain_basis(small_room, spp=8, exact_spp=True)
+    assert exact.extra is None
+    np.testing.assert_array_equal(exact.images, basis.images)
+    # Fewer samples do not replace more of them.
+    assert cache.is_cached(topped)
+    assert obtain_basis(small_room, spp=16).origin.extra_spp == topped.origin.extra_spp
+
+
+def test_damaged_numbers_of_samples_are_no_basis(small_room: Scene, counts: Any, tmp_path: Path):
+    topped = top_up.top_up(small_room, render_basis(small_room, spp=4), counts)
+    write_basis(tmp_path / "b.exr", topped)
+    plain = replace(topped, extra=None, origin=replace(topped.origin, extra_spp=0.0))
+    write_basis(tmp_path / "plain.exr", plain)
+    assert read_basis(tmp_path / "plain.exr").extra is None
+    write_basis(tmp_path / "b.exr", replace(topped, extra=-topped.extra))
+    with pytest.raises(BasisError, match="extra samples are damaged"):
+        read_basis(tmp_path / "b.exr")
+    with pytest.raises(BasisError, match="extra samples"):
+        replace(topped, extra=None)
+    with pytest.raises(BasisError, match="another size"):
+        replace(topped, extra=counts[1:])
+
+
+def test_nothing_else_is_topped_up(small_room: Scene, counts: Any, tmp_path: Path):
+    basis = render_basis(small_room, spp=4)
+    changed = load_scene(write_room(tmp_path), parameters={"width": 20})
+    with pytest.raises(BasisError, match="of this scene and film"):
+        top_up.top_up(changed, basis, counts)

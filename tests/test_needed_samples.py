@@ -1,0 +1,125 @@
+"""Samples until the lights are as sure as was asked for, where the painting needs them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, write_room
+from test_views import CLOSE
+
+from lightpaint.basis.render import guide_training
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.errors import LightpaintError
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
+from lightpaint.pipeline.one_call import paint_with_light
+from lightpaint.pipeline.settings import PILOT_SPP, Settings
+from lightpaint.report.measures import picture_errors
+from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.target.target import Target
+
+
+class Heard:
+    """A listener that remembers remarks, and what was worked on."""
+
+    def __init__(self) -> None:
+        self.remarks: list[str] = []
+        self.work: set[str] = set()
+
+    def __call__(self, label: str, *_: object) -> None:
+        self.work.add(label)
+
+    def say(self, text: str) -> None:
+        self.remarks.append(text)
+
+
+@pytest.fixture(autouse=True)
+def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+
+
+def painting(scene: Scene) -> Target:
+    """Three lights dimmed, and a stroke that no mix reaches."""
+    basis = render_basis(scene, spp=64, seed=7)
+    weights = basis.present_weights * np.array([1, 0.5, 2, 1, 0.7][: len(basis.names)])[:, None]
+    image = basis.mix(weights)
+    image[8:12, 4:12] *= np.float32([1.2, 1, 0.8])
+    return Target("t", image, np.ones(basis.size, np.float32), everything=True)
+
+
+def answer(scene: Any, target: Any, folder: Path, **how: Any) -> tuple[Any, Heard]:
+    heard = Heard()
+    how = {"verify": False, "report": False, "force": True} | how
+    return paint_with_light(scene, target, folder, progress=heard, **how), heard
+
+
+@pytest.mark.usefixtures("own_cache")
+def test_samples_go_where_they_are_needed_until_the_error_is_met(small_room: Scene, tmp_path: Path):
+    target = painting(small_room)
+    look, heard = answer(small_room, target, tmp_path / "a", error=0.3)
+    reached = picture_errors(look.basis, error_bars(look.solution)).max()
+    assert reached <= 0.3
+    assert look.basis.origin.spp == PILOT_SPP
+    assert look.basis.extra.any()
+    assert heard.work >= {"basis", "top-up"}
+    [said] = [x for x in heard.remarks if "where the painting needs them" in x]
+    assert "lights are known to ± " in said
+    assert "was asked for" not in said
+    # All of it is kept: the same again renders nothing.
+    again, heard = answer(small_room, target, tmp_path / "a", error=0.3)
+    assert not heard.work & {"basis", "top-up"}
+    np.testing.assert_array_equal(again.solution.weights, look.solution.weights)
+    assert any("more where a painting needed them" in x for x in heard.remarks)
+    # A smaller error goes on from there.
+    finer, _ = answer(small_room, target, tmp_path / "a", error=reached / 1.5)
+    assert (finer.basis.extra >= look.basis.extra).all()
+    assert finer.basis.origin.extra_spp > look.basis.origin.extra_spp
+
+
+def test_time_bounds_what_an_error_takes(small_room: Scene, tmp_path: Path):
+    target = painting(small_room)
+    how = {"error": 1e-4, "time_s": 0.01, "use_cache": False}
+    look, heard = answer(small_room, target, tmp_path / "a", **how)
+    assert look.basis.origin.mean_spp == PILOT_SPP
+    assert any("was asked for" in x for x in heard.remarks)
+
+
+def test_several_views_share_the_samples(tmp_path: Path):
+    lights = LIGHTS["panel"] + LIGHTS["bulb"] + LIGHTS["beam"] + LIGHTS["sky"]
+    room = write_room(tmp_path, lights=lights, sensors=CLOSE)
+    scenes = [load_scene(room, sensor=name) for name in ("camera", "close")]
+    targets = [painting(scene) for scene in scenes]
+    looks, heard = answer(scenes, targets, tmp_path / "a", error=0.3, use_cache=False)
+    assert {"top-up of camera", "top-up of close"} <= heard.work
+    for look, scene in zip(looks, scenes, strict=True):
+        assert look.basis.size == scene.size
+        assert look.basis.origin.extra_spp > 0
+
+
+def test_renders_of_single_lights_get_more_samples_everywhere(tmp_path: Path):
+    integrator = '<integrator type="volpathmis"/>'
+    room = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"], integrator=integrator)
+    scene = load_scene(room)
+    target = painting(scene)
+    look, _ = answer(scene, target, tmp_path / "a", error=0.3, use_cache=False)
+    assert look.basis.origin.method == "separate renders"
+    assert look.basis.extra is None
+    assert picture_errors(look.basis, error_bars(look.solution)).max() <= 0.3
+
+
+@pytest.mark.parametrize("other", [{"spp": 4}, {"exact_spp": True}])
+def test_an_error_and_a_number_of_samples_are_refused(other: dict[str, Any]):
+    with pytest.raises(LightpaintError, match=r"error is 0\.02 and .*: expected either"):
+        Settings(error=0.02, **other)
+
+
+def test_an_error_needs_a_scene(make_basis: Any, tmp_path: Path):
+    basis = make_basis()
+    target = Target("t", basis.present_look, np.ones(basis.size, np.float32), everything=True)
+    with pytest.raises(LightpaintError, match="error"):
+        paint_with_light(None, target, tmp_path, basis=basis, error=0.02)
