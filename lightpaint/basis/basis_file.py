@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, IndirectLight, Origin
 from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.basis.file_parts import (
@@ -30,8 +31,10 @@ from lightpaint.basis.file_parts import (
     planes_of,
     scales_of,
     stack_channels,
+    stored_channels,
 )
 from lightpaint.basis.file_planes import FilePlanes
+from lightpaint.basis.half_floats import EncodedPlanes
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
@@ -55,6 +58,10 @@ ORIGIN_KEY = "lightpaint.origin"
 
 #: Longest basis file that is read, in bytes.
 MAX_BYTES = 2**36
+
+#: Bytes of the images of all lights in float32 up to which memory holds them so: up to here the
+#: time to decode half floats counts, beyond it memory.
+SINGLES_MAX_BYTES = 2**27
 
 #: Bytes of planes in float32 up to which they are brought into memory.
 IN_MEMORY_MAX_BYTES = 2**31
@@ -108,9 +115,12 @@ def write_basis(path: str | Path, basis: Basis) -> None:
 def as_stored(basis: Basis) -> Basis:
     """Return `basis` with the planes that come back of what `write_basis` writes of it.
 
-    So that who solves what was just rendered finds what who reads it from its file finds. It is
-    rounded in the memory of the planes that are given, which must be in memory.
+    So that who solves what was just rendered finds what who reads it from its file finds. Many
+    planes are copied in half floats. Few are rounded in the memory of those that are given, which
+    must be in memory.
     """
+    if is_encoded(len(basis.lights), basis.size):
+        return _encoded(basis)
     for k in range(len(basis.lights)):
         planes = planes_of(basis, k)
         for plane, encoding in zip(planes, encodings_of_planes(planes), strict=True):
@@ -147,6 +157,27 @@ def read_basis(path: str | Path) -> Basis:
         raise BasisError(f"{path} is damaged as a basis: {one_line(str(error))}") from error
     except MemoryError:
         raise ImageError(f"{path} takes more memory than there is") from None
+
+
+def is_encoded(lights: int, size: tuple[int, int]) -> bool:
+    """Return whether memory holds planes of so many lights as their file does."""
+    return 12 * lights * size[0] * size[1] > SINGLES_MAX_BYTES
+
+
+def _encoded(basis: Basis) -> Basis:
+    """Return `basis` with planes that memory holds as their file does."""
+    stored: list[list[Sequence[Floats]]] = [[] for _ in PLANE_CHANNELS]
+    scales: list[list[float]] = [[] for _ in PLANE_CHANNELS]
+    for k in range(len(basis.lights)):
+        planes = planes_of(basis, k)
+        for number, encoding in enumerate(encodings_of_planes(planes)):
+            numbers = encoding.encoded(planes[number])
+            stored[number].append([numbers[..., c].copy() for c in range(3)])
+            scales[number].append(encoding.scale)
+    made = [EncodedPlanes(*its) for its in zip(stored, scales, strict=True) if its[0]]
+    images, noise, *indirect = made
+    parts = IndirectLight(*indirect) if indirect else None
+    return replace(basis, planes=images, noise=noise, indirect=parts)
 
 
 def is_large(lights: int, size: tuple[int, int]) -> bool:
@@ -189,6 +220,9 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
 
     def planes(order: Sequence[int], number: int) -> Planes:
         its = [(lit[k], scales[k][number]) for k in order]
+        if is_encoded(len(lit), lit[0].size):
+            stored = stored_channels(its, PLANE_CHANNELS[number])
+            return EncodedPlanes(stored, [scale for _, scale in its])
         return as_planes(stack_channels(its, PLANE_CHANNELS[number]))
 
     stored = [partial(getattr, part, "channels") for part in lit]

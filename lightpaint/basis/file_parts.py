@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis, free_name
@@ -103,18 +104,31 @@ def _is_scale(scale: object) -> bool:
 
 def stack_channels(parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]) -> Floats:
     """Return some channels of parts times a scale each, (n, h, w, 3)."""
-    first = parts[0][0]
-    stack_channels = np.empty((len(parts), *first.size, 3), np.float32)
-    for image, (part, scale) in zip(stack_channels, parts, strict=True):
-        if part.size != first.size:
-            raise BasisError(f"parts {first.name!r} and {part.name!r} differ in size")
-        for k, name in enumerate(names):
-            if name not in part.channels:
-                raise BasisError(f"no channel {name} in part {part.name!r}")
-            image[..., k] = part.channels[name]
+    stored = stored_channels(parts, names)
+    stacked = np.empty((len(parts), *parts[0][0].size, 3), np.float32)
+    for image, channels, (_, scale) in zip(stacked, stored, parts, strict=True):
+        for k, channel in enumerate(channels):
+            image[..., k] = channel
         if scale != 1:
             image *= np.float32(scale)
-    return stack_channels
+    return stacked
+
+
+def stored_channels(
+    parts: Sequence[tuple[ExrPart, float]], names: Sequence[str]
+) -> list[list[npt.NDArray[Any]]]:
+    """Return some channels of parts as they are stored, (h, w) each.
+
+    Raises BasisError if parts differ in size, or lack one of these channels.
+    """
+    first = parts[0][0]
+    for part, _ in parts:
+        if part.size != first.size:
+            raise BasisError(f"parts {first.name!r} and {part.name!r} differ in size")
+        for name in names:
+            if name not in part.channels:
+                raise BasisError(f"no channel {name} in part {part.name!r}")
+    return [[part.channels[name] for name in names] for part, _ in parts]
 
 
 def other_parts(basis: Basis) -> Iterator[ExrPart]:

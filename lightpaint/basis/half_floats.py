@@ -5,14 +5,15 @@ noise in every tile of it, and in float32 where it is so clean that rounding wou
 bright for half floats, or so dim that they lose digits, is multiplied by a power of two first.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles
+from lightpaint.basis.file_planes import RowPlanes
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 
@@ -45,6 +46,66 @@ class PlaneEncoding:
     def rounded(self, plane: Floats) -> npt.NDArray[np.float32]:
         """Return a plane as it comes back."""
         return self.decoded(self.encoded(plane))
+
+
+class EncodedPlanes(RowPlanes):
+    """Planes that memory holds as files do: in half floats where nobody sees the rounding.
+
+    stored: of each light its three channels, (h, w) each, half floats or float32, as
+    `PlaneEncoding.encoded` returns them. scales: what the numbers of each light are to be
+    multiplied by.
+    """
+
+    def __init__(
+        self, stored: Sequence[Sequence[npt.NDArray[Any]]], scales: Sequence[float]
+    ) -> None:
+        self._stored = [[np.ascontiguousarray(its) for its in channels] for channels in stored]
+        self._scales = tuple(scales)
+
+    @property
+    def count(self) -> int:
+        """n."""
+        return len(self._stored)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        height, width = self._stored[0][0].shape
+        return height, width
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of memory that the planes take."""
+        return sum(its.nbytes for channels in self._stored for its in channels)
+
+    def plane(self, i: int) -> Floats:
+        """Return the plane of light i, (h, w, 3)."""
+        made = np.empty((*self.size, 3), np.float32)
+        self._decode(i, slice(None), made.reshape(-1, 3).T)
+        return made
+
+    def rows(self, top: int, bottom: int) -> Floats:
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        height, width = self.size
+        top, bottom = max(top, 0), min(bottom, height)
+        made = self.pixels(slice(top * width, max(bottom, top) * width))
+        return made.transpose(0, 2, 1).reshape(self.count, 3, -1, width).transpose(0, 2, 3, 1)
+
+    def pixels(self, where: slice | Indices) -> Floats:
+        """Return some pixels of all planes, (n, p, 3)."""
+        length = self._stored[0][0].reshape(-1)[where].size
+        # Channel by channel, as they are stored and as sums go over them.
+        made = np.empty((self.count, 3, length), np.float32)
+        for i, channels in enumerate(made):
+            self._decode(i, where, channels)
+        return made.transpose(0, 2, 1)
+
+    def _decode(self, i: int, where: slice | Indices, into: Floats) -> None:
+        """Write some pixels of light i into (3, p)."""
+        for stored, channel in zip(self._stored[i], into, strict=True):
+            copy_as_singles(stored.reshape(-1)[where], channel)
+        if self._scales[i] != 1:
+            into *= np.float32(self._scales[i])
 
 
 def encodings_of(image: Floats, noise: Floats) -> tuple[PlaneEncoding, PlaneEncoding]:

@@ -1,6 +1,7 @@
 """Planes in half floats: only where their rounding is far below the noise, and nobody sees it."""
 
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.basis import basis_file
+from lightpaint.basis.basis import IndirectLight
 from lightpaint.basis.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
 from lightpaint.basis.file_parts import SCALE_KEY
 from lightpaint.basis.file_planes import RowPlanes
@@ -16,10 +19,11 @@ from lightpaint.basis.half_floats import (
     HALF,
     HIDDEN_SHARE,
     TILE,
+    EncodedPlanes,
     PlaneEncoding,
     encodings_of,
 )
-from lightpaint.basis.planes import as_planes
+from lightpaint.basis.planes import MemoryPlanes, as_planes
 from lightpaint.errors import BasisError
 from lightpaint.images.formats.exr import read_parts, write_parts
 
@@ -92,7 +96,12 @@ def basis(make_basis: Any) -> lp.Basis:
     return made
 
 
-def test_what_is_stored_comes_back(tmp_path: Path, basis: lp.Basis) -> None:
+@pytest.mark.parametrize("limit", [0, 2**27])
+def test_what_is_stored_comes_back(
+    tmp_path: Path, basis: lp.Basis, monkeypatch: pytest.MonkeyPatch, limit: int
+) -> None:
+    """Where memory holds planes in half floats, and where in float32."""
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", limit)
     images, halves = basis.images.copy(), basis.half_differences.copy()
     path = tmp_path / "a.basis.exr"
     write_basis(path, basis)
@@ -111,6 +120,36 @@ def test_what_is_stored_comes_back(tmp_path: Path, basis: lp.Basis) -> None:
     kinds = [[part.channels[c].dtype for c in ("R", "half_difference.R")] for part in parts[:5]]
     assert kinds == [[HALF, HALF], [HALF, HALF], [FLOAT, HALF], [HALF, HALF], [HALF, HALF]]
     assert [SCALE_KEY in part.attributes for part in parts[:5]] == [False] * 3 + [True, False]
+
+
+def test_memory_holds_many_planes_in_two_bytes_a_number(
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also of indirect light, and with the answer of float32."""
+    planes = [plane(0.1, seed=k) for k in range(3)]
+    images, halves = (np.stack(x) for x in zip(*planes, strict=True))
+    indirect = IndirectLight(MemoryPlanes(0.4 * images), MemoryPlanes(0.4 * halves))
+    made = replace(make_basis(images=images, half_differences=halves), indirect=indirect)
+    target = lp.Target.of(made.mix(np.full((3, 3), 0.7)))
+    write_basis(tmp_path / "a.basis.exr", made)
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    rendered, kept = as_stored(made), read_basis(tmp_path / "a.basis.exr")
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 2**27)
+    singles = as_stored(made)
+    for its in (rendered, kept):
+        assert its.indirect is not None
+        assert singles.indirect is not None
+        for mine, other in (
+            (its.planes, singles.planes),
+            (its.noise, singles.noise),
+            (its.indirect.planes, singles.indirect.planes),
+            (its.indirect.noise, singles.indirect.noise),
+        ):
+            assert isinstance(mine, EncodedPlanes)
+            assert 2 * mine.nbytes == images.nbytes
+            assert mine.array().tobytes() == other.array().tobytes()
+        expected = lp.solve(singles, target)
+        np.testing.assert_allclose(lp.solve(its, target).weights, expected.weights, rtol=1e-12)
 
 
 def test_a_file_is_half_as_long(tmp_path: Path, make_basis: Any) -> None:

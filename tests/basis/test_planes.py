@@ -13,6 +13,7 @@ import lightpaint as lp
 from lightpaint.basis import basis_file, file_planes
 from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means, in_one_row
 from lightpaint.basis.file_planes import FilePlanes
+from lightpaint.basis.half_floats import EncodedPlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import exr_rows
@@ -123,6 +124,11 @@ def test_planes_of_a_file_are_those_in_memory(
 ) -> None:
     path = tmp_path / "it.basis.exr"
     basis = written(path, make_basis, smooth=smooth, size=size)
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    in_memory = lp.read_basis(path)
+    assert isinstance(in_memory.planes, EncodedPlanes)
+    check_alike(in_memory.planes, basis.images)
+    check_alike(in_memory.noise, basis.half_differences)
     monkeypatch.setattr(basis_file, "IN_MEMORY_MAX_BYTES", 0)
     monkeypatch.setattr(file_planes, "STRIP_CACHE_BYTES", room)
     found = lp.read_basis(path)
