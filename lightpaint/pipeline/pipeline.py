@@ -17,7 +17,7 @@ from lightpaint.pipeline.results import Look, write_predicted, write_report
 from lightpaint.pipeline.settings import Settings
 from lightpaint.placement.light_search import suggest_lights
 from lightpaint.progress import Listener, Progress, listener, silent
-from lightpaint.relit.detection_power import LightShares, with_power
+from lightpaint.relit.detection_power import LightShares, with_light_tests
 from lightpaint.relit.render_rounds import refine_by_rendering
 from lightpaint.relit.sample_budget import VerificationBudget, verification_budget
 from lightpaint.relit.sequential_verification import verify_in_stages
@@ -170,7 +170,7 @@ def _verify(
     verification = verify(
         predicted, budget.scene, spp=budget.spp, seed=settings.seed, progress=listen
     )
-    return with_power(verification, predicted, LightShares.of(basis, lighting))
+    return with_light_tests(verification, predicted, LightShares.of(basis, lighting))
 
 
 def _budget(settings: Settings, basis: Basis, relit: Scene) -> VerificationBudget:

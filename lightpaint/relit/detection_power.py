@@ -16,11 +16,13 @@ from lightpaint.colour.color import luminance
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.relit.light_tests import LightTests, light_tests
 from lightpaint.relit.verification import (
     LIMIT,
     Verification,
     block_sums,
     brightness_weights,
+    limit_of_tests,
     noise_of,
 )
 
@@ -64,8 +66,10 @@ class LightShares:
         sums, blocks, noise = [], [], []
         for picture in pictures:
             sums.append(picture.image.sum(axis=(0, 1), dtype=np.float64))
-            blocks.append(block_sums(picture.image.astype(np.float64)).astype(np.float32))
-            noise.append(block_sums(picture.half_difference.astype(np.float64)).astype(np.float32))
+            blocks.append(block_sums(picture.image).astype(np.float32))
+            noise.append(block_sums(picture.half_difference).astype(np.float32))
+        if not sums:
+            return cls((), np.zeros((0, 3)), *np.zeros((2, 0, 1, 1, 3), np.float32))
         return cls(tuple(names), np.array(sums), np.array(blocks), np.array(noise))
 
     def luminance(self) -> dict[str, float]:
@@ -74,45 +78,51 @@ class LightShares:
         return dict(zip(self.names, (values / max(values.sum(), 1e-300)).tolist(), strict=True))
 
 
-def with_power(
+def with_light_tests(
     verification: Verification, predicted: Estimate, lights: LightShares
 ) -> Verification:
-    """Return `verification` with its power for an error of ERROR in each light that shines.
+    """Return `verification` with the test of each light that shines, and its power for an error of
+    ERROR in it.
 
     predicted: what it was held against.
     """
     factor = whole_factor(verification.verified.size, predicted.size) or 1
     verified = verification.verified.reduced(factor)
-    power = detection_power(predicted, verified, lights, limit=verification.limit)
-    return replace(verification, power=power)
+    tests = light_tests(predicted, verified, lights.blocks, lights.noise)
+    power = detection_power(predicted, verified, lights, tests, limit=verification.limit)
+    z = dict(zip(lights.names, tests.z.tolist(), strict=True))
+    return replace(verification, z_lights=z, power=power)
 
 
 def detection_power(
     predicted: Estimate,
     verified: Estimate,
     lights: LightShares,
+    tests: LightTests,
     *,
     limit: float = LIMIT,
     error: float = ERROR,
 ) -> dict[str, float]:
     """Return the probability, for each light, that a relative error in it exceeds `limit`.
 
-    Both tests of a verification count: the sum of the picture, and the pattern of blocks. Of the
-    sums, the most sensitive channel counts, since one path carries the noise of all. With the error
-    d, a block's product of halves has the mean d² and, beside the variance 4 S² of noise alone,
-    4 S d², where S is the variance of the block's difference. The light's own noise is taken out of
-    d².
+    It is that of the most sensitive test: the light's own, the sum of the picture, or the pattern
+    of blocks; so with all three it is at least as much. Of the sums, the most sensitive channel
+    counts, since one path carries the noise of all. With the error d, a block's product of halves
+    has the mean d² and, beside the variance 4 S² of noise alone, 4 S d², where S is the variance of
+    the block's difference. The light's own noise is taken out of d².
 
-    predicted, verified: as in `compare`, of one size.
+    predicted, verified: as in `compare`, of one size. tests: of the same.
     """
     squares, magnitude = noise_of(predicted, verified)
     deviation = np.sqrt(squares.sum(axis=(0, 1)))
     blocks, weight = block_sums(squares), brightness_weights(magnitude)
     spread = float(np.square(weight * 2 * blocks.sum(axis=-1)).sum())
+    means = tests.mean(error)
+    limits = tests.limits(limit_of_tests(max(len(lights.names), 1), once=limit))
     power_of = {}
     for k, name in enumerate(lights.names):
-        deviation_of_light = float(np.max(np.abs(error * lights.sums[k]) / deviation))
-        by_sum = NORMAL.cdf(deviation_of_light - limit) + NORMAL.cdf(-deviation_of_light - limit)
+        by_light = _two_sided(float(means[k]), float(limits[k]))
+        by_sum = _two_sided(float(np.max(np.abs(error * lights.sums[k]) / deviation)), limit)
         blocks_and_noise = (lights.blocks[k].astype(np.float64), lights.noise[k].astype(np.float64))
         power: Doubles = error**2 * (
             np.square(blocks_and_noise[0]) - np.square(blocks_and_noise[1])
@@ -120,5 +130,10 @@ def detection_power(
         mean = max(float((weight[..., None] * power).sum()), 0.0)
         variance = max(float((np.square(weight)[..., None] * 4 * blocks * power).sum()), 0.0)
         by_pattern = NORMAL.cdf((mean - limit * spread**0.5) / (spread + variance) ** 0.5)
-        power_of[name] = 1 - (1 - by_sum) * (1 - by_pattern)
+        power_of[name] = max(by_light, by_sum, by_pattern)
     return power_of
+
+
+def _two_sided(off: float, limit: float) -> float:
+    """Return the probability that a normal number of mean `off` lies beyond `limit`, either way."""
+    return NORMAL.cdf(off - limit) + NORMAL.cdf(-off - limit)

@@ -5,8 +5,9 @@ from different samples. They differ by noise; if they differ by more, something 
 and the difference in units of the noise (z) tells.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from statistics import NormalDist
 
 import numpy as np
 
@@ -47,6 +48,8 @@ class Verification(Shown):
         z_pattern: The correlation of the differences of the two halves, block by block, in standard
             errors (see `_pattern`): noise has none, a local error has.
         rmse: Of the pixels, in radiance.
+        z_lights: For each light that shines, the difference along its picture, in standard errors
+            (light_tests.py); empty if not computed.
         noise_rmse: The same for noise alone.
         delta_e_mean: CIEDE2000 at an exposure metered on the render, mean.
         delta_e_95: The same, 95th percentile.
@@ -73,6 +76,7 @@ class Verification(Shown):
     noise_rmse: float
     delta_e_mean: float
     delta_e_95: float
+    z_lights: Mapping[str, float] = field(default_factory=dict)
     power: Mapping[str, float] | None = None
     limit: float = LIMIT
     spp: int | None = None
@@ -86,8 +90,8 @@ class Verification(Shown):
 
     @property
     def difference(self) -> float:
-        """The largest of the differences in standard errors, for comparison with LIMIT."""
-        return max(*map(abs, self.z_mean), self.z_pattern)
+        """The largest of the differences in standard errors, for comparison with `limit`."""
+        return largest_difference(self.z_mean, self.z_pattern, self.z_lights, limit=self.limit)
 
     @property
     def agrees(self) -> bool:
@@ -100,6 +104,38 @@ class Verification(Shown):
         first."""
         power = self.power or {}
         return tuple(sorted((x for x in power if power[x] < LOW_POWER), key=power.__getitem__))
+
+
+def limit_of_tests(count: int, *, once: float = LIMIT) -> float:
+    """Return the limit, in standard errors, that passes sound renders as often as `once` does once.
+
+    By Bonferroni's inequality the chance of a false alarm is at most the sum of those of each test,
+    however the tests hang together and whichever of them are made.
+    """
+    return -NormalDist().inv_cdf(NormalDist().cdf(-once) / count)
+
+
+def largest_difference(
+    z_mean: Iterable[float], z_pattern: float, z_lights: Mapping[str, float], *, limit: float
+) -> float:
+    """Return the largest of the differences in standard errors, for comparison with `limit`.
+
+    One of many lights strays further than one alone, so theirs count for so much less.
+    """
+    lights = max(map(abs, z_lights.values()), default=0.0)
+    lights *= limit / limit_of_tests(max(len(z_lights), 1), once=limit)
+    return max(*map(abs, z_mean), z_pattern, lights)
+
+
+def differences(
+    predicted: Estimate, verified: Estimate
+) -> tuple[tuple[float, float, float], float]:
+    """Return `z_mean` and `z_pattern` of two estimates of one size."""
+    squares, magnitude = noise_of(predicted, verified)
+    difference = predicted.image.astype(np.float64) - verified.image
+    red, green, blue = difference.sum(axis=(0, 1)) / np.sqrt(squares.sum(axis=(0, 1)))
+    pattern = _pattern(predicted, verified, squares, magnitude)
+    return (float(red), float(green), float(blue)), pattern
 
 
 def compare(predicted: Estimate, verified: Estimate) -> Verification:
@@ -124,20 +160,20 @@ def _judge(predicted: Estimate, verified: Estimate) -> Verification:
 
     # A block's mean difference, over the standard error that its own pixels show.
     block_z = block_sums(difference) / np.sqrt(block_sums(squares))
-    z_mean = difference.sum(axis=(0, 1)) / np.sqrt(squares.sum(axis=(0, 1)))
+    z_mean, z_pattern = differences(predicted, verified)
 
     scale = 2.0 ** choose_exposure(verified.image)
-    differences = delta_e(predicted.image * scale, verified.image * scale)
+    delta = delta_e(predicted.image * scale, verified.image * scale)
     return Verification(
         verified=verified,
         z=z.astype(np.float32),
         z_rms=float(np.sqrt(np.square(block_z).mean())),
-        z_mean=(float(z_mean[0]), float(z_mean[1]), float(z_mean[2])),
-        z_pattern=_pattern(predicted, verified, squares, magnitude),
+        z_mean=z_mean,
+        z_pattern=z_pattern,
         rmse=float(np.sqrt(np.square(difference).mean())),
         noise_rmse=float(np.sqrt(squares.mean())),
-        delta_e_mean=float(differences.mean()),
-        delta_e_95=float(np.percentile(differences, 95)),
+        delta_e_mean=float(delta.mean()),
+        delta_e_95=float(np.percentile(delta, 95)),
     )
 
 
@@ -174,9 +210,10 @@ def _pattern(predicted: Estimate, verified: Estimate, squares: Floats, magnitude
     return float((weight * products).sum() / np.sqrt(np.square(weight * spread).sum()))
 
 
-def block_sums(image: Floats) -> Floats:
-    """Return sums over whole blocks of BLOCK x BLOCK pixels; the ragged border joins the last
-    ones."""
+def block_sums(image: Floats) -> Doubles:
+    """Return sums over whole blocks of BLOCK x BLOCK pixels, in float64; the ragged border joins
+    the last ones."""
     rows = np.arange(0, max(image.shape[0] - BLOCK + 1, 1), BLOCK)
     columns = np.arange(0, max(image.shape[1] - BLOCK + 1, 1), BLOCK)
-    return np.add.reduceat(np.add.reduceat(image, rows, axis=0), columns, axis=1)
+    strips = np.add.reduceat(image, rows, axis=0, dtype=np.float64)
+    return np.asarray(np.add.reduceat(strips, columns, axis=1))

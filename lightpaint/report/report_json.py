@@ -264,6 +264,7 @@ def verification_numbers(v: Verification) -> dict[str, Any]:
         "z_mean": v.z_mean,
         "z_pattern": v.z_pattern,
         "z_rms": v.z_rms,
+        "z_lights": dict(v.z_lights),
         "delta_e_mean": v.delta_e_mean,
         "delta_e_95": v.delta_e_95,
         "power": None if v.power is None else {"error": ERROR, "lights": dict(v.power)},

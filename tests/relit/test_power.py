@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.relit.detection_power import ERROR, LightShares, detection_power
-from lightpaint.relit.verification import compare
+from lightpaint.relit.detection_power import ERROR, LightShares, with_light_tests
+from lightpaint.relit.verification import Verification, compare
 
 SIZE, SEEDS = (48, 64), range(100)
 
@@ -23,10 +23,15 @@ def lamp(strength: float, spread: float) -> np.ndarray:
     return strength * np.repeat(picture[..., None], 3, axis=-1)
 
 
+def judge(predicted: Estimate, verified: Estimate, light: Estimate) -> Verification:
+    """Return a verification with the test of one light."""
+    lights = LightShares.of_pictures(["lamp"], [light])
+    return with_light_tests(compare(predicted, verified), predicted, lights)
+
+
 def power(predicted: Estimate, verified: Estimate, light: Estimate) -> float:
     """Return the power for an error in one light."""
-    lights = LightShares.of_pictures(["lamp"], [light])
-    return detection_power(predicted, verified, lights)["lamp"]
+    return (judge(predicted, verified, light).power or {})["lamp"]
 
 
 @pytest.mark.parametrize(
@@ -41,8 +46,9 @@ def test_as_many_errors_are_found_as_it_says(strength: float, spread: float):
         rng = np.random.default_rng(seed)
         predicted = estimate(rest + light, 0.2, rng)
         verified = estimate(rest + (1 - ERROR) * light, 0.2, rng)
-        found.append(not compare(predicted, verified).agrees)
-        said.append(power(predicted, verified, estimate(light, 0.1, rng)))
+        judged = judge(predicted, verified, estimate(light, 0.1, rng))
+        found.append(not judged.agrees)
+        said.append((judged.power or {})["lamp"])
     expected = np.mean(said)
     # Four standard errors of a share of so many, and what two tests at once have in common.
     error = 4 * np.sqrt(max(expected * (1 - expected), 0.01) / len(SEEDS))

@@ -15,15 +15,14 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.detection_power import LightShares
 from lightpaint.relit.relight import relight
-from lightpaint.relit.sample_budget import FEWEST
 from lightpaint.relit.sequential_verification import (
+    FIRST_LOOK,
     PARTS,
-    limit_of_looks,
+    can_tell,
     stages_of,
-    unchecked,
     verify_in_stages,
 )
-from lightpaint.relit.verification import LIMIT
+from lightpaint.relit.verification import LIMIT, limit_of_tests
 from lightpaint.scene.scene_reader import load_scene
 
 SIZE = (24, 32)
@@ -38,15 +37,15 @@ def test_stages_grow_up_to_all_samples_in_equal_halves(samples: int, block_pixel
     assert len(stages) <= len(PARTS)
     for stage in stages:
         assert stage % (2 * block_pixels) == 0
-    assert stages[0] >= min(spp, FEWEST // 2)
+    assert stages[0] >= min(spp, FIRST_LOOK)
 
 
 def test_one_look_has_the_limit_and_more_looks_no_more_false_alarms():
-    assert limit_of_looks(1) == pytest.approx(LIMIT, rel=1e-9)  # float64 in the tail
+    assert limit_of_tests(1) == pytest.approx(LIMIT, rel=1e-9)  # float64 in the tail
     # Sums of white noise, looked at after 1/8, 1/4, 1/2 and all: how often one is beyond. At 5
     # standard errors nothing would ever be, so it is tried where one look alarms in 1 of 20.
     once, runs = NormalDist().inv_cdf(0.975), 20_000
-    looks = limit_of_looks(len(PARTS), once=once)
+    looks = limit_of_tests(len(PARTS), once=once)
     rng = np.random.default_rng(0)
     walk = rng.normal(size=(runs, PARTS[0])).cumsum(axis=1)
     at = np.array([PARTS[0] // part for part in PARTS])
@@ -63,24 +62,55 @@ def _estimate(picture: np.ndarray, sigma: float, rng: np.random.Generator) -> Es
     return Estimate.of_halves(*(picture + noise).astype(np.float32))
 
 
-def test_what_is_unchecked_are_the_lights_that_only_more_samples_show():
+def _lit(strengths: dict[str, float]) -> tuple[Estimate, LightShares]:
+    """Return a prediction without noise and its lights, each alone in a column of the picture."""
+    clean, pictures = np.zeros((*SIZE, 3), np.float32), []
+    for k, strength in enumerate(strengths.values()):
+        picture = clean.copy()
+        picture[:, 8 * k : 8 * k + 8] = strength
+        pictures.append(Estimate(picture, clean))
+    whole = np.sum([x.image for x in pictures], axis=0)
+    return Estimate(whole, clean), LightShares.of_pictures(list(strengths), pictures)
+
+
+def test_it_ends_when_errors_show_in_most_of_the_light_and_in_each_large_light():
     rng = np.random.default_rng(1)
-    strengths = {"sun": 30.0, "lamp": 1.0, "glow": 0.001}
-    pictures = [np.full((*SIZE, 3), strength) for strength in strengths.values()]
-    whole = sum(pictures)
-    clean = np.zeros((*SIZE, 3), np.float32)
-    lights = LightShares.of_pictures(
-        list(strengths), [Estimate(x.astype(np.float32), clean) for x in pictures]
-    )
-    predicted = Estimate(np.asarray(whole, np.float32), clean)
-    # 5 % of the lamp is .05 in each pixel: 5 standard errors of the sum at sigma .05 √(h w) / 5.
-    sigma = 0.05 * np.sqrt(SIZE[0] * SIZE[1]) / LIMIT
-    noisy = _estimate(np.asarray(whole), 1.5 * sigma, rng)
-    share = 1 / sum(strengths.values())
-    # An eighth of the samples is there: √8 less noise shows the lamp, and never the glow.
-    found = unchecked(predicted, noisy, lights, 1 / 8, limit=LIMIT)
-    assert found == pytest.approx(share, rel=1e-5)  # float32
-    assert unchecked(predicted, noisy, lights, 1.0, limit=LIMIT) == 0
+    # 5 % of a light of 1 is .05 in each of its pixels: so noisy that it is far beyond the limit.
+    sigma = 0.05 * np.sqrt(SIZE[0] * 8) / (3 * LIMIT)
+
+    def ends(strengths: dict[str, float], done: float = 1 / 32) -> bool:
+        predicted, lights = _lit(strengths)
+        return can_tell(predicted, _estimate(predicted.image, sigma, rng), lights, done)
+
+    # What does not show makes 4 % of the light; 17 %, but all in one light; 40 % in small ones.
+    assert ends({"a": 2.0, "b": 2.0, "c": 0.16})
+    assert not ends({"a": 1.0, "b": 0.2})
+    assert not ends({"a": 0.9, "b": 0.2, "c": 0.2, "d": 0.2})
+    # Where more samples would show no more, it ends as well.
+    assert ends({"a": 1.0, "b": 0.2}, done=1.0)
+    assert ends({"a": 1e-3, "b": 1e-3, "c": 1e-3})
+
+
+def test_it_ends_at_once_where_they_disagree():
+    predicted, lights = _lit({"a": 1.0, "b": 0.2, "c": 0.2})
+    rng = np.random.default_rng(2)
+    sigma = 0.05 * np.sqrt(SIZE[0] * 8) / (3 * LIMIT)
+    assert not can_tell(predicted, _estimate(predicted.image, sigma, rng), lights, 1 / 32)
+    wrong = predicted.image.copy()
+    wrong[:, :8] *= 1.3
+    assert can_tell(predicted, _estimate(wrong, sigma, rng), lights, 1 / 32)
+
+
+@pytest.mark.parametrize("spp", [2, 6, 9])
+def test_it_never_takes_more_samples_than_its_budget(tmp_path: Path, spp: int):
+    scene = load_scene(write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["sky"]))
+    basis = render_basis(scene, spp=4, seed=0)
+    lighting = Lighting.of_weights(basis, basis.present_weights)
+    relit = relight(scene, lighting, tmp_path / "relit.xml")
+    found = verify_in_stages(combine(basis, lighting), relit, basis, lighting, spp=spp)
+    assert found.spp is not None
+    # Two halves of equally many, so one more than an odd number.
+    assert found.spp <= spp + spp % 2
 
 
 def test_it_stops_early_and_still_finds_what_is_wrong(tmp_path: Path):
@@ -93,7 +123,7 @@ def test_it_stops_early_and_still_finds_what_is_wrong(tmp_path: Path):
     assert right.agrees
     assert right.spp is not None
     assert right.spp < 1024
-    assert right.limit == pytest.approx(limit_of_looks(len(stages_of(1024))))
+    assert right.limit == pytest.approx(limit_of_tests(len(stages_of(1024))))
     wrong = Estimate(predicted.image * np.float32(1.2), predicted.half_difference)
     found = verify_in_stages(wrong, relit, basis, lighting, spp=1024)
     assert not found.agrees

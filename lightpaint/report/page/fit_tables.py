@@ -13,7 +13,7 @@ from lightpaint.lighting.answer.software_versions import Software, version
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.solution import Solution
 from lightpaint.relit.detection_power import ERROR
-from lightpaint.relit.verification import Verification
+from lightpaint.relit.verification import Verification, limit_of_tests
 from lightpaint.report.measures import (
     count_at_least_pixels,
     error_in_codes,
@@ -73,18 +73,26 @@ def verification_table(verification: Verification | None) -> str:
             ("z of the pattern", f"{v.z_pattern:+.2f}; limit {v.limit:.3g}".replace("-", "−")),
             ("z of 8×8 blocks, RMS", f"{v.z_rms:.3f}; about 1 is noise"),
             ("ΔE2000", f"mean {v.delta_e_mean:.2f}; 95 % of pixels below {v.delta_e_95:.2f}"),
-            *_power(v),
+            *_light_tests(v),
         ]
     )
 
 
-def _power(v: Verification) -> list[tuple[str, str]]:
-    """Return a row on the chance of detecting an error in each light, the smallest first."""
+def _light_tests(v: Verification) -> list[tuple[str, str]]:
+    """Return rows on the tests of each light: the farthest z, and the chance of detecting an error
+    in each, the smallest first.
+    """
     if not v.power:
         return []
-    in_order = sorted(v.power.items(), key=lambda item: item[1])
-    texts = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
-    return [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(texts, room=400))]
+    in_order = sorted(v.power.items(), key=lambda its: its[1])
+    told = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
+    rows = [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(told, room=400))]
+    if v.z_lights:
+        name, z = max(v.z_lights.items(), key=lambda its: abs(its[1]))
+        limit = limit_of_tests(len(v.z_lights), once=v.limit)
+        far = f"{z:+.2f} in {name}, the largest of {len(v.z_lights)}; limit ±{limit:.3g}"
+        rows.insert(0, ("z of each light", far.replace("-", "−")))
+    return rows
 
 
 def render_table(

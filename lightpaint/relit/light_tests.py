@@ -1,0 +1,135 @@
+"""Tests of a verification that look for an error in one light each: matched filters.
+
+What an error in a light would look like is known: a share of that light's own picture. So the
+difference of prediction and render is summed with weights that bring this picture out best against
+the noise, block by block and with the channels' correlations (a matched filter). It sees an error
+of 5 % with a fraction of the samples that the sum of the picture needs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.images.estimate import Estimate, box_mean
+from lightpaint.relit.verification import PRECISION, block_sums
+
+#: Blocks on either side over which the noise is averaged before it weighs the blocks.
+SMOOTH = 1
+
+#: Share of a block's mean variance that every mix of its channels is taken to have at least, when
+#: blocks are weighed: few pixels show no colour noise where there is some.
+FLOOR = 0.01
+
+#: Variance below which there is none.
+TINY = 1e-38
+
+
+@dataclass(frozen=True)
+class LightTests:
+    """The outcome of the tests.
+
+    z: (n,), the difference along the picture of each light, in standard errors. Where the
+    prediction is true its mean is 0, and it scatters as a standard normal number, or less in
+    pictures of few blocks. sensitivity, overlap: (n,), what a relative error of the light adds, see
+    `mean`. freedom: (n,), the degrees of freedom of the variance.
+    """
+
+    z: Doubles
+    sensitivity: Doubles
+    overlap: Doubles
+    freedom: Doubles
+
+    def mean(self, error: float) -> Doubles:
+        """Return the mean, under a relative error of each light, of the quotient behind z."""
+        grown = 1 + np.clip(error**2 * self.overlap, 0, 1)
+        return np.asarray(np.maximum(error * self.sensitivity, 0) / np.sqrt(grown))
+
+    def limits(self, limit: float) -> Doubles:
+        """Return the quotient from which on the z of each light exceeds `limit`."""
+        squares = np.square(limit * (8 * self.freedom + 3) / (8 * self.freedom + 1))
+        with np.errstate(over="ignore"):
+            return np.sqrt(self.freedom * np.expm1(squares / self.freedom))
+
+
+def light_tests(
+    predicted: Estimate, verified: Estimate, blocks: Floats, half_differences: Floats
+) -> LightTests:
+    """Test for an error in each of n lights.
+
+    Let D_A and D_B be the differences of the first and of the second halves of both images, in sums
+    over blocks. Their noise is independent. A block's weights a_A = S_A⁻¹ L_A are made of the first
+    halves alone: C_A is the scatter of the pixels of D_A, S_A that of its neighbours too, L_A the
+    picture of the light. They meet D_B; and the other way round, x = a_A·D_B and y = a_B·D_A:
+
+        t = Σ (x + y) / √(V + W),   V = Σ (a_A·C_B a_A + a_B·C_A a_B),   W = 2 Σ x y in [0, V]
+
+    So weights and noise are unrelated, and Σ (x + y) is 0 in the mean for noise of any distribution
+    and has the variance V. W is what x and y have in common where a few bright paths of a light are
+    in its picture as in the difference. Where few pixels make V, t is Student's, with their number
+    of degrees of freedom; z is the normal number that is as rare (Wallace 1959).
+
+    predicted, verified: as in `compare`, of one size. blocks, half_differences: (n, rows, columns,
+    3), of the picture of each light and of its half difference, as of `LightShares`.
+    """
+    difference = predicted.image.astype(np.float64) - verified.image
+    half = predicted.half_difference.astype(np.float64) - verified.half_difference
+    round_off = np.square(PRECISION * (np.abs(predicted.image) + np.abs(verified.image)))
+    floor = block_sums(round_off.mean(axis=-1) + TINY)
+    floor = floor[..., None, None] * np.eye(3)
+    first, second = difference + half, difference - half
+    scatter = [_scatter(its) + floor for its in (first, second)]
+    counts = [_pixels_that_count(its) for its in (first, second)]
+    inverses = [np.linalg.inv(_smooth(its)) for its in scatter]
+    sums = block_sums(first), block_sums(second)
+    found = []
+    for its, its_half in zip(blocks.astype(np.float64), half_differences, strict=True):
+        lit = its + its_half, its - its_half
+        # Each half's weights, and with them what the other half has.
+        a = [_times(x, light) for x, light in zip(inverses, lit, strict=True)]
+        x, y = _dot(a[0], sums[1]), _dot(a[1], sums[0])
+        x_signal, y_signal = _dot(a[0], lit[1]), _dot(a[1], lit[0])
+        x_variance = _dot(a[0], _times(scatter[1], a[0]))
+        y_variance = _dot(a[1], _times(scatter[0], a[1]))
+        variance = max(float((x_variance + y_variance).sum()), TINY)
+        uneven = np.square(x_variance) / counts[1] + np.square(y_variance) / counts[0]
+        freedom = max(3 * variance**2 / max(float(uneven.sum()), TINY), 1.0)
+        common = min(max(2 * float((x * y).sum()), 0.0), variance)
+        t = float((x + y).sum()) / (variance + common) ** 0.5
+        rare = freedom * np.log1p(t**2 / freedom)
+        z = np.copysign(np.sqrt(rare), t) * (8 * freedom + 1) / (8 * freedom + 3)
+        sensitivity = float((x_signal + y_signal).sum()) / variance**0.5
+        overlap = 2 * float((x_signal * y_signal).sum()) / variance
+        found.append((z, sensitivity, overlap, freedom))
+    return LightTests(*np.reshape(np.array(found, np.float64), (-1, 4)).T)
+
+
+def _pixels_that_count(values: Floats) -> Doubles:
+    """Return how many pixels of each block make its scatter: (Σ x²)² / Σ x⁴, at least 1."""
+    squares = np.square(values).sum(axis=-1)
+    fourth = block_sums(np.square(squares))
+    return np.maximum(np.square(block_sums(squares)) / np.maximum(fourth, TINY), 1)
+
+
+def _scatter(values: Floats) -> Doubles:
+    """Return Σ x xᵀ over the pixels x of each block, (rows, columns, 3, 3)."""
+    pairs = [block_sums(values[..., i] * values[..., j]) for i, j in ((0, 0), (0, 1), (0, 2))]
+    pairs += [block_sums(values[..., i] * values[..., j]) for i, j in ((1, 1), (1, 2), (2, 2))]
+    return np.stack([pairs[k] for k in (0, 1, 2, 1, 3, 4, 2, 4, 5)], axis=-1).reshape(
+        *pairs[0].shape, 3, 3
+    )
+
+
+def _smooth(scatter: Floats) -> Doubles:
+    """Return means over neighbouring blocks, with some variance in every mix of the channels."""
+    mean = np.asarray(box_mean(scatter, SMOOTH), np.float64)
+    trace = np.trace(mean, axis1=-2, axis2=-1)[..., None, None]
+    return np.asarray(mean + FLOOR * trace / 3 * np.eye(3))
+
+
+def _times(matrices: Floats, vectors: Floats) -> Doubles:
+    return np.asarray((matrices @ vectors[..., None])[..., 0])
+
+
+def _dot(a: Floats, b: Floats) -> Doubles:
+    return np.asarray((a * b).sum(axis=-1))
