@@ -15,7 +15,8 @@ from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.pipeline.one_call import paint_with_light
 from lightpaint.pipeline.settings import PILOT_SPP, Settings
 from lightpaint.report.measures import picture_errors
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 
 

@@ -19,7 +19,8 @@ from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
 from lightpaint.basis.render.cached_render import obtain_basis, top_up_basis
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
-from lightpaint.scene.scene import Scene, load_scene
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
 
 
 @pytest.fixture(autouse=True)
