@@ -1,6 +1,7 @@
-/** One light of the mixer: its row, and what its sliders make of it. */
+/** One light of the mixer: its row with its sliders. */
 
 import { slideByTouch } from '../touch.js';
+import { createElement, createSlider } from './page_elements.js';
 
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
 /** kelvin: where a look has it white, else null.
@@ -35,34 +36,34 @@ export function kelvinTable(table) {
 
 /** A light that can be moved. */
 export class Row {
-  /** @param {Light} light @param {Kelvins} kelvins @param {() => void} changed */
-  constructor(light, kelvins, changed) {
+  /** @param {Light} light @param {Kelvins} kelvins @param {() => void} onChange */
+  constructor(light, kelvins, onChange) {
     this.light = light;
-    /** Which of the planes is its. */
+    /** Index of its plane. */
     this.plane = 0;
     this.kelvins = kelvins;
-    this.changed = changed;
+    this.onChange = onChange;
     this.rgb = light.answer;
     this.kelvin = light.kelvin.answer;
-    /** What it was when it was last on. */
+    /** Its colour when it was last on. */
     this.hue = light.answer;
     this.isSolo = false;
     this.isMute = false;
     const levels = [light.present, light.answer].map(luminance);
     this.level = levels[0] || levels[1] || 1;
     const stops = levels.filter((x) => x > 0).map((x) => Math.log2(x / this.level));
-    this.most = Math.ceil(Math.max(BRIGHTEST, ...stops));
-    this.least = Math.floor(Math.min(DARKEST, ...stops.map((x) => x - 1)));
+    this.maxStops = Math.ceil(Math.max(BRIGHTEST, ...stops));
+    this.minStops = Math.floor(Math.min(DARKEST, ...stops.map((x) => x - 1)));
     const { name } = light;
-    this.element = element('div', 'mixer-light');
+    this.element = createElement('div', 'mixer-light');
     this.thumb = document.createElement('canvas');
-    this.swatch = element('i', 'mixer-swatch');
+    this.swatch = createElement('i', 'mixer-swatch');
     this.solo = this.toggle('S', `Solo: show ${name} alone`, () => (this.isSolo = !this.isSolo));
     this.mute = this.toggle('M', `Mute: show all but ${name}`, () => (this.isMute = !this.isMute));
-    this.dimmer = slider(`${name}: stops from now`, this.least, this.most);
-    this.dimmed = element('output');
-    this.white = slider(`${name}: colour temperature`, kelvins.coolest, kelvins.warmest);
-    this.whiteness = element('output');
+    this.dimmer = createSlider(`${name}: stops from now`, this.minStops, this.maxStops);
+    this.dimmed = createElement('output');
+    this.white = createSlider(`${name}: colour temperature`, kelvins.coolest, kelvins.warmest);
+    this.whiteness = createElement('output');
     this.build();
   }
 
@@ -71,54 +72,54 @@ export class Row {
     this.element.setAttribute('role', 'group');
     this.element.setAttribute('aria-label', light.name);
     this.thumb.setAttribute('aria-hidden', 'true');
-    const head = element('div', 'mixer-head');
-    const name = element('span', 'mixer-name', light.name);
+    const head = createElement('div', 'mixer-head');
+    const name = createElement('span', 'mixer-name', light.name);
     name.title = light.name;
-    const hear = element('span', 'mixer-hear');
-    hear.append(this.solo, this.mute);
-    head.append(this.swatch, name, hear);
-    const body = element('div', 'mixer-sliders');
+    const toggles = createElement('span', 'mixer-hear');
+    toggles.append(this.solo, this.mute);
+    head.append(this.swatch, name, toggles);
+    const body = createElement('div', 'mixer-sliders');
     this.element.append(this.thumb, head, body);
     if (light.isFixed) {
-      body.append(element('small', '', 'stays as it is in the scene'));
+      body.append(createElement('small', '', 'stays as it is in the scene'));
       return;
     }
     body.append(this.dimmer, this.dimmed);
-    const back = () => this.show();
+    const restore = () => this.show();
     this.dimmer.addEventListener('input', () => this.dim(Number(this.dimmer.value)));
-    slideByTouch(this.dimmer, (stops) => this.dim(stops), back);
+    slideByTouch(this.dimmer, (stops) => this.dim(stops), restore);
     this.dimmer.addEventListener('dblclick', () => this.dim(0));
     if (light.isScalar) return;
     this.white.classList.add('is-white');
     this.white.style.setProperty('--track', trackOf(kelvins));
     body.append(this.white, this.whiteness);
-    this.white.addEventListener('input', () => this.turn(Number(this.white.value)));
-    slideByTouch(this.white, (mired) => this.turn(mired), back);
+    this.white.addEventListener('input', () => this.setTemperature(Number(this.white.value)));
+    slideByTouch(this.white, (mired) => this.setTemperature(mired), restore);
   }
 
   /** @param {string} text @param {string} label @param {() => void} act */
   toggle(text, label, act) {
-    const button = /** @type {HTMLButtonElement} */ (element('button', '', text));
+    const button = createElement('button', '', text);
     button.type = 'button';
     button.title = label;
     button.setAttribute('aria-label', label);
     button.addEventListener('click', () => {
       act();
       this.show();
-      this.changed();
+      this.onChange();
     });
     return button;
   }
 
   /** @param {number} stops */
   dim(stops) {
-    const level = stops <= this.least ? 0 : this.level * 2 ** stops;
+    const level = stops <= this.minStops ? 0 : this.level * 2 ** stops;
     const factor = level / luminance(this.hue);
     this.set(/** @type {RGB} */ (this.hue.map((x) => x * factor)), this.kelvin);
   }
 
   /** @param {number} mired */
-  turn(mired) {
+  setTemperature(mired) {
     const hue = this.kelvins.rgb(mired);
     const level = luminance(this.rgb);
     if (level > 0) this.set(/** @type {RGB} */ (hue.map((x) => x * level)), 1e6 / mired);
@@ -133,8 +134,8 @@ export class Row {
     const { light } = this;
     this.isSolo = this.isMute = false;
     const other = look === 'answer' ? light.present : light.answer;
-    const known = [light[look], other].find((rgb) => luminance(rgb) > 0);
-    this.hue = known ?? [1, 1, 1];
+    const lit = [light[look], other].find((rgb) => luminance(rgb) > 0);
+    this.hue = lit ?? [1, 1, 1];
     this.rgb = light[look];
     this.kelvin = light.kelvin[look];
     this.show();
@@ -146,18 +147,18 @@ export class Row {
     this.kelvin = kelvin;
     if (luminance(rgb) > 0) this.hue = rgb;
     this.show();
-    this.changed();
+    this.onChange();
   }
 
   show() {
-    const { dimmer, dimmed, white, whiteness, swatch, solo, mute, element: all } = this;
+    const { dimmer, dimmed, white, whiteness, swatch, solo, mute, element: row } = this;
     const level = luminance(this.rgb);
-    const stops = level > 0 ? Math.log2(level / this.level) : this.least;
-    const told =
+    const stops = level > 0 ? Math.log2(level / this.level) : this.minStops;
+    const stopsText =
       level > 0 ? `${stops < -0.005 ? '\u2212' : '+'}${Math.abs(stops).toFixed(2)}` : 'off';
     dimmer.value = String(stops);
-    dimmer.setAttribute('aria-valuetext', level > 0 ? `${told} stops` : 'off');
-    dimmed.textContent = told;
+    dimmer.setAttribute('aria-valuetext', level > 0 ? `${stopsText} stops` : 'off');
+    dimmed.textContent = stopsText;
     const { kelvin } = this;
     const temperature = kelvin === null ? 'own colour' : `${Math.round(kelvin / 10) * 10} K`;
     const { coolest, warmest } = this.kelvins;
@@ -170,7 +171,7 @@ export class Row {
     swatch.classList.toggle('is-off', !(level > 0));
     solo.setAttribute('aria-pressed', String(this.isSolo));
     mute.setAttribute('aria-pressed', String(this.isMute));
-    all.classList.toggle('is-mute', this.isMute);
+    row.classList.toggle('is-mute', this.isMute);
   }
 }
 
@@ -189,20 +190,4 @@ function hexOf(rgb) {
 function trackOf({ rgb, coolest, warmest }) {
   const places = Array.from({ length: 9 }, (_, k) => coolest + (k / 8) * (warmest - coolest));
   return `linear-gradient(to right, ${places.map((mired) => hexOf(rgb(mired))).join(', ')})`;
-}
-
-/** @param {string} tag @param {string} [name] @param {string} [text] */
-function element(tag, name = '', text = '') {
-  const made = document.createElement(tag);
-  if (name) made.className = name;
-  made.textContent = text;
-  return made;
-}
-
-/** @param {string} label @param {number} min @param {number} max */
-function slider(label, min, max) {
-  const input = document.createElement('input');
-  Object.assign(input, { type: 'range', min, max, step: 'any' });
-  input.setAttribute('aria-label', label);
-  return input;
 }

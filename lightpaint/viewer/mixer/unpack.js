@@ -1,4 +1,4 @@
-/** Pictures that images/page_picture.py made small. */
+/** Pictures that images/packed_picture.py packs. */
 import { finite } from '../drawing/half.js';
 
 /** data: base64, deflated. @typedef {{data: string, scale: number, dropped: number,
@@ -9,7 +9,7 @@ import { finite } from '../drawing/half.js';
 export async function unpacked({ data, dropped, size: [height, width] }) {
   const bytes = await inflated(data.slice(data.indexOf(',') + 1));
   const count = height * width;
-  const planes = [0, 1, 2].map((c) => toldBy(bytes, c * count, 3 * count, height, width));
+  const planes = [0, 1, 2].map((c) => unpackPlane(bytes, c * count, 3 * count, height, width));
   const [green, red, blue] = planes;
   const halves = new Uint16Array(3 * count);
   for (let i = 0; i < count; i++) {
@@ -20,23 +20,23 @@ export async function unpacked({ data, dropped, size: [height, width] }) {
   return finite(halves);
 }
 
-/** One channel's numbers, from what its neighbours do not tell of them.
+/** The numbers of one channel: each is predicted by its neighbours, and stored as the difference.
  * @param {Uint8Array} bytes @param {number} first @param {number} all @param {number} height
  * @param {number} width @returns {Int32Array} */
-function toldBy(bytes, first, all, height, width) {
-  const made = new Int32Array(height * width);
+function unpackPlane(bytes, first, all, height, width) {
+  const numbers = new Int32Array(height * width);
   for (let y = 0, i = 0; y < height; y++) {
     for (let x = 0; x < width; x++, i++) {
       const folded = bytes[first + i] | (bytes[all + first + i] << 8);
-      const left = x ? made[i - 1] : 0;
-      const above = y ? made[i - width] : 0;
-      const corner = x && y ? made[i - width - 1] : 0;
+      const left = x ? numbers[i - 1] : 0;
+      const above = y ? numbers[i - width] : 0;
+      const corner = x && y ? numbers[i - width - 1] : 0;
       const [low, high] = left < above ? [left, above] : [above, left];
       const plane = left + above - corner;
-      made[i] = ((folded >> 1) ^ -(folded & 1)) + (plane < low ? low : plane > high ? high : plane);
+      numbers[i] = ((folded >> 1) ^ -(folded & 1)) + (plane < low ? low : plane > high ? high : plane);
     }
   }
-  return made;
+  return numbers;
 }
 
 /** @param {string} text base64 @returns {Promise<Uint8Array>} */

@@ -1,0 +1,179 @@
+/** Two looks under one border, A and B, with the lights of both beside them. */
+import { createElement } from '../../viewer/mixer/page_elements.js';
+import {
+  aspectOf,
+  elementOf,
+  headRow,
+  inputOf,
+  lightCell,
+  luminanceText,
+  stopsText,
+  titleOf,
+} from './gallery_data.js';
+
+/** @typedef {import("./gallery_data.js").Look} Look */
+/** @typedef {import("./look_cards.js").Side} Side */
+
+export class LookComparison {
+  /** @param {() => Look[]} shownLooks the looks that the filter leaves, in their order */
+  constructor(shownLooks) {
+    this.shownLooks = shownLooks;
+    /** Set once the cards are made. @type {Map<Look, HTMLElement>} */
+    this.cards = new Map();
+    /** @type {{a: Look | null, b: Look | null}} */
+    this.chosen = { a: null, b: null };
+    this.dialog = /** @type {HTMLDialogElement} */ (elementOf('wipe'));
+    this.stage = /** @type {HTMLElement} */ (this.dialog.querySelector('.stage'));
+    this.addListeners();
+  }
+
+  addListeners() {
+    const { dialog, stage } = this;
+    /** @param {PointerEvent} event */
+    const follow = (event) => {
+      if (!(this.chosen.a && this.chosen.b)) return;
+      const box = stage.getBoundingClientRect();
+      const percent = (100 * (event.clientX - box.left)) / box.width;
+      this.moveBorder(Math.min(100, Math.max(0, percent)));
+    };
+    stage.addEventListener('pointerdown', follow);
+    stage.addEventListener('pointermove', follow);
+    const slide = inputOf('slide');
+    slide.addEventListener('input', () => this.moveBorder(Number(slide.value)));
+    elementOf('before').addEventListener('click', () => this.step(-1));
+    elementOf('next').addEventListener('click', () => this.step(1));
+    elementOf('swap').addEventListener('click', () => this.swap());
+    elementOf('compare').addEventListener('click', () => this.open());
+    elementOf('clear').addEventListener('click', () => this.clear());
+    elementOf('close').addEventListener('click', () => dialog.close());
+    dialog.addEventListener('keydown', (event) => {
+      if (event.target instanceof HTMLInputElement) return;
+      if (event.key === 'ArrowLeft') this.step(-1);
+      if (event.key === 'ArrowRight') this.step(1);
+    });
+    dialog.addEventListener('click', (event) => {
+      if (event.target === dialog) dialog.close();
+    });
+    // A look that was only enlarged is not half of a pair.
+    dialog.addEventListener('close', () => {
+      if (!this.chosen.b) this.choose('a', null);
+    });
+  }
+
+  /** @param {Side} side @param {Look | null} look */
+  choose(side, look) {
+    const before = this.chosen[side];
+    this.chosen[side] = look;
+    const { a, b } = this.chosen;
+    for (const changed of [before, look]) {
+      const card = changed && this.cards.get(changed);
+      if (!card) continue;
+      for (const button of card.querySelectorAll('[data-side]')) {
+        const chosen = /** @type {HTMLElement} */ (button).dataset.side === 'a' ? a : b;
+        button.setAttribute('aria-pressed', String(chosen === changed));
+      }
+      card.classList.toggle('is-chosen', a === changed || b === changed);
+    }
+    this.showTray();
+  }
+
+  /** Choose a look or, if it is chosen already, no look; compare both once there are two.
+   * @param {Side} side @param {Look} look */
+  toggle(side, look) {
+    this.choose(side, this.chosen[side] === look ? null : look);
+    if (this.chosen.a && this.chosen.b) this.open();
+  }
+
+  /** Show one look, large. @param {Look} look */
+  enlarge(look) {
+    this.choose('a', look);
+    this.open();
+  }
+
+  clear() {
+    this.choose('a', null);
+    this.choose('b', null);
+  }
+
+  swap() {
+    const { a, b } = this.chosen;
+    this.choose('a', b);
+    this.choose('b', a);
+    this.open();
+  }
+
+  /** Show the chosen looks in the tray, where others can be chosen. */
+  showTray() {
+    const { a, b } = this.chosen;
+    elementOf('tray').hidden = (!a && !b) || elementOf('looks-panel').hidden;
+    elementOf('tray-a').textContent = a ? titleOf(a) : '—';
+    elementOf('tray-b').textContent = b ? titleOf(b) : '—';
+    inputOf('compare').disabled = !a || !b;
+  }
+
+  /** Fill the dialog with the chosen looks, and open it. */
+  open() {
+    const { dialog } = this;
+    const { a, b } = this.chosen;
+    const first = a ?? b;
+    if (!first) return;
+    const pictures = this.stage.querySelectorAll('img');
+    [b ?? first, first].forEach((look, k) => {
+      pictures[k].src = look.picture ?? '';
+      pictures[k].alt = titleOf(look);
+    });
+    elementOf('name-a').textContent = titleOf(first);
+    elementOf('name-b').textContent = b ? titleOf(b) : '';
+    const isPair = Boolean(a && b && a !== b);
+    elementOf('pair').textContent =
+      isPair && b ? `${titleOf(first)} | ${titleOf(b)}` : titleOf(first);
+    for (const element of dialog.querySelectorAll('.of-two'))
+      /** @type {HTMLElement} */ (element).hidden = !isPair;
+    dialog.style.setProperty('--aspect', aspectOf(first));
+    dialog.style.setProperty('--ratio', String(first.size[0] / first.size[1]));
+    this.moveBorder(isPair ? 50 : 100);
+    listLights(first, isPair ? b : null);
+    if (!dialog.open) dialog.showModal();
+  }
+
+  /** @param {number} percent from the left, of A */
+  moveBorder(percent) {
+    this.stage.style.setProperty('--p', `${percent}%`);
+    inputOf('slide').value = String(percent);
+  }
+
+  /** Go to a look before or after this one, among those that are shown. @param {number} by */
+  step(by) {
+    const side = this.chosen.b ? 'b' : 'a';
+    const looks = this.shownLooks().filter((look) => look.picture);
+    if (!looks.length) return;
+    const present = looks.indexOf(/** @type {Look} */ (this.chosen[side]));
+    const border = Number(inputOf('slide').value);
+    this.choose(side, looks[(present + by + looks.length) % looks.length]);
+    this.open();
+    if (this.chosen.b) this.moveBorder(border);
+  }
+}
+
+/** List the lights of one or both looks, those that change most first.
+ * @param {Look} a @param {Look | null} b */
+function listLights(a, b) {
+  const lightsOfB = new Map((b?.lights ?? []).map((light) => [light.name, light]));
+  const rows = (a.lights ?? []).map((light) => {
+    const other = lightsOfB.get(light.name);
+    const [y, z] = [light.y, other?.y ?? 0];
+    const stops = y > 0 && z > 0 ? Math.log2(z / y) : y > 0 || z > 0 ? Infinity : 0;
+    const row = createElement('tr');
+    row.append(createElement('th', '', light.name), lightCell(light, luminanceText(light.y)));
+    if (b && other) {
+      const change = Number.isFinite(stops) ? stopsText(stops) : z > 0 ? 'on' : 'off';
+      row.append(lightCell(other, luminanceText(other.y)));
+      row.append(createElement('td', '', y === z ? '=' : change));
+    }
+    return { row, weight: b ? Math.abs(stops) : 0 };
+  });
+  if (b) rows.sort((one, other) => other.weight - one.weight || 0);
+  const heads = b ? ['light', 'A', 'B', 'stops'] : ['light', 'luminance'];
+  elementOf('beside-head').replaceChildren(headRow(heads));
+  elementOf('beside-body').replaceChildren(...rows.map(({ row }) => row));
+}

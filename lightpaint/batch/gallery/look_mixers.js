@@ -1,0 +1,58 @@
+/** The mixers of a gallery, one for each basis, and the looks that they can begin from. */
+import { begin } from '../../viewer/mixer/mixer.js';
+import { createElement } from '../../viewer/mixer/page_elements.js';
+import { elementOf, inputOf, looks, titleOf, transforms } from './gallery_data.js';
+
+/** @typedef {import("./gallery_data.js").Look} Look */
+/** @typedef {import("./gallery_data.js").LookLight} LookLight */
+
+/** Distance from Planck's locus up to which a light has a colour temperature. */
+const WHITE_DUV = 0.02;
+
+/** @param {LookLight} light */
+const isWhite = ({ duv }) => duv !== undefined && Math.abs(duv) <= WHITE_DUV;
+
+export class LookMixers {
+  constructor() {
+    /** @type {Map<string, HTMLElement>} */
+    this.roots = new Map();
+    for (const root of document.querySelectorAll('.mixer'))
+      if (root instanceof HTMLElement) this.roots.set(root.dataset.basis ?? '', root);
+    this.looks = looks.filter((look) => this.has(look));
+    /** Number of requests: a mixer that unpacks slowly does not replace a later one. */
+    this.requests = 0;
+    for (const look of this.looks) {
+      const option = createElement('option', '', titleOf(look));
+      option.value = String(looks.indexOf(look));
+      elementOf('from').append(option);
+    }
+  }
+
+  /** @param {Look} look */
+  has(look) {
+    return look.basis !== undefined && this.roots.has(look.basis);
+  }
+
+  /** Show the mixer that begins from a look. @param {Look} look */
+  begin(look) {
+    const root = this.roots.get(look.basis ?? '');
+    if (!root) return;
+    const request = ++this.requests;
+    for (const other of this.roots.values()) if (other !== root) other.hidden = true;
+    inputOf('from').value = String(looks.indexOf(look));
+    begin(root, startOf(look), () => request === this.requests);
+    scrollTo(0, 0);
+  }
+}
+
+/** @param {Look} look @returns {import("../../viewer/mixer/mixer.js").Look} */
+function startOf(look) {
+  const [view, stops] = look.view ?? ['srgb', 0];
+  const lights = look.lights ?? [];
+  return {
+    name: look.look,
+    emission: new Map(lights.map((light) => [light.name, light.emission ?? [0, 0, 0]])),
+    kelvin: new Map(lights.map((light) => [light.name, (isWhite(light) && light.kelvin) || null])),
+    transform: { ...(transforms[view] ?? transforms.srgb), stops },
+  };
+}

@@ -1,0 +1,49 @@
+/** The data of a mixer, which stand in the page as JSON, and their unpacked planes. */
+import { VALUES } from '../drawing/half.js';
+import { SRGB } from '../drawing/lut.js';
+import { unpacked } from './unpack.js';
+
+/** @typedef {import("./unpack.js").Compact} Compact */
+/** @typedef {import("./mixer_light.js").Light} Light */
+/** @typedef {import("../drawing/colour.js").RGB} RGB */
+
+/** lights: those with a plane of their own, in the order of the planes. shown: of these, which have
+ * sliders; the others are as they are in the look. rest: the others together,
+ * as they are in the answer and at present: two more planes. lighting: the answer's file.
+ * @typedef {{size: [number, number], planes: Compact[], lights: Light[], shown?: number[],
+ *   rest: {label: string, answer: Record<string, RGB>, present: Record<string, RGB>} | null,
+ *   kelvins: [number, RGB][], transform: {stops: number, low: number, high: number,
+ *   curve: number[] | null, lattice: Compact | null}, painting: string | null,
+ *   lighting: {target?: string, lights: Record<string, {emission: RGB, weight: RGB}>},
+ *   command: string | null}} Data */
+
+/** The data and planes of a mixer, once unpacked.
+ * @type {WeakMap<HTMLElement, Promise<[Data, Uint16Array[]]>>} */
+const unpackedMixers = new WeakMap();
+
+/** @param {HTMLElement} root @returns {Promise<[Data, Uint16Array[]]>} */
+export function unpackMixer(root) {
+  const earlier = unpackedMixers.get(root);
+  if (earlier) return earlier;
+  const text = root.querySelector('script[type="application/json"]')?.textContent ?? '';
+  /** @type {Data} */
+  const data = JSON.parse(text);
+  const promise = Promise.all(data.planes.map(unpacked)).then(
+    (planes) => /** @type {[Data, Uint16Array[]]} */ ([data, planes]),
+  );
+  unpackedMixers.set(root, promise);
+  return promise;
+}
+
+/** @param {Data['transform']} transform @returns {Promise<import("../drawing/lut.js").Lut>} */
+export async function lutOf({ low, high, curve, lattice }) {
+  if (curve) {
+    // A curve alone needs no lattice.
+    const shaper = { side: curve.length, low, high };
+    return { shaper, lattice: new Float32Array(1), curve: Float32Array.from(curve) };
+  }
+  if (!lattice) return SRGB;
+  const halves = await unpacked(lattice);
+  const values = Float32Array.from(halves, (bits) => VALUES[bits] * lattice.scale);
+  return { shaper: { side: lattice.size[1], low, high }, lattice: values, curve: null };
+}
