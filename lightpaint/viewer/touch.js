@@ -13,53 +13,53 @@ const MARK = 18;
  * heard; mouse, pen and keys are left to it.
  * @param {HTMLInputElement} input
  * @param {(value: number, done: boolean) => void} move done: false while the finger is down
- * @param {() => void} back have it show its value again
+ * @param {() => void} restore have it show its value again
  * @param {AbortSignal} [signal] ends it
  */
-export function slideByTouch(input, move, back, signal) {
+export function slideByTouch(input, move, restore, signal) {
   /** @type {{id: number, x: number, y: number, isSure: boolean} | null} */
   let finger = null;
   // Of a touch comes more when it is over: a change, and what is like a mouse.
   let isTouched = false;
-  const to = (/** @type {PointerEvent} */ event, /** @type {boolean} */ done) => {
+  const moveTo = (/** @type {PointerEvent} */ event, /** @type {boolean} */ done) => {
     const { left, width } = input.getBoundingClientRect();
     const part = (event.clientX - left - MARK / 2) / (width - MARK);
     const [low, high] = [Number(input.min), Number(input.max)];
     input.value = String(low + Math.min(1, Math.max(0, part)) * (high - low));
     move(Number(input.value), done);
   };
-  const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ hear) =>
-    input.addEventListener(name, hear, { capture: true, signal });
-  on('pointerdown', (/** @type {PointerEvent} */ event) => {
+  const listen = (/** @type {string} */ name, /** @type {(event: any) => void} */ handler) =>
+    input.addEventListener(name, handler, { capture: true, signal });
+  listen('pointerdown', (/** @type {PointerEvent} */ event) => {
     isTouched = event.pointerType === 'touch';
     if (!isTouched || finger || input.disabled) return;
     finger = { id: event.pointerId, x: event.clientX, y: event.clientY, isSure: false };
   });
-  on('pointermove', (/** @type {PointerEvent} */ event) => {
+  listen('pointermove', (/** @type {PointerEvent} */ event) => {
     if (finger?.id !== event.pointerId) return;
     const [across, down] = [event.clientX - finger.x, event.clientY - finger.y].map(Math.abs);
     finger.isSure ||= across >= SURE && across > down;
-    if (finger.isSure) to(event, false);
+    if (finger.isSure) moveTo(event, false);
   });
-  on('pointerup', (/** @type {PointerEvent} */ event) => {
+  listen('pointerup', (/** @type {PointerEvent} */ event) => {
     if (finger?.id !== event.pointerId) return;
     finger = null;
     input.focus({ preventScroll: true }); // what is typed elsewhere is taken first
-    to(event, true);
+    moveTo(event, true);
   });
-  on('pointercancel', (/** @type {PointerEvent} */ event) => {
+  listen('pointercancel', (/** @type {PointerEvent} */ event) => {
     if (finger?.id !== event.pointerId) return;
     // What it has moved by then stays where it is.
     if (finger.isSure) move(Number(input.value), true);
-    else back();
+    else restore();
     finger = null;
   });
-  on('keydown', () => (isTouched = false));
+  listen('keydown', () => (isTouched = false));
   for (const name of ['input', 'change'])
-    on(name, (/** @type {Event} */ event) => {
+    listen(name, (/** @type {Event} */ event) => {
       if (!isTouched) return;
       event.stopImmediatePropagation();
-      if (!finger?.isSure) back();
+      if (!finger?.isSure) restore();
     });
-  on('mousedown', (/** @type {Event} */ event) => isTouched && event.preventDefault());
+  listen('mousedown', (/** @type {Event} */ event) => isTouched && event.preventDefault());
 }

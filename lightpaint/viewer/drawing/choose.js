@@ -46,9 +46,9 @@ function canvasOf() {
  * @param {{view?: 'gl' | 'cpu' | null, onRestored?: () => void}} options */
 function glView(size, count, { view, onRestored }) {
   try {
-    const made = new GlView(canvasOf(), size, { isSlowRefused: view !== 'gl', onRestored });
-    made.setCount(count);
-    return made;
+    const glView = new GlView(canvasOf(), size, { isSlowRefused: view !== 'gl', onRestored });
+    glView.setCount(count);
+    return glView;
   } catch {
     return null;
   }

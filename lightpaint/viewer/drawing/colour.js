@@ -31,9 +31,9 @@ export function toHex(rgb) {
 /** Linear light of `#ffaa66` or `#fa6`; null for what is no colour.
  * @param {string} text @returns {RGB | null} */
 export function ofHex(text) {
-  const found = /^#?([0-9a-f]{3}|[0-9a-f]{6})$/i.exec(text.trim());
-  if (!found) return null;
-  const digits = found[1].length === 6 ? found[1] : found[1].replace(/./g, '$&$&');
+  const match = /^#?([0-9a-f]{3}|[0-9a-f]{6})$/i.exec(text.trim());
+  if (!match) return null;
+  const digits = match[1].length === 6 ? match[1] : match[1].replace(/./g, '$&$&');
   return three((c) => decodeSrgb(parseInt(digits.slice(2 * c, 2 * c + 2), 16) / 255));
 }
 

@@ -105,7 +105,7 @@ export class CpuView {
     context.fillStyle = `rgb(${GROUND.join(' ')})`;
     context.fillRect(0, 0, canvas.width, canvas.height);
     for (const pane of panes(params, canvas, this.size)) {
-      const layer = this.shown(pane.kind, params);
+      const layer = this.layerOf(pane.kind, params);
       if (!layer) continue;
       context.save();
       context.beginPath();
@@ -130,8 +130,8 @@ export class CpuView {
 
   /** The picture of a kind with its codes up to date; null where there is none.
    * @param {Kind} kind @param {Params} params @returns {Layer | null} */
-  shown(kind, params) {
-    if (kind === 'solution' || kind === 'other') return this.mixed(kind, params);
+  layerOf(kind, params) {
+    if (kind === 'solution' || kind === 'other') return this.mixedLayer(kind, params);
     const layer = this.layers.get(kind);
     if (!layer) return null;
     const isImportance = kind === 'painting' && params.overlay === 'importance';
@@ -146,21 +146,21 @@ export class CpuView {
   }
 
   /** @param {'solution' | 'other'} kind @param {Params} params */
-  mixed(kind, params) {
+  mixedLayer(kind, params) {
     const mix = this.mixes[kind];
     const started = performance.now();
     const isOther = mix.update(this.planes, this.step, params.live);
     const layer = this.layer(kind, this.step);
     if (isOther) layer.setLight(mix.light);
-    const wants = kind === 'solution' ? params.overlay : falseOnly(params);
+    const overlay = kind === 'solution' ? params.overlay : falseOnly(params);
     // What is missed depends on the painting, too.
-    if (wants === 'missed') layer.forget();
-    const painting = wants === 'missed' ? this.codesOfPainting(params) : null;
+    if (overlay === 'missed') layer.forget();
+    const painting = overlay === 'missed' ? this.codesOfPainting(params) : null;
     const { beyond } = this;
-    layer.show(this.lut, params.stops, wants === 'importance' ? null : wants, (rgba) => {
+    layer.show(this.lut, params.stops, overlay === 'importance' ? null : overlay, (rgba) => {
       const grid = this.grid(this.step);
-      if (wants === 'falsecolor') falseColour(rgba, layer.light, 2 ** params.stops);
-      else if (wants === 'beyond' && beyond) inked(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
+      if (overlay === 'falsecolor') falseColour(rgba, layer.light, 2 ** params.stops);
+      else if (overlay === 'beyond' && beyond) inked(rgba, (p) => beyond[p] / 255, INKS.beyond, grid);
       else if (painting) missed(rgba, painting, this.importance, grid);
     });
     if (isOther) this.pace = (performance.now() - started) * this.step ** 2;
@@ -169,7 +169,7 @@ export class CpuView {
 
   /** @param {Params} params */
   codesOfPainting(params) {
-    const layer = this.shown('painting', { ...params, overlay: null });
+    const layer = this.layerOf('painting', { ...params, overlay: null });
     return layer && layer.image.data;
   }
 
@@ -194,12 +194,12 @@ export class CpuView {
 
   /** @param {number} x @param {number} y */
   planesAt(x, y) {
-    const made = new Float32Array(3 * this.planes.length);
+    const values = new Float32Array(3 * this.planes.length);
     const from = 3 * (y * this.size[1] + x);
     this.planes.forEach(({ halves, scale }, k) => {
-      for (let c = 0; halves && c < 3; c++) made[3 * k + c] = VALUES[halves[from + c]] * scale;
+      for (let c = 0; halves && c < 3; c++) values[3 * k + c] = VALUES[halves[from + c]] * scale;
     });
-    return made;
+    return values;
   }
 
   /** @param {Kind} kind @param {number} x @param {number} y

@@ -21,10 +21,10 @@ const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 /** @param {WebGL2RenderingContext} gl */
 function isSoftware(gl) {
-  const told = String(gl.getParameter(gl.RENDERER));
+  const renderer = String(gl.getParameter(gl.RENDERER));
   // Some browsers hide the name behind an extension, of which others say that it is old.
-  const info = told.startsWith('WebKit') ? gl.getExtension('WEBGL_debug_renderer_info') : null;
-  return SOFTWARE.test(info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : told);
+  const info = renderer.startsWith('WebKit') ? gl.getExtension('WEBGL_debug_renderer_info') : null;
+  return SOFTWARE.test(info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : renderer);
 }
 
 /** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
@@ -174,29 +174,29 @@ export class GlView {
     const { gl, canvas, textures } = this;
     const picture = this.texture(pane.kind);
     if (!picture) return;
-    const { at } = this.planes.shower.use();
+    const { uniform } = this.planes.shower.use();
     const isSharp = pane.scale >= SQUARES || pane.scale === 1;
     const { nothing } = textures;
     const units = [picture, this.pictures.get('painting') ?? nothing, this.beyond ?? nothing];
     units.forEach((texture, i) => textures.bind(i, gl.TEXTURE_2D, texture));
     textures.bind(3, gl.TEXTURE_3D, this.lattice ?? textures.black);
     for (const [i, name] of ['picture', 'painting', 'beyond', 'lattice'].entries())
-      gl.uniform1i(at(name), i);
+      gl.uniform1i(uniform(name), i);
     const { shaper, lattice } = this.lut;
-    gl.uniform2f(at('size'), this.size[1], this.size[0]);
-    gl.uniform2f(at('corner'), pane.left, pane.top);
-    gl.uniform1f(at('scale'), pane.scale);
-    gl.uniform1f(at('above'), canvas.height);
-    gl.uniform1f(at('gain'), 2 ** params.stops);
-    gl.uniform1f(at('side'), shaper.side);
-    gl.uniform2f(at('shaper'), shaper.low, shaper.high);
-    gl.uniform1i(at('isSrgb'), Number(!lattice));
-    gl.uniform1i(at('isSharp'), Number(isSharp));
-    gl.uniform1i(at('isSmall'), Number(pane.scale < 0.75));
+    gl.uniform2f(uniform('size'), this.size[1], this.size[0]);
+    gl.uniform2f(uniform('corner'), pane.left, pane.top);
+    gl.uniform1f(uniform('scale'), pane.scale);
+    gl.uniform1f(uniform('above'), canvas.height);
+    gl.uniform1f(uniform('gain'), 2 ** params.stops);
+    gl.uniform1f(uniform('side'), shaper.side);
+    gl.uniform2f(uniform('shaper'), shaper.low, shaper.high);
+    gl.uniform1i(uniform('isSrgb'), Number(!lattice));
+    gl.uniform1i(uniform('isSharp'), Number(isSharp));
+    gl.uniform1i(uniform('isSmall'), Number(pane.scale < 0.75));
     const overlay = overlayOf(pane.kind, params);
-    gl.uniform1i(at('overlay'), overlay);
+    gl.uniform1i(uniform('overlay'), overlay);
     const isImportance = overlay === OVERLAYS.importance;
-    gl.uniform1f(at('full'), isImportance ? fullOf(this.importance) : 1);
+    gl.uniform1f(uniform('full'), isImportance ? fullOf(this.importance) : 1);
     gl.scissor(pane.x, canvas.height - pane.y - pane.height, pane.width, pane.height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
@@ -207,15 +207,15 @@ export class GlView {
     // What was drawn is only there until the browser has shown it.
     if (this.last) this.draw(this.last);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    const found = new Uint8Array(width * height * 4);
-    gl.readPixels(x, canvas.height - y - height, width, height, gl.RGBA, gl.UNSIGNED_BYTE, found);
-    const made = new Uint8Array(found.length);
+    const pixels = new Uint8Array(width * height * 4);
+    gl.readPixels(x, canvas.height - y - height, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    const flipped = new Uint8Array(pixels.length);
     for (let row = 0; row < height; row++)
-      made.set(
-        found.subarray(row * width * 4, (row + 1) * width * 4),
+      flipped.set(
+        pixels.subarray(row * width * 4, (row + 1) * width * 4),
         (height - 1 - row) * width * 4,
       );
-    return made;
+    return flipped;
   }
 
   /** @param {Kind} kind @param {number} x @param {number} y

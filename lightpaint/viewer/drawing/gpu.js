@@ -78,13 +78,13 @@ export class Planes {
     const mix = this.mixes[kind];
     if (!mix.isStale) return;
     mix.texture ??= this.textures.halves();
-    const { at } = this.mixer.use();
+    const { uniform } = this.mixer.use();
     const scaled = new Float32Array(4 * Math.max(1, count));
     for (let k = 0; k < count; k++)
       for (let c = 0; c < 3; c++) scaled[4 * k + c] = mix.weights[3 * k + c] * this.scales[k];
     this.textures.bind(1, gl.TEXTURE_2D, this.textures.weights(scaled));
-    gl.uniform1i(at('planes'), 0);
-    gl.uniform1i(at('weights'), 1);
+    gl.uniform1i(uniform('planes'), 0);
+    gl.uniform1i(uniform('weights'), 1);
     this.onto(mix.texture, this.size[1], this.size[0]);
     gl.clearColor(0, 0, 0, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
@@ -92,8 +92,8 @@ export class Planes {
     gl.blendFunc(gl.ONE, gl.ONE);
     this.slices.forEach((slice, i) => {
       this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);
-      gl.uniform1i(at('first'), i * perSlice);
-      gl.uniform1i(at('count'), Math.min(perSlice, count - i * perSlice));
+      gl.uniform1i(uniform('first'), i * perSlice);
+      gl.uniform1i(uniform('count'), Math.min(perSlice, count - i * perSlice));
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     });
     gl.disable(gl.BLEND);
@@ -114,10 +114,10 @@ export class Planes {
    * @param {number} x @param {number} y */
   at(x, y) {
     const { gl, count, perSlice } = this;
-    const made = new Float32Array(3 * count);
-    const { at } = this.prober.use();
-    gl.uniform1i(at('planes'), 0);
-    gl.uniform2i(at('at'), x, y);
+    const values = new Float32Array(3 * count);
+    const { uniform } = this.prober.use();
+    gl.uniform1i(uniform('planes'), 0);
+    gl.uniform2i(uniform('at'), x, y);
     this.slices.forEach((slice, i) => {
       const here = Math.min(perSlice, count - i * perSlice);
       this.textures.bind(0, gl.TEXTURE_2D_ARRAY, slice);
@@ -127,9 +127,9 @@ export class Planes {
       gl.readPixels(0, 0, here, 1, gl.RGBA, gl.FLOAT, rgba);
       for (let k = 0; k < here; k++)
         for (let c = 0; c < 3; c++)
-          made[3 * (i * perSlice + k) + c] = rgba[4 * k + c] * this.scales[i * perSlice + k];
+          values[3 * (i * perSlice + k) + c] = rgba[4 * k + c] * this.scales[i * perSlice + k];
     });
-    return made;
+    return values;
   }
 }
 

@@ -18,9 +18,9 @@ export function finite(halves) {
 
 /** @param {Uint16Array} halves @param {number} [scale] */
 export function toFloats(halves, scale = 1) {
-  const made = new Float32Array(halves.length);
-  for (let i = 0; i < made.length; i++) made[i] = VALUES[halves[i]] * scale;
-  return made;
+  const values = new Float32Array(halves.length);
+  for (let i = 0; i < values.length; i++) values[i] = VALUES[halves[i]] * scale;
+  return values;
 }
 
 function valuesOf() {

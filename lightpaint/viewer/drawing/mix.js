@@ -40,29 +40,29 @@ export class Mix {
    * @param {Plane[]} planes @param {number} step 1 or 2 @param {boolean} live
    * @returns {boolean} whether `light` is another one */
   update(planes, step, live) {
-    const wanted = this.weights;
+    const weights = this.weights;
     const before = step === this.step ? this.mixed : null;
-    const isSame = before !== null && wanted.every((w, i) => w === before[i]);
+    const isSame = before !== null && weights.every((w, i) => w === before[i]);
     if (isSame && (live || this.isExact)) return false;
     const changed = before
       ? planes
           .map((_, k) => k)
-          .filter((k) => [0, 1, 2].some((c) => wanted[3 * k + c] !== before[3 * k + c]))
+          .filter((k) => [0, 1, 2].some((c) => weights[3 * k + c] !== before[3 * k + c]))
       : [];
     this.step = step;
     const isCarried = live && before !== null && 2 * changed.length <= planes.length;
     if (isCarried) {
-      const more = wanted.map((w, i) => w - before[i]);
+      const more = weights.map((w, i) => w - before[i]);
       this.add(planes, changed, more, false);
     } else
       this.add(
         planes,
         planes.map((_, k) => k),
-        wanted,
+        weights,
         true,
       );
     this.isExact = !isCarried;
-    this.mixed = wanted.slice();
+    this.mixed = weights.slice();
     return true;
   }
 

@@ -68,7 +68,7 @@ export function lay(rgba, at, ink, amount) {
 
 /** For each pixel shown: its place in RGBA, and its column, row and place in the whole picture.
  * @param {Grid} grid @param {(at: number, x: number, y: number, p: number) => void} visit */
-function each({ height, width, step }, visit) {
+function visitPixels({ height, width, step }, visit) {
   let at = 0;
   for (let y = 0; y < height; y += step)
     for (let x = 0; x < width; x += step, at += 4) visit(at, x, y, y * width + x);
@@ -78,7 +78,7 @@ function each({ height, width, step }, visit) {
  * @param {Uint8ClampedArray} rgba of the solution, changed @param {Uint8ClampedArray} painting
  * @param {Float32Array} importance @param {Grid} grid of the solution */
 export function missed(rgba, painting, importance, grid) {
-  each(grid, (at, x, y, p) => {
+  visitPixels(grid, (at, x, y, p) => {
     const r = rgba[at] - painting[4 * p];
     const g = rgba[at + 1] - painting[4 * p + 1];
     const b = rgba[at + 2] - painting[4 * p + 2];
@@ -103,7 +103,7 @@ export const inkOf = (x, most) => Math.log1p(Math.max(0, x)) / Math.log1p(most);
 /** @param {Uint8ClampedArray} rgba changed @param {(p: number) => number} amount of ink at a pixel
  * @param {number[]} ink @param {Grid} grid */
 export function inked(rgba, amount, ink, grid) {
-  each(grid, (at, x, y, p) => lay(rgba, at, ink, 0.8 * Math.min(1, amount(p)) * hatch(x, y, 1)));
+  visitPixels(grid, (at, x, y, p) => lay(rgba, at, ink, 0.8 * Math.min(1, amount(p)) * hatch(x, y, 1)));
 }
 
 /** @param {Uint8ClampedArray} rgba changed @param {Float32Array} light (…, 3)

@@ -7,12 +7,12 @@ import { SRGB } from './lut.js';
 /** The half that is 1. */
 const ONE = 0x3c00;
 
-/** @typedef {{use: () => {at: (name: string) => WebGLUniformLocation | null}}} Program */
+/** @typedef {{use: () => {uniform: (name: string) => WebGLUniformLocation | null}}} Program */
 
 /** @param {WebGL2RenderingContext} gl @param {string} vertex @param {string} fragment
  * @returns {Program} */
 export function program(gl, vertex, fragment) {
-  const made = gl.createProgram();
+  const linked = gl.createProgram();
   for (const [kind, source] of /** @type {const} */ ([
     [gl.VERTEX_SHADER, vertex],
     [gl.FRAGMENT_SHADER, fragment],
@@ -21,24 +21,24 @@ export function program(gl, vertex, fragment) {
     if (!shader) throw new Error('no shader: the context is lost');
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
-    gl.attachShader(made, shader);
+    gl.attachShader(linked, shader);
     const log = gl.getShaderInfoLog(shader);
     if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`a shader: ${log}`);
   }
-  gl.linkProgram(made);
-  if (!gl.getProgramParameter(made, gl.LINK_STATUS))
-    throw new Error(`a program: ${gl.getProgramInfoLog(made)}`);
+  gl.linkProgram(linked);
+  if (!gl.getProgramParameter(linked, gl.LINK_STATUS))
+    throw new Error(`a program: ${gl.getProgramInfoLog(linked)}`);
   /** @type {Map<string, WebGLUniformLocation | null>} */
   const places = new Map();
   /** @param {string} name */
-  const at = (name) => {
-    if (!places.has(name)) places.set(name, gl.getUniformLocation(made, name));
+  const uniform = (name) => {
+    if (!places.has(name)) places.set(name, gl.getUniformLocation(linked, name));
     return places.get(name) ?? null;
   };
   return {
     use: () => {
-      gl.useProgram(made);
-      return { at };
+      gl.useProgram(linked);
+      return { uniform };
     },
   };
 }
@@ -54,7 +54,7 @@ export class Textures {
     this.rows = Math.max(1, Math.floor(2 ** 18 / size[1]));
     this.rgba = new Uint16Array(4 * this.rows * size[1]).fill(ONE);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    this.nothing = this.made(gl.TEXTURE_2D, 8, gl.NEAREST, () =>
+    this.nothing = this.createTexture(gl.TEXTURE_2D, 8, gl.NEAREST, () =>
       gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, 1, 1),
     );
     this.black = this.lattice(SRGB);
@@ -66,7 +66,7 @@ export class Textures {
 
   /** @param {number} kind @param {number} bytes @param {number} filter
    * @param {() => void} fill */
-  made(kind, bytes, filter, fill) {
+  createTexture(kind, bytes, filter, fill) {
     const { gl } = this;
     const texture = gl.createTexture();
     this.bind(0, kind, texture);
@@ -100,7 +100,7 @@ export class Textures {
   planes(count) {
     const { gl } = this;
     const [height, width] = this.size;
-    return this.made(gl.TEXTURE_2D_ARRAY, 8 * height * width * count, gl.NEAREST, () =>
+    return this.createTexture(gl.TEXTURE_2D_ARRAY, 8 * height * width * count, gl.NEAREST, () =>
       gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA16F, width, height, count),
     );
   }
@@ -121,7 +121,7 @@ export class Textures {
   halves() {
     const { gl } = this;
     const [height, width] = this.size;
-    return this.made(gl.TEXTURE_2D, 8 * height * width, gl.LINEAR, () =>
+    return this.createTexture(gl.TEXTURE_2D, 8 * height * width, gl.LINEAR, () =>
       gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, width, height),
     );
   }
@@ -177,7 +177,7 @@ export class Textures {
     const { gl } = this;
     const [height, width] = data ? this.size : [1, 1];
     const bytes = data ?? new Uint8Array(1);
-    return this.made(gl.TEXTURE_2D, bytes.length, gl.NEAREST, () =>
+    return this.createTexture(gl.TEXTURE_2D, bytes.length, gl.NEAREST, () =>
       gl.texImage2D(
         ...[gl.TEXTURE_2D, 0, gl.R8, width, height, 0, gl.RED, gl.UNSIGNED_BYTE],
         bytes,
@@ -192,7 +192,7 @@ export class Textures {
     const rgba = new Float32Array(4 * side ** 3);
     for (let i = 0; lattice && i < side ** 3; i++)
       rgba.set(lattice.subarray(3 * i, 3 * i + 3), 4 * i);
-    return this.made(gl.TEXTURE_3D, 8 * side ** 3, gl.LINEAR, () =>
+    return this.createTexture(gl.TEXTURE_3D, 8 * side ** 3, gl.LINEAR, () =>
       gl.texImage3D(
         ...[gl.TEXTURE_3D, 0, gl.RGBA16F, side, side, side, 0, gl.RGBA, gl.FLOAT],
         rgba,
@@ -203,7 +203,7 @@ export class Textures {
   /** Weights in a row. @param {Float32Array} rgba (n, 4) */
   weights(rgba) {
     const { gl } = this;
-    this.row ??= this.made(gl.TEXTURE_2D, rgba.byteLength, gl.NEAREST, () => {});
+    this.row ??= this.createTexture(gl.TEXTURE_2D, rgba.byteLength, gl.NEAREST, () => {});
     this.bind(1, gl.TEXTURE_2D, this.row);
     gl.texImage2D(
       ...[gl.TEXTURE_2D, 0, gl.RGBA32F, rgba.length / 4, 1, 0, gl.RGBA, gl.FLOAT],
@@ -217,7 +217,7 @@ export class Textures {
     const { gl } = this;
     if (this.probed?.count !== count) {
       this.drop(this.probed?.texture ?? null);
-      const texture = this.made(gl.TEXTURE_2D, 8 * count, gl.NEAREST, () =>
+      const texture = this.createTexture(gl.TEXTURE_2D, 8 * count, gl.NEAREST, () =>
         gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, count, 1),
       );
       this.probed = { count, texture };

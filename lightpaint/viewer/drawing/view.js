@@ -101,11 +101,11 @@ export function panes(params, canvas, size) {
       placed(params.left, front, whole, params, size),
     ].filter((pane) => pane.width > 0);
   }
-  const beside = Math.max(1, Math.floor((width - GAP) / 2));
-  const above = Math.max(1, Math.floor((height - GAP) / 2));
-  const isBeside = fit([beside, height], size) >= fit([width, above], size);
-  const first = isBeside ? { ...whole, width: beside } : { ...whole, height: above };
-  const second = isBeside ? { ...first, x: width - beside } : { ...first, y: height - above };
+  const columnWidth = Math.max(1, Math.floor((width - GAP) / 2));
+  const rowHeight = Math.max(1, Math.floor((height - GAP) / 2));
+  const isBeside = fit([columnWidth, height], size) >= fit([width, rowHeight], size);
+  const first = isBeside ? { ...whole, width: columnWidth } : { ...whole, height: rowHeight };
+  const second = isBeside ? { ...first, x: width - columnWidth } : { ...first, y: height - rowHeight };
   return [
     placed(params.left, first, first, params, size),
     placed(params.right, second, second, params, size),
@@ -134,11 +134,11 @@ export function inPicture(pane, x, y) {
 export function zoomed(params, pane, x, y, factor) {
   const zoom = Math.min(64, Math.max(0.25, params.zoom * factor));
   const scale = (pane.scale * zoom) / params.zoom;
-  const kept = 1 / pane.scale - 1 / scale;
+  const shift = 1 / pane.scale - 1 / scale;
   const [across, down] = pane.middle;
   return {
     zoom,
-    pan: [params.pan[0] + (x - across) * kept, params.pan[1] + (y - down) * kept],
+    pan: [params.pan[0] + (x - across) * shift, params.pan[1] + (y - down) * shift],
   };
 }
 

@@ -17,7 +17,7 @@ const KEPT = 'lightpaint-key';
 export const REFUSALS = [403, 410];
 
 /** Who shows a key, or a token. @param {string | null} key @returns {RequestInit} */
-export function shown(key) {
+export function authorization(key) {
   return { credentials: 'omit', headers: { authorization: `Bearer ${key}` } };
 }
 
@@ -35,11 +35,11 @@ export class AccessKey {
 
   /** The key, or null for who has none; fails where no server is. @returns {Promise<string | null>} */
   async key() {
-    if (this.token === null) return kept();
-    const answer = await fetch(this.url, { ...shown(this.token), cache: 'no-store' });
+    if (this.token === null) return storedKey();
+    const answer = await fetch(this.url, { ...authorization(this.token), cache: 'no-store' });
     if (!answer.ok && !REFUSALS.includes(answer.status)) throw new Error(await answer.text());
-    const key = answer.ok ? await answer.text() : kept();
-    if (key !== null) keep(key);
+    const key = answer.ok ? await answer.text() : storedKey();
+    if (key !== null) storeKey(key);
     this.token = null;
     // Nobody who looks at the page, or at what its browser remembers, is to see it.
     history.replaceState(history.state, '', location.pathname + location.search);
@@ -52,7 +52,7 @@ function tokenIn(fragment) {
   return new URLSearchParams(fragment.slice(1)).get('token');
 }
 
-function kept() {
+function storedKey() {
   try {
     return sessionStorage.getItem(KEPT);
   } catch {
@@ -61,7 +61,7 @@ function kept() {
 }
 
 /** @param {string} key */
-function keep(key) {
+function storeKey(key) {
   try {
     sessionStorage.setItem(KEPT, key);
   } catch {

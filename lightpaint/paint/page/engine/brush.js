@@ -57,7 +57,7 @@ export class Path {
   }
 
   /** Go on to a point. @param {Point} point @returns {Region[]} what is covered anew */
-  to(point) {
+  moveTo(point) {
     const from = this.last ?? point;
     const length = Math.hypot(point.x - from.x, point.y - from.y);
     const regions = [];
@@ -81,7 +81,7 @@ export class Path {
  * @param {number} flow @returns {Region} */
 export function fill(canvas, object, flow) {
   const { objects, width } = canvas;
-  const region = objects ? around(objects, width, object) : canvas.whole;
+  const region = objects ? boundsOf(objects, width, object) : canvas.whole;
   let count = 0;
   canvas.cover(region, (x, y, before) => {
     const isIn = !objects || objects[y * width + x] === object;
@@ -101,7 +101,7 @@ export function flood(canvas) {
 
 /** Where an object is seen. @param {Int16Array} objects @param {number} width
  * @param {number} object @returns {Region} */
-function around(objects, width, object) {
+function boundsOf(objects, width, object) {
   let [top, bottom, left, right] = [Infinity, 0, Infinity, 0];
   for (let p = 0; p < objects.length; p++) {
     if (objects[p] !== object) continue;

@@ -33,13 +33,13 @@ export function inView(name, view) {
 /** A state as it is of one view: its size, its objects, and how its planes are scaled.
  * @param {Message} state @param {number} view @returns {Message} */
 export function stateOfView(state, view) {
-  const its = state.views?.[view];
-  if (!its) return state;
+  const viewState = state.views?.[view];
+  if (!viewState) return state;
   const lights = state.lights.map((/** @type {Light} */ light, /** @type {number} */ k) => ({
     ...light,
-    scale: its.scales[k],
+    scale: viewState.scales[k],
   }));
-  return { ...state, lights, size: its.size, objects: its.objects };
+  return { ...state, lights, size: viewState.size, objects: viewState.objects };
 }
 
 /** @type {Record<string, {new (buffer: ArrayBuffer, at: number, length: number): Data,
@@ -74,7 +74,7 @@ export function dtypeOf(data) {
 
 /** What `buffers` says of some arrays.
  * @param {Arrays} arrays @returns {About[]} */
-export function described(arrays) {
+export function bufferInfo(arrays) {
   return Object.entries(arrays).map(([name, { data, shape }]) => ({
     name,
     dtype: dtypeOf(data),
@@ -86,7 +86,7 @@ export function described(arrays) {
  * @param {Record<string, unknown>} content @param {Arrays} [arrays]
  * @returns {ArrayBuffer} */
 export function frame(content, arrays = {}) {
-  const text = new TextEncoder().encode(JSON.stringify({ ...content, buffers: described(arrays) }));
+  const text = new TextEncoder().encode(JSON.stringify({ ...content, buffers: bufferInfo(arrays) }));
   const pictures = Object.values(arrays);
   const start = padded(4 + text.length);
   const size = pictures.reduce((at, { data }) => at + padded(data.byteLength), start);

@@ -1,6 +1,6 @@
 /** The session behind an anywidget model in a notebook. */
 import { UNQUEUED, Emitter } from './socket_host.js';
-import { VERSION, described, pictureOf } from './message_frames.js';
+import { VERSION, bufferInfo, pictureOf } from './message_frames.js';
 
 /** @typedef {import("./socket_host.js").Host} Host */
 /** @typedef {import("./message_frames.js").Arrays} Arrays */
@@ -118,7 +118,7 @@ export class ModelHost extends Emitter {
       const seq = ++this.seq;
       this.asked.set(seq, { resolve, reject });
       if (this.timer === undefined) this.listen(seq - 1);
-      const content = { kind, seq, ...fields, buffers: described(arrays) };
+      const content = { kind, seq, ...fields, buffers: bufferInfo(arrays) };
       // Copies: what is painted on meanwhile is of another message.
       const bytes = Object.values(arrays).map(({ data }) =>
         data.buffer.slice(data.byteOffset, data.byteOffset + data.byteLength),

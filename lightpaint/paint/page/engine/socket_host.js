@@ -4,7 +4,7 @@
  * Every message has a number, which its reply repeats. After a lost connection the host reconnects and
  * begins with `hello`.
  */
-import { AccessKey, PROTOCOL, REFUSALS, shown } from './access_key.js';
+import { AccessKey, PROTOCOL, REFUSALS, authorization } from './access_key.js';
 import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
 
 /** @typedef {import("./message_frames.js").Arrays} Arrays */
@@ -124,8 +124,8 @@ export class SocketHost extends Emitter {
   dropped(socket) {
     if (socket !== this.socket) return;
     this.socket = null;
-    const gone = new Error('the connection to the painter is lost');
-    for (const { reject } of this.asked.values()) reject(gone);
+    const error = new Error('the connection to the painter is lost');
+    for (const { reject } of this.asked.values()) reject(error);
     this.asked.clear();
     this.retry();
   }
@@ -148,8 +148,9 @@ export class SocketHost extends Emitter {
    * page of the new address would find the session taken. */
   async askWhy() {
     try {
-      const how = /** @type {RequestInit} */ ({ method: 'HEAD', cache: 'no-store' });
-      const { status } = await fetch(new URL('key', this.base), { ...how, ...shown(this.key) });
+      const options = /** @type {RequestInit} */ ({ method: 'HEAD', cache: 'no-store' });
+      const url = new URL('key', this.base);
+      const { status } = await fetch(url, { ...options, ...authorization(this.key) });
       if (!REFUSALS.includes(status) || this.socket?.readyState === WebSocket.OPEN) return;
       this.refuse();
     } catch {
@@ -194,7 +195,7 @@ export class SocketHost extends Emitter {
     const url = new URL(`data/${path}`, this.base);
     const generation = this.generations[name];
     if (generation !== undefined) url.searchParams.set('g', String(generation));
-    const response = await fetch(url, shown(this.key));
+    const response = await fetch(url, authorization(this.key));
     if (!response.ok) throw new Error(`${name}: ${await response.text()}`);
     const shape = (response.headers.get('x-shape') ?? '').split(',').map(Number);
     const dtype = response.headers.get('x-dtype') ?? '';

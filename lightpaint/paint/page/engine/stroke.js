@@ -74,7 +74,7 @@ export class Stroke {
       const object = canvas.objectAt(start.x, start.y);
       return this.applied([fill(canvas, object, settings.flow)]);
     }
-    if (settings.tool !== 'adjust') return this.applied(this.path.to(start));
+    if (settings.tool !== 'adjust') return this.applied(this.path.moveTo(start));
     const object = canvas.objectAt(start.x, start.y);
     if (settings.about === 'object' && object >= 0) fill(canvas, object, 1);
     else
@@ -89,7 +89,7 @@ export class Stroke {
     if (!last || tool === 'fill') return [];
     if (tool === 'adjust') return this.adjust(last);
     if (tool === 'line') return this.line(last);
-    return this.applied(points.flatMap((point) => this.path.to(point)));
+    return this.applied(points.flatMap((point) => this.path.moveTo(point)));
   }
 
   /** A straight line from where it began. @param {Point} to @returns {Region[]} */
@@ -101,7 +101,8 @@ export class Stroke {
     // Its last stamp is at its end.
     const length = Math.hypot(to.x - start.x, to.y - start.y);
     path.step = length / Math.max(1, Math.ceil(length / path.step)) || path.step;
-    const regions = [...path.to({ ...start, pressure: 1 }), ...path.to({ ...to, pressure: 1 })];
+    const ends = [start, to].map((point) => path.moveTo({ ...point, pressure: 1 }));
+    const regions = ends.flat();
     return [...(before ? [before] : []), ...this.applied(regions)];
   }
 

@@ -4,7 +4,7 @@ import { html, useEffect, useRef } from '../vendor/preact.js';
 import { Button, Dialog } from './controls.js';
 import { number, shortened } from './format.js';
 import { Icon } from './icons.js';
-import { put } from './thumbnail.js';
+import { drawPicture } from './thumbnail.js';
 
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./ui_state.js").Advice} Cause */
@@ -117,7 +117,7 @@ export function PreviewDialog({ ui, app }) {
 function Small({ picture, caption }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   useEffect(() => {
-    if (picture && ref.current) put(ref.current, picture);
+    if (picture && ref.current) drawPicture(ref.current, picture);
   }, [picture]);
   return html`<figure><canvas ref=${ref} width="16" height="9" role="img"
     aria-label=${caption === 'Before' ? 'The answer before the change' : 'The answer after it'}></canvas>

@@ -24,7 +24,7 @@ export function Thumbnail({ name, generation, app }) {
         (picture) => {
           isThere = true;
           if (isGone || !ref.current) return;
-          put(ref.current, picture);
+          drawPicture(ref.current, picture);
           drawn.current = name;
         },
         () => undefined, // A thumbnail is not worth an error.
@@ -52,13 +52,13 @@ function clear(canvas) {
 }
 
 /** @param {HTMLCanvasElement} canvas @param {import("./engine_interface.js").Picture} picture (h, w, 3) */
-export function put(canvas, { data, shape: [height, width] }) {
+export function drawPicture(canvas, { data, shape: [height, width] }) {
   canvas.width = width;
   canvas.height = height;
   const pixels = new ImageData(width, height);
-  for (let at = 0; at < width * height; at += 1) {
-    for (let c = 0; c < 3; c += 1) pixels.data[4 * at + c] = data[3 * at + c];
-    pixels.data[4 * at + 3] = 255;
+  for (let i = 0; i < width * height; i += 1) {
+    for (let c = 0; c < 3; c += 1) pixels.data[4 * i + c] = data[3 * i + c];
+    pixels.data[4 * i + 3] = 255;
   }
   canvas.getContext('2d')?.putImageData(pixels, 0, 0);
 }
