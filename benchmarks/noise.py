@@ -8,8 +8,11 @@ compiled, loading not counted. `one pass` is the basis as it is rendered and sol
 its planes as people see them, without grain. The rivals are one ordinary render per light, as they
 come and denoised alike; where there are many lights, some of them are rendered alone, and their
 time is scaled to all. A figure says how many times lower the error is at equal time, as the
-geometric mean over lights. `--before` names a checkout of an earlier version, which is then
-measured in the same run, in turns. Long renders are kept in FOLDER for the next run.
+geometric mean over lights. `weights` is how far the weights of a painting are off, in the mean of
+lights by their share of the picture: the scene as it is under another light, with a pool of paint,
+solved with the noise correction; against the weights that the long render gives. `--before` names a
+checkout of an earlier version, which is then measured in the same run, in turns. Long renders are
+kept in FOLDER for the next run.
 """
 
 import argparse
@@ -20,20 +23,25 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from hall import write_hall
 
-from lightpaint import Basis, Scene, load_scene, render_basis
+from lightpaint import Basis, Scene, Target, correct_noise, load_scene, render_basis, solve
+from lightpaint.colour.color import luminance
 from lightpaint.images.denoiser import denoised
 from lightpaint.scene.scene_render import Stream, render_loaded
 
 REPOSITORY = Path(__file__).parent.parent
 GALLERY = REPOSITORY / "scenes" / "gallery" / "scene.xml"
 SCENES = ("gallery", "hall64", "hall256")
-HALL_SIZE = {"width": 320, "height": 180}
+HALL_SIZE = {"width": 160, "height": 90}
+
+#: Samples of the long renders: so many that their own noise is far below that of what is measured.
+LONG_SPP = {"gallery": 768, "hall64": 1024, "hall256": 512}
 
 #: Seeds of the long render, and of the first one that is measured.
 LONG_SEED, FIRST_SEED = 90_000, 1
@@ -46,7 +54,7 @@ WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 try:
     from lightpaint.basis.denoised_planes import denoise_to_halves
 except ImportError:  # as earlier versions call it
-    from lightpaint.basis.clean import clean_halves as denoise_to_halves
+    from lightpaint.basis.clean import clean_plane as denoise_to_halves
 
 Errors = npt.NDArray[np.float64]
 
@@ -56,17 +64,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=SCENES)
     parser.add_argument("--spp", type=int, default=32)
-    parser.add_argument("--long-spp", type=int, default=1024)
+    parser.add_argument("--long-spp", type=int, help=f"by default {LONG_SPP}")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--before", type=Path, metavar="CHECKOUT")
     parser.add_argument("--keep", type=Path, metavar="FOLDER")
-    parser.add_argument("--measure", nargs=2, help=argparse.SUPPRESS)
+    parser.add_argument("--measure", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.measure:
-        scene, out = options.measure
-        measure(scene_named(scene), options.spp, options.repeats, Path(out))
+        scene, long, out = options.measure
+        measure(scene_named(scene), Path(long), options.spp, options.repeats, Path(out))
         return
-    print(f"{'':32s}{'one pass':>10s}{'pictures':>10s}{'of denoised':>13s}{'CPU s':>8s}")
+    heads = f"{'one pass':>10s}{'pictures':>10s}{'of denoised':>13s}{'weights':>9s}{'CPU s':>8s}"
+    print(" " * 32 + heads, flush=True)
     with tempfile.TemporaryDirectory() as folder:
         keep = options.keep or Path(folder)
         keep.mkdir(parents=True, exist_ok=True)
@@ -85,9 +94,11 @@ def scene_named(name: str) -> Scene:
 def compare(name: str, options: argparse.Namespace, keep: Path) -> None:
     """Measure one scene by this version, by the one before, and by a render per light."""
     scene = scene_named(name)
-    truth, variance = long_render(scene, options.long_spp, keep / f"{name}_{options.long_spp}.npz")
+    long_spp = options.long_spp or LONG_SPP[name]
+    long = keep / f"{name}_{long_spp}.npz"
+    truth, variance = long_render(scene, long_spp, long)
     checkouts = {"now": REPOSITORY} | ({"before": options.before} if options.before else {})
-    found = {which: measured(name, options, at, keep) for which, at in checkouts.items()}
+    found = {which: measured(name, options, at, long) for which, at in checkouts.items()}
     spp, repeats, lights = options.spp, options.repeats, len(scene.lights)
     which = np.unique(np.linspace(0, lights - 1, min(ALONE, lights)).astype(int))
     alone = [render_alone(scene, k, spp, seed) for seed in range(repeats) for k in which]
@@ -96,7 +107,11 @@ def compare(name: str, options: argparse.Namespace, keep: Path) -> None:
     now = found["now"]
     # As many samples as that many renders can take in the same time, one at least.
     few = max(1, round(spp * float(now["pictures_s"]) / alone_s))
-    features = render_basis(scene, spp=2, seed=0).features
+    few_samples = render_basis(scene, spp=2, seed=0)
+    features = few_samples.features
+    exact = replace(few_samples, planes=truth, noise=np.zeros_like(truth), indirect=None)
+    expected = luminance(solve(exact, painting(exact, truth)).weights)
+    light = expected * luminance(truth.mean(axis=(1, 2)))
     rough = [render_alone(scene, k, few, seed) for seed in range(repeats) for k in which]
     begin_s = time.process_time()
     clean = [denoised(image, features) for image, _ in rough]
@@ -106,6 +121,7 @@ def compare(name: str, options: argparse.Namespace, keep: Path) -> None:
         noisy = errors(its["planes"], np.tile(np.arange(lights), repeats), truth, variance)
         shown = errors(its["pictures"], np.tile(np.arange(lights), repeats), truth, variance)
         pass_s, pictures_s = float(its["pass_s"]), float(its["pictures_s"])
+        off = np.abs(luminance(its["weights"]) / np.maximum(expected, 1e-12) - 1).mean(axis=0)
         figures = (
             ratio(plain * alone_s, noisy[which] * pass_s),
             ratio(plain * alone_s, shown[which] * pictures_s),
@@ -113,7 +129,8 @@ def compare(name: str, options: argparse.Namespace, keep: Path) -> None:
         )
         title = f"{name}, {lights} lights, {spp} spp, {label}"
         print(
-            f"{title:32s}{figures[0]:9.1f}x{figures[1]:9.1f}x{figures[2]:12.1f}x{pictures_s:8.1f}"
+            f"{title:32s}{figures[0]:9.1f}x{figures[1]:9.1f}x{figures[2]:12.1f}x"
+            f"{100 * off @ light / light.sum():7.1f} %{pictures_s:8.1f}"
         )
         sys.stdout.flush()
 
@@ -128,13 +145,29 @@ def long_render(scene: Scene, spp: int, path: Path) -> tuple[npt.NDArray[np.floa
         return kept["planes"], kept["variance"]
 
 
+def painting(basis: Basis, truth: npt.NDArray[np.float32]) -> Target:
+    """Return a painting of a scene: its look in a warmer light that falls off, with a pool.
+
+    truth: planes, (n, h, w, 3), whose sum is that look.
+    """
+    look = np.einsum("nhwc,nc->hwc", truth, basis.present_weights)
+    y, x = (np.arange(size) / size for size in look.shape[:2])
+    pool = np.square((x - 0.35) / 0.15) + np.square((y[:, None] - 0.6) / 0.25) < 1
+    painted = look * (0.4 + 0.6 * x[:, None]) * (1.1, 1, 0.85)
+    painted += pool[..., None] * look.mean() * (1.5, 1.2, 0.7)
+    return Target.of(painted.astype(np.float32))
+
+
 def measured(
-    name: str, options: argparse.Namespace, checkout: Path, keep: Path
+    name: str, options: argparse.Namespace, checkout: Path, long: Path
 ) -> dict[str, npt.NDArray[np.float32]]:
-    """Return what `measure` finds in a process that runs the version of `checkout`."""
-    out = keep / "measured.npz"
-    command = [sys.executable, str(Path(__file__).absolute()), "--measure", name, str(out)]
-    command += ["--spp", str(options.spp), "--repeats", str(options.repeats)]
+    """Return what `measure` finds in a process that runs the version of `checkout`.
+
+    long: file of the long render.
+    """
+    out = long.parent / "measured.npz"
+    command = [sys.executable, str(Path(__file__).absolute()), "--measure", name, str(long)]
+    command += [str(out), "--spp", str(options.spp), "--repeats", str(options.repeats)]
     path = os.pathsep.join([str(checkout), str(Path(__file__).parent)])
     subprocess.run(command, check=True, env={**os.environ, "PYTHONPATH": path})
     with np.load(out) as found:
@@ -143,10 +176,15 @@ def measured(
     return made
 
 
-def measure(scene: Scene, spp: int, repeats: int, out: Path) -> None:
-    """Write planes and pictures of several seeds, and seconds for one of each."""
-    render_basis(scene, spp=2, seed=0)  # compiles the kernels
-    planes, pictures, pass_s, clean_s = [], [], 0.0, 0.0
+def measure(scene: Scene, long: Path, spp: int, repeats: int, out: Path) -> None:
+    """Write planes, pictures and weights of several seeds, and seconds for one of each.
+
+    long: file of the long render, of which the painting is made.
+    """
+    compiled = render_basis(scene, spp=2, seed=0)
+    with np.load(long) as kept:
+        target = painting(compiled, kept["planes"])
+    planes, pictures, weights, pass_s, clean_s = [], [], [], 0.0, 0.0
     for seed in range(FIRST_SEED, FIRST_SEED + repeats):
         basis, seconds = render_timed(scene, spp, seed)
         pass_s += seconds
@@ -156,10 +194,12 @@ def measure(scene: Scene, spp: int, repeats: int, out: Path) -> None:
             pictures.append(halves.astype(np.float32) * np.float32(scale))
         clean_s += time.process_time() - begin_s
         planes += list(basis.images)
+        weights.append(correct_noise(solve(basis, target)).weights)
         del basis
         gc.collect()
     seconds = {"pass_s": pass_s / repeats, "pictures_s": (pass_s + clean_s) / repeats}
-    np.savez(out, planes=np.stack(planes), pictures=np.stack(pictures), **seconds)
+    made = {"planes": planes, "pictures": pictures, "weights": weights}
+    np.savez(out, **{name: np.stack(its) for name, its in made.items()}, **seconds)
 
 
 def render_timed(scene: Scene, spp: int, seed: int) -> tuple[Basis, float]:

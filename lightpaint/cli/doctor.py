@@ -79,7 +79,7 @@ def _denoiser() -> Finding:
     version = _package("pyoidn")
     if version.state == "ok":
         return Finding("denoiser", "ok", f"Open Image Denoise (pyoidn {version.found})")
-    return Finding("denoiser", "info", "a plain filter; a better one: pip install pyoidn")
+    return Finding("denoiser", "info", "simpler filters; a better one: pip install pyoidn")
 
 
 def _llvm() -> list[Finding]:

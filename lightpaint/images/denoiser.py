@@ -21,9 +21,9 @@ from lightpaint.images.pixel_blocks import block_mean
 #: Key of the text of a denoised PNG that names the denoiser and the file of the raw render.
 DENOISED_KEY = "lightpaint.denoised"
 
-#: Remark, shown once, if only the plain filter is available.
+#: Remark, shown once, if only simpler filters are available.
 MISSING_REMARK = (
-    "Open Image Denoise is not installed, so a plain filter smooths the pictures: for cleaner "
+    "Open Image Denoise is not installed, so simpler filters smooth the pictures: for cleaner "
     "ones, pip install pyoidn (Linux and Windows, x86-64); the solution is the same"
 )
 
