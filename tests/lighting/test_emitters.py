@@ -66,6 +66,27 @@ def test_a_warm_stroke_over_a_lantern_leaves_it_on(basis: Basis, space: Any):
         assert live > 1.5
 
 
+@pytest.mark.parametrize("space", ["display", "linear"])
+def test_a_warm_stroke_over_a_lantern_leaves_it_on_in_a_dark_room(basis: Basis, space: Any):
+    """The room two stops down, then the brush: darker than it was, but brighter than the room."""
+    everywhere = (slice(None), slice(None))
+    target = _painted(basis, everywhere, 0.25, times=True)
+    room = _lantern(basis, target, space=space)
+    assert room == pytest.approx((0.25, 0.25), rel=0.05)
+    target.image[AROUND] = 0.06 * WARM
+    target.importance[AROUND] = 10  # as a page counts strokes over what was asked of the whole
+    exact, live = _lantern(basis, target, space=space)
+    assert exact > 0.35
+    assert live > 0.35
+
+
+def test_a_room_that_becomes_darker_and_warmer_dims_its_lantern(basis: Basis):
+    everywhere = (slice(None), slice(None))
+    exact, live = _lantern(basis, _painted(basis, everywhere, 0.15 * WARM, times=True))
+    assert exact < 0.3
+    assert live < 0.3
+
+
 def test_a_clearly_darker_stroke_dims_it(basis: Basis):
     exact, live = _lantern(basis, _painted(basis, AROUND, 0.2, times=True))
     assert exact < 0.7

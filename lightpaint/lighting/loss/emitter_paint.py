@@ -3,7 +3,9 @@
 A flame outshines every display. Somebody who paints a table and the lantern on it warm wants no
 less light of the lantern, though the paint on each pixel of the flame is darker than the flame.
 Only paint that darkens the surroundings of the emitter, or its displayed value where nothing around
-it is painted, asks for less.
+it is painted, asks for less. A stroke over both that is warmer does not, though it may be darker
+than a bright room was before: on the flame it is darker still than beside it, since it covers the
+flame.
 """
 
 import numpy as np
@@ -19,6 +21,9 @@ RADIUS, MIN_RADIUS = 1 / 30, 2
 
 #: Stops from which on paint is darker than what it covers.
 DARKER_STOPS = 0.5
+
+#: Stops of red against blue from which on paint is warmer than what it covers.
+WARMER_STOPS = 0.5
 
 #: Light, relative to the picture's mean, below which a ratio means nothing.
 DARK_SHARE = 0.01
@@ -55,21 +60,25 @@ def find_glow_paint(
     painted_emitters = seen & (importance > 0)
     if not painted_emitters.any():
         return painted_emitters
-    counts = importance * ~seen
+    counts = (importance * ~seen)[..., None]
     radius = paint_radius(seen.shape)
     paint_nearby, painted, now = (
-        box_mean(np.asarray(x, np.float64), radius)
-        for x in (counts, counts * _brightness(image), counts * _brightness(look))
+        box_mean(np.maximum(np.asarray(x, np.float64), 0), radius)
+        for x in (counts, counts * image, counts * look)
     )
     # Sums that slide along have round-off where they are 0.
-    is_near = paint_nearby > NO_IMPORTANCE
+    is_near = paint_nearby[..., 0] > NO_IMPORTANCE
     # Ratios of means, since single pixels are noise.
-    change = _stops(painted + dark * paint_nearby, now + dark * paint_nearby)
+    painted, now = painted + dark * paint_nearby, now + dark * paint_nearby
+    change = _stops(_brightness(painted), _brightness(now))
     own_change = _stops(
         _brightness(_clip_to_display(image, transform)) + dark,
         _brightness(_clip_to_display(look, transform)) + dark,
     )
-    return np.asarray(painted_emitters & (np.where(is_near, change, own_change) > -DARKER_STOPS))
+    warmth = [_stops(x[..., 0], x[..., 2]) for x in (painted, now)]
+    is_covered = (warmth[0] - warmth[1] > WARMER_STOPS) & (own_change < change - DARKER_STOPS)
+    is_less = (change <= -DARKER_STOPS) & ~is_covered
+    return np.asarray(painted_emitters & ~np.where(is_near, is_less, own_change <= -DARKER_STOPS))
 
 
 def affected_region(region: Slices, size: tuple[int, int]) -> Slices:
@@ -91,6 +100,6 @@ def _clip_to_display(image: Floats, transform: ViewTransform | None) -> Floats |
     return image if transform is None else np.minimum(image, transform.white)
 
 
-def _stops(value: Doubles, reference: Doubles) -> Doubles:
+def _stops(value: Floats, reference: Floats) -> Doubles:
     safe = np.maximum(reference, 1e-30)
     return np.asarray(np.log2(np.maximum(value, 1e-30) / safe))
