@@ -92,8 +92,9 @@ class RoughPlanes:
 
     It is the clean picture of the scene as it is, times the share that the light has in it, so that
     they add up to that picture. Shares are those of light that is averaged along surfaces, direct
-    light as far as its noise in that picture asks for it; where surfaces are not known, of means
-    over squares of pixels, and then shadows are soft.
+    light as far as its noise in that picture asks for it. Where surfaces are not known, or pictures
+    are too large for that to be quick, they are of means over squares of pixels, and shadows are
+    soft.
 
     present: (h, w, 3) float32, that picture.
     """
@@ -120,7 +121,7 @@ class RoughPlanes:
     def _averaged(self, picture: Floats, indirect: Floats | None) -> Floats:
         """Return a picture that is smooth; a sum of pictures becomes the sum of smooth ones."""
         along_surfaces = self.basis.surface_filter
-        if indirect is None or along_surfaces is None:
+        if indirect is None or along_surfaces is None or not along_surfaces.is_quick:
             height, width = self.basis.size
             return resampled(picture, (-(-height // ROUGH_BLOCK), -(-width // ROUGH_BLOCK)))
         direct = picture - indirect

@@ -30,8 +30,8 @@ SQUARINGS = 5
 #: Rows of a band, whose weights and pictures a processor's cache holds.
 BAND_ROWS = 32
 
-#: Pixels of a picture up to which the weights are kept for the next one.
-KEPT_PIXELS = 2**20
+#: Pixels of a picture up to which the weights are kept for the next one: 160 bytes for each.
+KEPT_PIXELS = 2**19
 
 
 class SurfaceFilter:
@@ -55,11 +55,12 @@ class SurfaceFilter:
         def fill(band: "_Band") -> None:
             made[band.top : band.bottom] = self._filtered(band, image)
 
-        parallel_map(fill, self._kept if self._is_small else self._bands())
+        parallel_map(fill, self._kept if self.is_quick else self._bands())
         return made
 
     @property
-    def _is_small(self) -> bool:
+    def is_quick(self) -> bool:
+        """True if weights are kept; else each picture takes ten times as long."""
         return self.size[0] * self.size[1] <= KEPT_PIXELS
 
     @cached_property

@@ -117,23 +117,31 @@ def test_without_a_denoiser_light_is_averaged_along_surfaces(
     assert error["along surfaces"] < 0.06 * raw
 
 
+def two_lights(rng: np.random.Generator) -> tuple[Basis, list[np.ndarray]]:
+    """A basis of two lights whose pools are where the other's are not, and its true planes."""
+    pools, glow = pools_and_glow()
+    both = [split_basis(its, glow, rng) for its in (pools, 0.3 - pools)]
+
+    def stacked(name: str, parts: Any) -> Any:
+        return as_planes(np.concatenate([getattr(its, name).array() for its in parts]))
+
+    lights = [replace(both[0].lights[0], name=name) for name in ("spot", "other")]
+    indirect = [stacked(name, [its.indirect for its in both]) for name in ("planes", "noise")]
+    basis = replace(
+        both[0],
+        lights=lights,
+        planes=stacked("planes", both),
+        noise=stacked("noise", both),
+        indirect=IndirectLight(*indirect),
+    )
+    return basis, [pools + glow, 0.3 - pools + glow]
+
+
 def test_planes_that_stand_in_keep_edges_of_direct_light(rng: np.random.Generator):
     """They add up to the picture that they are shares of, and are nearer to the truth than shares
     of squares of pixels.
     """
-    pools, glow = pools_and_glow()
-    first, second = split_basis(pools, glow, rng), split_basis(0.3 - pools, glow, rng)
-    lights = [*first.lights, replace(second.lights[0], name="other")]
-    both = {
-        name: np.concatenate([getattr(its, name).array() for its in (first, second)])
-        for name in ("planes", "noise")
-    }
-    parts = [
-        np.concatenate([getattr(its.indirect, name).array() for its in (first, second)])
-        for name in ("planes", "noise")
-    ]
-    basis = replace(first, lights=lights, **both, indirect=IndirectLight(*map(as_planes, parts)))
-    truth = [pools + glow, 0.3 - pools + glow]
+    basis, truth = two_lights(rng)
     present = (truth[0] + truth[1]).astype(np.float32)
     error = {}
     for name, features in (("squares", None), ("surfaces", wall())):
@@ -142,6 +150,18 @@ def test_planes_that_stand_in_keep_edges_of_direct_light(rng: np.random.Generato
         np.testing.assert_allclose(sum(planes), present, rtol=1e-4)  # single precision
         error[name] = np.mean([np.square(a - b).mean() for a, b in zip(planes, truth, strict=True)])
     assert error["surfaces"] < 0.2 * error["squares"]
+
+
+def test_planes_that_stand_in_of_large_pictures_are_of_squares(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+):
+    """Averages along surfaces would take as long as the denoised planes that they stand in for."""
+    basis, truth = two_lights(rng)
+    present = (truth[0] + truth[1]).astype(np.float32)
+    expected = RoughPlanes(basis, present).plane(0)
+    with_surfaces = replace(basis, features=wall())
+    monkeypatch.setattr("lightpaint.images.surface_filter.KEPT_PIXELS", 1)
+    np.testing.assert_array_equal(RoughPlanes(with_surfaces, present).plane(0), expected)
 
 
 def test_without_indirect_light_all_of_it_is_denoised(make_basis: Any):
