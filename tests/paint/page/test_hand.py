@@ -558,6 +558,22 @@ def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
     assert painter.ui("tool") == "eraser"
 
 
+def test_undo_takes_back_what_a_field_has_taken(painter: Painter) -> None:
+    """Who types a level and thinks better of it is still in the field."""
+    painter.stroke()
+    painter.still()
+    field = painter.page.get_by_role("textbox", name=re.compile(", level$")).first
+    assert not field.evaluate("(one) => one.spellcheck")
+    field.fill("+1 st")
+    field.press("Control+z")  # the text alone
+    assert painter.said("undo") == []
+    field.fill("+1 st")
+    field.press("Enter")
+    painter.still()
+    field.press("Control+z")
+    assert len(painter.said("undo")) == 1
+
+
 #: Outlines as they are drawn, beside what they are to be: (wrong pixels, white ones).
 OUTLINE = """(object) => {
   const canvas = document.querySelector('.outline');

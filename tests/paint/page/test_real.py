@@ -654,6 +654,8 @@ def test_one_waits_for_the_first_picture_and_paints_while_it_gets_better(
     try:
         me = opened(served)
         me.page.get_by_text("Rendering the first picture …").wait_for()
+        whole = me.page.get_by_role("button", name="1:1", exact=True)
+        assert whole.get_attribute("aria-pressed") != "true"  # there is no picture yet
         me.page.reload()
         me.page.get_by_text("Rendering the first picture …").wait_for()
         assert me.page.get_by_role("progressbar").first.get_attribute("aria-valuenow") == "1"

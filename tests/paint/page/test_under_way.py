@@ -21,7 +21,7 @@ def test_files_that_are_written_are_seen_when_their_window_is_closed(painter: Pa
     progress(painter, "export", 4)
     dialog = page.get_by_role("dialog")
     assert "25 %" in dialog.inner_text()
-    assert dialog.get_by_text("Export continues if you close this window").is_visible()
+    assert dialog.get_by_text("You can close this window").is_visible()
     assert page.locator(".working").count() == 0  # it is seen once
     page.keyboard.press("Escape")
     chip = page.locator(".working")

@@ -227,6 +227,13 @@ def test_a_sentence_with_its_button_is_whole(painter: Painter) -> None:
     assert said.evaluate("(one) => one.scrollHeight - one.clientHeight") <= 1
 
 
+def test_numbers_stay_on_the_lines_of_their_units(painter: Painter) -> None:
+    how_true(painter)
+    said = painter.page.locator(".truth").evaluate("(one) => one.textContent")
+    assert said.count("\u00a0%") >= 5
+    assert " %" not in said
+
+
 def test_axe_finds_nothing_in_a_crowd(painter: Painter, axe: str) -> None:
     longest(painter)
     painter.page.evaluate("() => window.painter.store.set({ unfolded: [0, 40] })")

@@ -3,7 +3,7 @@
 import { html, useEffect, useLayoutEffect, useMemo, useRef } from '../vendor/preact.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button, Choice } from './controls.js';
-import { number, progressText } from './format.js';
+import { number, progressText, unbroken } from './format.js';
 import { Icon } from './icons.js';
 import { overlayOf } from './ui_state.js';
 import { updateShow } from './tools.js';
@@ -48,7 +48,7 @@ export function AnalysisPanel({ ui, app }) {
   return html`<div class="truth" ref=${frame}>
     <${Choice} label="Overlay" value=${ui.show.overlay} choices=${OVERLAYS}
       change=${choose} />
-    ${sentences.map((text) => html`<p key=${text}>${text}</p>`)}
+    ${sentences.map((text) => html`<p key=${text}>${unbroken(text)}</p>`)}
     <div class="row">
       <${Button} label=${ui.explaining ? 'Finding reasons …' : 'Why not closer?'}
         disabled=${ui.explaining} act=${() => session.explain()}

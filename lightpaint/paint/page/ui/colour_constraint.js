@@ -102,7 +102,7 @@ function TextField({ label, value, take }) {
   };
   return html`<label class="field words" data-tip=${value.length > 16 ? value : undefined}
     ><span class="name">${label}</span>
-    <input type="text" value=${typed ?? value} spellcheck="false" autocomplete="off"
+    <input type="text" value=${typed ?? value} data-typed=${typed === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)} onBlur=${done}
       onKeyDown=${press} /></label>`;
 }

@@ -67,7 +67,7 @@ function Hex({ colour, set }) {
     if (key === 'Escape') setTyped(null);
   };
   return html`<label class="field hex"><span class="only-read">Hex</span>
-    <input type="text" value=${typed ?? toHex(colour)} spellcheck="false" autocomplete="off"
+    <input type="text" value=${typed ?? toHex(colour)} data-typed=${typed === null ? 'no' : 'yes'} spellcheck=${false} autocomplete="off"
       maxlength="7"
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
       onBlur=${() => now.current !== null && take(now.current)}

@@ -131,7 +131,7 @@ export function NumberField(props) {
   return html`<label class="field number" data-tip=${tip}>
     <span class=${hidden ? 'only-read' : 'name'}>${label}</span>
     <input type="text" inputmode="decimal" value=${shown} placeholder=${empty} autocomplete="off"
-      disabled=${disabled} onKeyDown=${press}
+      data-typed=${typed === null ? 'no' : 'yes'} disabled=${disabled} onKeyDown=${press}
       onInput=${(/** @type {any} */ event) => setTyped(event.currentTarget.value)}
       onBlur=${() => now.current !== null && take(now.current)} />
     ${unit !== undefined && html`<span class="unit" aria-hidden="true">${unit}</span>`}

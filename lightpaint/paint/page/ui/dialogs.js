@@ -70,7 +70,7 @@ function ExportDialog({ ui, app, close }) {
         act=${() => app.session.write(what)} /></div>
     ${
       isBusy &&
-      html`<div class="row"><span class="faint folder">Export continues if you close this window.</span>
+      html`<div class="row"><span class="faint folder">You can close this window.</span>
         <${ProgressBar} progress=${ui.writing ?? { done: 0, total: 0 }} label="Exporting" />
         <span class="faint">${ui.writing && progressText(ui.writing)}</span>
         <${Button} label="Stop" icon="close" act=${() => app.session.write([])}

@@ -105,3 +105,6 @@ export const counted = (count, one, many = `${one}s`) => `${count} ${count === 1
 export function within(file, folder) {
   return file.startsWith(folder) ? file.slice(folder.length).replace(/^[/\\]+/, '') : file;
 }
+
+/** A sentence whose numbers stay on the lines of their units. @param {string} text */
+export const unbroken = (text) => text.replace(/(\d) (?=%)|(ΔE) (?=\d)/g, '$1$2\u00a0');

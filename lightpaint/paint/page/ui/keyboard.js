@@ -39,6 +39,16 @@ function isAmongNumbers(event) {
   return event.key.length === 1 && !isMod(event) && Boolean(element.closest?.('[data-numbers]'));
 }
 
+/** What takes back steps of the session, also from a field in which nothing is typed any more. */
+const HISTORY_KEYS = ['mod+z', 'mod+shift+z'];
+
+/** Whether a field has taken what was typed in it: there is no text to take back, but what that has
+ * changed. @param {KeyboardEvent} event in that field */
+function isTaken(event) {
+  const field = /** @type {HTMLElement} */ (event.composedPath()[0]);
+  return field.dataset?.typed === 'no';
+}
+
 /** Have what is typed in a field taken, before something is done with it.
  * @param {KeyboardEvent} event in that field */
 function commit(event) {
@@ -60,7 +70,7 @@ export function handleKey(event, app) {
   if (name === 'mod+s' || (name === 'mod+a' && !isIn)) event.preventDefault();
   if (app.store.value.dialog) return;
   if (name === 'mod+s' && isIn) commit(event);
-  else if (isIn) return;
+  else if (isIn && !(HISTORY_KEYS.includes(name) && isTaken(event))) return;
   const digit = /^[0-9]$/.test(event.key) && !event.ctrlKey && !event.metaKey;
   const found = BY_KEY.get(name);
   if (digit) setFlow(app.store, (Number(event.key) || 10) / 10);

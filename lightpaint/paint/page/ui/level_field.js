@@ -92,7 +92,7 @@ export function Level({ light, rgb, disabled, change, say }) {
     const to = (stops ?? DARKEST) + way * (event.shiftKey ? 10 : 1);
     take(`${Math.min(MOST, Math.max(-MOST, Number(to.toFixed(1))))} st`);
   };
-  return html`<input class="level" type="text" autocomplete="off" spellcheck="false"
+  return html`<input class="level" type="text" data-typed=${typed === null ? 'no' : 'yes'} autocomplete="off" spellcheck=${false}
     aria-label=${`${light.label}, level`} data-tip="Stops from now. Type +1.5, 80 % or off."
     value=${typed ?? (stops === null ? 'off' : stopsText(stops))} disabled=${disabled}
     onFocus=${(/** @type {any} */ event) => event.currentTarget.select()}

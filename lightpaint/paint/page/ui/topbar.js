@@ -62,7 +62,7 @@ function Zoom({ ui: { show, fit }, app }) {
     <${Button} label=${isFitted ? 'Fit' : `${Math.round(100 * scale)} %`} class="zoom" keys="F"
       tip="Fit the whole picture. Zoom with Ctrl and the wheel, or with + and −."
       act=${() => updateShow(app.store, { zoom: 1, pan: [0, 0] })} />
-    <${Button} label="1:1" class="zoom pixels" keys="Shift+F" on=${Math.abs(scale - 1) < 1e-3}
+    <${Button} label="1:1" class="zoom pixels" keys="Shift+F" on=${fit !== null && Math.abs(scale - 1) < 1e-3}
       tip="100 %: one image pixel on one pixel of the page" act=${() => showPixels(app)} />
   </div>`;
 }
