@@ -80,7 +80,11 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.sources import SceneFile as SceneFile
     from lightpaint.pipeline.templates import render_template as render_template
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis
+    from lightpaint.placement.freedom import Freedom as Freedom
     from lightpaint.placement.light_search import suggest_lights as suggest_lights
+    from lightpaint.placement.place import Move as Move
+    from lightpaint.placement.place import Placement as Placement
+    from lightpaint.placement.place import place as place
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
@@ -104,13 +108,16 @@ _HOMES = {
     "Diagnosis": "lighting.analysis.diagnosis",
     "Estimate": "images.estimate",
     "Fit": "lighting.fit",
+    "Freedom": "placement.freedom",
     "Job": "pipeline.job",
     "LightGroups": "basis.lightgroups.light_groups",
     "Lighting": "lighting.answer.lighting",
     "LightpaintError": "errors",
     "Look": "pipeline.results",
+    "Move": "placement.place",
     "Objects": "images.object_map",
     "Painting": "pipeline.sources",
+    "Placement": "placement.place",
     "Pose": "scene.pose",
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
@@ -132,6 +139,7 @@ _HOMES = {
     "error_bars": "lighting.analysis.noise.uncertainty",
     "load_scene": "scene.scene_reader",
     "paint_with_light": "pipeline.one_call",
+    "place": "placement.place",
     "read_basis": "basis.basis_file",
     "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.light_groups",

@@ -172,7 +172,7 @@ def obtain_denoised_planes(
             if progress is not None:
                 progress(k + 1, len(basis.lights))
         found = DenoisedPlanes.of(basis, halves, scales)
-        write_denoised_planes(basis, found)
+        cache_denoised_planes(basis, found)
     return found
 
 
@@ -201,7 +201,7 @@ def read_denoised_planes(basis: Basis) -> DenoisedPlanes | None:
     return None
 
 
-def write_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
+def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
     """Keep what was made of `basis`. Returns whether that worked: nothing is lost if not."""
     try:
         path = cache.companion_path(basis, DENOISED_SUFFIX)

@@ -10,9 +10,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.denoised_mixes import denoise_present_look
 from lightpaint.basis.denoised_planes import (
     DenoisedPlanes,
+    cache_denoised_planes,
     denoise_to_halves,
     read_denoised_planes,
-    write_denoised_planes,
 )
 from lightpaint.paint.session.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture
@@ -97,4 +97,4 @@ class PlaneDenoiser:
         if self._use_cache:
             for planes_of_view in self._by_view.values():
                 if not planes_of_view.is_cached:
-                    write_denoised_planes(planes_of_view.basis, planes_of_view.planes)
+                    cache_denoised_planes(planes_of_view.basis, planes_of_view.planes)

@@ -53,7 +53,7 @@ class Candidates:
                 f"candidates of {size[1]}x{size[0]} for a basis of {basis.size[1]}x"
                 f"{basis.size[0]}: render them on blocks of its pixels"
             )
-        image, importance = _reduced(solution.image, solution.weight, factor)
+        image, importance = reduced_goal(solution, factor)
         free = ~added.is_fixed
         count = int(free.sum())
         pictures, noise = (
@@ -70,7 +70,7 @@ class Candidates:
             image,
             importance,
             _with_free_lights(solution.problem.local_reduction, count),
-            _pull(solution, count),
+            pull_with_more(solution, count),
             count,
         )
 
@@ -110,8 +110,8 @@ def _with_free_lights(reduction: Reduction, count: int) -> Reduction:
     )
 
 
-def _pull(solution: Solution, count: int) -> NormalEquations | None:
-    """Return the pull of the lights to their present emission; candidates have none."""
+def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
+    """Return the pull of the lights to their present emission, and none of `count` more."""
     if (pull := solution.problem.pull) is None:
         return None
     return NormalEquations(
@@ -121,10 +121,14 @@ def _pull(solution: Solution, count: int) -> NormalEquations | None:
     )
 
 
-def _reduced(image: Floats, importance: Floats, factor: int) -> tuple[Floats, Floats]:
-    """Return means of blocks, weighted with importance, and the importance of whole blocks."""
-    weight = block_mean(importance.astype(np.float64), factor)
-    weighted = block_mean(image * importance.astype(np.float64), factor)
+def reduced_goal(solution: Solution, factor: int) -> tuple[Floats, Floats]:
+    """Return the goal and its importance on a film with a pixel for each block of pixels.
+
+    Goals are means weighted with importance; importance is that of whole blocks.
+    """
+    importance = solution.weight.astype(np.float64)
+    weight = block_mean(importance, factor)
+    weighted = block_mean(solution.image * importance, factor)
     return weighted / np.where(weight > 0, weight, 1), weight * factor**2
 
 

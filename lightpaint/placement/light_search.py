@@ -98,7 +98,7 @@ def suggest_lights(
         return ()
     # The gains are of the last linear problem, which may be on another scale.
     total = solution.energy
-    small = _on_small_film(scene, basis)
+    small = on_small_film(scene, basis, PIXELS)
     space = small.while_loaded(lambda loaded: free_space(small, loaded, seed=seed))
     if not len(space.places):
         return ()
@@ -126,8 +126,11 @@ def suggest_lights(
     return _suggestions(scene, additions, best, total) if additions else ()
 
 
-def _on_small_film(scene: Scene, basis: Basis) -> Scene:
-    """Return `scene` on a film whose pixels are blocks of those of `basis`, PIXELS or fewer."""
+def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
+    """Return `scene` on a film whose pixels are blocks of those of `basis`, `pixels` or fewer.
+
+    Raises SceneError if the basis is of another film.
+    """
     (height, width), (mine_h, mine_w) = scene.size, basis.size
     if whole_factor(scene.size, basis.size) is None:
         raise SceneError(
@@ -135,7 +138,7 @@ def _on_small_film(scene: Scene, basis: Basis) -> Scene:
             f"of {scene.path}, {width}x{height}: make it again"
         )
     on_its_film = scene.reduced(f"{mine_w}x{mine_h}")
-    return on_its_film.reduced(f"1/{reduction_to(on_its_film.film, PIXELS)}")
+    return on_its_film.reduced(f"1/{reduction_to(on_its_film.film, pixels)}")
 
 
 def _most(small: Scene, tried: int) -> int:

@@ -36,6 +36,7 @@ class Stream(IntEnum):
     VIEW = 6
     SURFACES = 7
     CANDIDATES = 8
+    FROZEN_PATHS = 9
 
 
 def pass_seed(seed: int, stream: Stream, index: int) -> int:

@@ -18,8 +18,8 @@ import pytest
 import lightpaint as lp
 from lightpaint.basis.denoised_planes import (
     DenoisedPlanes,
+    cache_denoised_planes,
     read_denoised_planes,
-    write_denoised_planes,
 )
 from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
@@ -351,15 +351,15 @@ def test_kept_pictures_that_are_damaged_are_made_again(
     scales = np.ones(len(basis.lights))
     clean = DenoisedPlanes(basis.images.astype(np.float16), scales, basis.present_look)
     assert read_denoised_planes(basis) is None
-    assert write_denoised_planes(basis, clean)
+    assert cache_denoised_planes(basis, clean)
     [path] = tmp_path.iterdir()
     data = path.read_bytes()
     for damage in (b"", b"no file", data[: len(data) // 2], data[:2000] + bytes(99) + data[2099:]):
         path.write_bytes(damage)
         assert read_denoised_planes(basis) is None
-    assert write_denoised_planes(basis, replace(clean, halves=clean.halves[:1]))
+    assert cache_denoised_planes(basis, replace(clean, halves=clean.halves[:1]))
     assert read_denoised_planes(basis) is None
-    assert write_denoised_planes(basis, clean)
+    assert cache_denoised_planes(basis, clean)
     found = read_denoised_planes(basis)
     assert found is not None
     np.testing.assert_array_equal(found.halves, clean.halves)

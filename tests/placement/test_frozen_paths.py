@@ -1,0 +1,137 @@
+"""Columns of frozen paths: the light that plain renders have, at any place, by the same paths."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import write_room
+
+import lightpaint as lp
+from lightpaint.arrays import Floats
+from lightpaint.errors import SceneError
+from lightpaint.placement.frozen_paths import FrozenPaths, falloff
+from lightpaint.scene.pose import Site
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
+from lightpaint.scene.surfaces import render_features
+
+#: Lights of the test room that no ray meets by chance.
+SEARCHED = ("bulb", "beam", "sun")
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Scene:
+    return load_scene(write_room(tmp_path))
+
+
+def sites(scene: Scene) -> list[Site]:
+    return [scene.light(name).members[0].site for name in SEARCHED]
+
+
+def along_paths(scene: Scene, work: Callable[[FrozenPaths], Any], **how: Any) -> Any:
+    return scene.while_loaded(lambda loaded: work(FrozenPaths(scene, loaded, **how)))
+
+
+def test_columns_are_the_planes_of_a_basis(room: Scene) -> None:
+    """Direct and indirect light, glossy walls included, within the noise of both."""
+    basis = lp.render_basis(room, spp=1024)
+    names = [light.name for light in basis.lights]
+    planes = basis.images[[names.index(name) for name in SEARCHED]]
+    columns = along_paths(room, lambda p: p.columns(sites(room)), first_hits=100, bounces=100)
+    for plane, column in zip(planes, columns, strict=True):
+        assert column.mean() == pytest.approx(plane.mean(), rel=0.02)  # noise
+        assert np.square(column - plane).sum() < 0.03 * np.square(plane).sum()  # noise
+
+
+def test_direct_light_alone_is_that_of_the_direct_integrator(tmp_path: Path) -> None:
+    room = load_scene(write_room(tmp_path), integrator="path:max_depth=2")
+    basis = lp.render_basis(room, spp=256)
+    names = [light.name for light in basis.lights]
+    planes = basis.images[[names.index(name) for name in SEARCHED]]
+    columns = along_paths(room, lambda p: p.columns(sites(room)), first_hits=100, bounces=9)
+    for plane, column in zip(planes, columns, strict=True):
+        assert np.square(column - plane).sum() < 0.01 * np.square(plane).sum()  # noise
+
+
+def test_a_filter_along_surfaces_takes_noise_and_no_light(room: Scene) -> None:
+    features = render_features(room)
+    truth = along_paths(room, lambda p: p.columns(sites(room)), first_hits=100, bounces=100)
+
+    def both(paths: FrozenPaths) -> tuple[Floats, Floats]:
+        raw = paths.columns(sites(room))
+        return raw, paths.filtered_along(features).columns(sites(room))
+
+    raw, filtered = along_paths(room, both, first_hits=100, bounces=2, seed=3)
+    errors = [np.square(its - truth).sum(axis=(1, 2, 3)) for its in (raw, filtered)]
+    assert (errors[1] < 0.7 * errors[0]).all()
+    assert filtered.mean() == pytest.approx(truth.mean(), rel=0.05)
+
+
+def test_one_place_has_one_column_whatever_came_before(room: Scene) -> None:
+    here = Site(position=(0.2, 1.1, 0.4))
+    there = Site(position=(-0.4, 1.3, 0.1))
+
+    def columns(paths: FrozenPaths) -> list[Floats]:
+        return [
+            paths.columns([here])[0],
+            paths.columns([there, here])[1],
+            paths.columns([there])[0],
+        ]
+
+    first, second, other = along_paths(room, columns)
+    np.testing.assert_array_equal(first, second)
+    assert np.abs(first - other).max() > 0
+    again, _, _ = along_paths(room, columns)
+    np.testing.assert_array_equal(first, again)
+    reseeded, _, _ = along_paths(room, columns, seed=1)
+    assert np.abs(first - reseeded).max() > 0
+
+
+def test_light_falls_with_the_square_of_the_distance(room: Scene) -> None:
+    """Against the closed form of a point light, on the floor, which is diffuse."""
+
+    def ratio(paths: FrozenPaths) -> Floats:
+        near, far = (
+            paths.contributions(paths.direct, Site(position=(0, y, 0.2))).astype(float)
+            for y in (1.0, 1.001)
+        )
+        points = paths.points(paths.direct).astype(float)
+        squares = [
+            np.square(points - np.array([0, y, 0.2])).sum(axis=1, keepdims=True)
+            for y in (1.0, 1.001)
+        ]
+        # The cosines are those of a floor at height 0.
+        cosines = [y / np.sqrt(its) for y, its in zip((1.0, 1.001), squares, strict=True)]
+        is_lit = (near > 0).all(axis=1) & (far > 0).all(axis=1) & (np.abs(points[:, 1]) < 1e-4)
+        assert is_lit.sum() > 100
+        expected = cosines[0] / squares[0] * squares[1] / cosines[1]
+        return near[is_lit] / far[is_lit] / expected[is_lit]
+
+    np.testing.assert_allclose(along_paths(room, ratio, bounces=0), 1, atol=1e-4)  # precision
+
+
+def test_cones_are_those_of_mitsuba(room: Scene) -> None:
+    """A spot's own column is what `falloff` makes of one that shines all around."""
+    beam = room.light("beam").members[0].site
+
+    def both(paths: FrozenPaths) -> tuple[Floats, Floats]:
+        added = paths.contributions(paths.direct, beam)
+        share = falloff(
+            paths.points(paths.direct),
+            beam,
+            np.array([beam.direction]),
+            np.array([[beam.cutoff, beam.beam]], dtype=float),
+        )[0]
+        return paths.direct_images([beam])[0], paths.image_of(
+            paths.direct, share[0][:, None] * added
+        )
+
+    whole, made = along_paths(room, both, bounces=0)
+    np.testing.assert_allclose(made, whole, atol=2e-4 * whole.max())  # single precision
+
+
+def test_what_paths_cannot_be_frozen_for(room: Scene, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="first_hits is 7: expected a square number"):
+        along_paths(room, lambda p: p, first_hits=7)

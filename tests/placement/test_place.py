@@ -1,0 +1,148 @@
+"""Places, directions and cones that a painting asks for are found; noise asks for none."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import write_room
+
+import lightpaint as lp
+from lightpaint.errors import SceneError
+from lightpaint.placement.freedom import FreeLight
+from lightpaint.scene.pose import Site
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
+
+LINE = ((-1.0, 1.5, 0.0), (1.0, 1.5, 0.0))
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Scene:
+    return load_scene(write_room(tmp_path))
+
+
+def placed(
+    room: Scene, painted: Scene, freedoms: Mapping[str, lp.Freedom], seed: int = 0
+) -> lp.Placement:
+    """The placement for a picture of `painted`, which another seed rendered."""
+    basis = lp.render_basis(room, spp=256, seed=1)
+    goal = lp.render_basis(painted, spp=256, seed=2).present_look
+    solution = lp.solve(basis, lp.Target.of(goal), space="linear", hold=0)
+    return lp.place(room, basis, solution, freedoms, seed=seed)
+
+
+def angle(one: Site, other: Site) -> float:
+    """Degrees between the directions of two sites."""
+    a, b = (np.array(x.direction, dtype=float) for x in (one, other))
+    return float(np.degrees(np.arccos(np.clip(a @ b, -1, 1))))
+
+
+def test_a_lamp_is_found_where_the_painting_has_it(room: Scene) -> None:
+    there = (0.3, 1.3, 0.2)
+    painted = room.moved({"bulb": lp.Pose(position=there)})
+    found = placed(room, painted, {"bulb": lp.Freedom(within=1.5)})
+    assert [move.name for move in found.moves] == ["bulb"]
+    assert found.moves[0].new.position == pytest.approx(there, abs=0.1)
+    assert found.missed_after < 0.3 * found.missed_before
+    site = found.scene.light("bulb").members[0].site
+    assert site.position == pytest.approx(found.moves[0].new.position, rel=1e-6)
+
+
+def test_a_spot_is_turned_to_where_the_painting_has_its_beam(room: Scene) -> None:
+    painted = room.moved({"beam": lp.Pose(target=(-0.6, 0, -0.3))})
+    found = placed(room, painted, {"beam": lp.Freedom(aim=True)})
+    beam = painted.light("beam").members[0].site
+    assert [move.name for move in found.moves] == ["beam"]
+    assert angle(found.moves[0].new, beam) < 4
+    assert f"turned by {found.moves[0].turn:.0f}°" in str(found.moves[0])
+
+
+def test_nothing_moves_where_nothing_is_missed(room: Scene) -> None:
+    free = {"bulb": lp.Freedom(within=0.5), "beam": lp.Freedom(aim=40), "sun": lp.Freedom(aim=20)}
+    found = placed(room, room, free)
+    assert found.moves == ()
+    assert found.scene is room
+    assert found.missed_after == found.missed_before
+
+
+@pytest.mark.parametrize(
+    ("name", "freedom", "words"),
+    [
+        ("panel", lp.Freedom(within=1), "'panel' is of the kind area"),
+        ("sky", lp.Freedom(aim=True), "'sky' is of the kind constant"),
+        ("bulb", lp.Freedom(aim=10), "'bulb' has not a direction"),
+        ("bulb", lp.Freedom(cone=(10, 20)), "'bulb' has not a cone"),
+        ("sun", lp.Freedom(within=1), "'sun' has not a place"),
+        ("lamp", lp.Freedom(within=1), "no light 'lamp'"),
+    ],
+)
+def test_what_a_light_is_not_free_to_do(
+    room: Scene, name: str, freedom: lp.Freedom, words: str
+) -> None:
+    with pytest.raises(SceneError, match=words):
+        placed(room.reduced("1/4"), room.reduced("1/4"), {name: freedom})
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"within": -1}, "within is -1"),
+        ({"within": np.nan}, "within is nan"),
+        ({"aim": 200}, "aim is 200"),
+        ({"cone": (30, 10)}, r"cone is \(30, 10\)"),
+        ({"line": ((0, 0, 0), (0, 0, 0))}, "two different points"),
+        ({"line": (0, 1)}, "two points of three numbers"),
+        ({"box": ((0, 0), (1, 1))}, "two points of three numbers"),
+        ({"within": 1, "line": LINE}, "within and line are given"),
+    ],
+)
+def test_freedoms_that_mean_nothing(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        lp.Freedom(**values)
+
+
+@pytest.mark.parametrize(
+    "freedom",
+    [
+        lp.Freedom(within=0.7, aim=25, cone=(10, 40)),
+        lp.Freedom(box=((-1, 1, -1), (1, 2, 0.5)), aim=True),
+        lp.Freedom(line=LINE, cone=(15, 60)),
+        lp.Freedom(aim=5),
+    ],
+)
+def test_steps_stay_within_the_freedom(freedom: lp.Freedom) -> None:
+    """Whatever the step: the pose is permitted, and is its own nearest permitted one."""
+    start = Site(position=(0.5, 1.5, 0.0), direction=(0.0, -1.0, 0.0), cutoff=30.0, beam=20.0)
+    light = FreeLight("spot", start, freedom)
+    rng = np.random.default_rng(5)
+    site = start
+    for _ in range(200):
+        site = light.stepped(site, rng.normal(size=sum(light.dimensions)))
+        again = light.permitted(site)
+        assert again.position == pytest.approx(site.position, abs=1e-9)
+        assert again.direction == pytest.approx(site.direction, abs=1e-9)
+        direction, place = (np.array(x, dtype=float) for x in (site.direction, site.position))
+        assert np.linalg.norm(direction) == pytest.approx(1)
+        assert angle(site, start) <= freedom.turn + 1e-4
+        cutoff, beam = np.array([site.cutoff, site.beam], dtype=float)
+        assert beam < cutoff
+        if freedom.within is not None:
+            assert np.linalg.norm(place - (0.5, 1.5, 0.0)) <= freedom.within + 1e-9
+        if freedom.cone is not None:
+            assert freedom.cone[0] <= cutoff <= freedom.cone[1]
+
+
+def test_directions_cover_what_is_permitted_and_nothing_else() -> None:
+    start = Site(position=(0, 1, 0), direction=(0.6, -0.8, 0.0), cutoff=30.0, beam=20.0)
+    light = FreeLight("spot", start, lp.Freedom(aim=50))
+    directions = light.directions(10)
+    cosines = directions @ np.array(start.direction)
+    assert cosines.min() >= np.cos(np.radians(50)) - 1e-12
+    rng = np.random.default_rng(2)
+    anywhere = rng.normal(size=(2000, 3))
+    anywhere /= np.linalg.norm(anywhere, axis=1, keepdims=True)
+    permitted = anywhere[anywhere @ np.array(start.direction) >= np.cos(np.radians(45))]
+    gaps = np.degrees(np.arccos(np.clip((permitted @ directions.T).max(axis=1), -1, 1)))
+    assert gaps.max() < 10
