@@ -18,8 +18,9 @@ from lightpaint.screen import short_repr
 
 
 class LinearProblem:
-    """A linear problem by its sums, with the freedom of the lights: the frozen dataclass adds
-    fields.
+    """A linear problem by its sums, and the freedom of its lights.
+
+    `Problem` and `SummedProblem` are frozen dataclasses with these fields.
 
     equations: M and b of the squares; corrected: the same without the share `noise_removed` of the
     noise, None if none was removed. constraints: on the lights. reduction: the unknowns that these

@@ -43,24 +43,41 @@ def bounds_of(solution: Solution) -> tuple[tuple[Bound, ...], int]:
     equations = problem.with_pull(problem.solved)
     answer = _bounded_answer(solution, equations)
     least = MIN_GAIN * float(solution.equations.target_norm2.sum())
-    active = [h for h in find_active_bounds(answer) if h.estimate > least]
-    active.sort(key=lambda h: -h.estimate)
+    active = [
+        active_bound for active_bound in find_active_bounds(answer) if active_bound.estimate > least
+    ]
+    active.sort(key=lambda active_bound: -active_bound.estimate)
     before, bounds = _relative_objective(problem.solved, answer.w), []
     size = len(answer.reduction.unknowns) // len(answer.reduction.channel_groups)
-    for h in active[: min(max(MAX_UNKNOWNS // max(size, 1), MIN_RELEASED), MAX_RELEASED)]:
-        reduction, x = _release(answer, h)
-        if h.kind == "left out" and reduction.knobs[h.knob].whites is not None:
-            freed = next_whites(equations, reduction, answer.w, only=[h.knob])[1]
+    for active_bound in active[
+        : min(max(MAX_UNKNOWNS // max(size, 1), MIN_RELEASED), MAX_RELEASED)
+    ]:
+        reduction, x = _release(answer, active_bound)
+        if (
+            active_bound.kind == "left out"
+            and reduction.knobs[active_bound.knob].whites is not None
+        ):
+            freed = next_whites(equations, reduction, answer.w, only=[active_bound.knob])[1]
         else:
             freed = solve_reduced(equations, reduction, answer.w, x=x)
         gain = before - _relative_objective(problem.solved, freed.weights)
         if problem.pull is None:
             gain = max(gain, 0.0)  # except for round-off
-        tint = _tint(answer, h, freed.weights)
-        names = tuple(solution.basis.names[k] for k in h.lights)
-        label = answer.full.labels[h.lights[0]]
-        held_by = h.kind if h.kind in ("zero", "kept", "left out") else label
-        bounds.append(Bound(names, h.kind, held_by, gain, h.multiplier, h.per, tint))
+        tint = _tint(answer, active_bound, freed.weights)
+        names = tuple(solution.basis.names[k] for k in active_bound.lights)
+        label = answer.full.labels[active_bound.lights[0]]
+        held_by = active_bound.kind if active_bound.kind in ("zero", "kept", "left out") else label
+        bounds.append(
+            Bound(
+                names,
+                active_bound.kind,
+                held_by,
+                gain,
+                active_bound.multiplier,
+                active_bound.per,
+                tint,
+            )
+        )
     return tuple(sorted(bounds, key=lambda bound: -bound.gain)), len(active) - len(bounds)
 
 
@@ -79,10 +96,10 @@ def _bounded_answer(solution: Solution, equations: NormalEquations) -> BoundedAn
     )
 
 
-def _tint(o: BoundedAnswer, bound: ActiveBound, freed: Doubles) -> Tint:
+def _tint(answer: BoundedAnswer, bound: ActiveBound, freed: Doubles) -> Tint:
     """Return the side of its range of white to which a light goes in weights (n, 3) after
     release."""
-    white_ranges = [knob.whites for knob in o.full.knobs if knob.lights == bound.lights]
+    white_ranges = [knob.whites for knob in answer.full.knobs if knob.lights == bound.lights]
     if bound.kind != "colour" or not white_ranges or (whites := white_ranges[0]) is None:
         return ""
     [green] = whites.greener(freed[list(bound.lights)])
@@ -97,27 +114,29 @@ def _relative_objective(equations: NormalEquations, w: Doubles) -> float:
     return float(quadratic - 2 * np.einsum("ci,ic->", equations.b, w))
 
 
-def _release(o: BoundedAnswer, bound: ActiveBound) -> tuple[Reduction, Doubles]:
+def _release(answer: BoundedAnswer, bound: ActiveBound) -> tuple[Reduction, Doubles]:
     """Return the reduction without one bound, and the answer in its unknowns."""
-    knobs, x = [*o.reduction.knobs], o.optimum.x
+    knobs, x = [*answer.reduction.knobs], answer.optimum.x
     if bound.kind == "left out":
-        knobs[bound.knob] = move_to_best_white(o.full.knobs[bound.knob], o.gradient)
+        knobs[bound.knob] = move_to_best_white(answer.full.knobs[bound.knob], answer.gradient)
     elif bound.kind == "zero":
-        knob, places = knobs[bound.knob], o.reduction.places[bound.knob]
+        knob, places = knobs[bound.knob], answer.reduction.places[bound.knob]
         below = tuple(
             replace(u, lower=-np.inf, upper=0.0) if x[i] == 0 else u
             for u, i in zip(knob.unknowns, places, strict=True)
         )
         knobs[bound.knob] = replace(knob, unknowns=below)
     if bound.kind in ("left out", "zero"):
-        return replace(o.reduction, knobs=tuple(knobs)), x
+        return replace(answer.reduction, knobs=tuple(knobs)), x
     left = [k for k, knob in enumerate(knobs) if not set(knob.lights) & set(bound.lights)]
-    weights = o.reduction.fixed_weights.copy()
+    weights = answer.reduction.fixed_weights.copy()
     weights[list(bound.lights)] = 0
-    freed = [Knob.of_any_colour(k, is_scalar=o.basis.lights[k].is_scalar) for k in bound.lights]
-    values = [x[list(o.reduction.places[k])] for k in left]
-    values += [o.w[k.lights[0], : len(k.unknowns)] for k in freed]
+    freed = [
+        Knob.of_any_colour(k, is_scalar=answer.basis.lights[k].is_scalar) for k in bound.lights
+    ]
+    values = [x[list(answer.reduction.places[k])] for k in left]
+    values += [answer.w[k.lights[0], : len(k.unknowns)] for k in freed]
     released = replace(
-        o.reduction, fixed_weights=weights, knobs=(*(knobs[k] for k in left), *freed)
+        answer.reduction, fixed_weights=weights, knobs=(*(knobs[k] for k in left), *freed)
     )
     return released, np.concatenate(values)

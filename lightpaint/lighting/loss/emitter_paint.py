@@ -32,9 +32,14 @@ DARK_SHARE = 0.01
 NO_IMPORTANCE = 1e-7
 
 
-def dark_threshold(look: Floats, seen: Bools) -> float:
-    """Return the light below which ratios of a picture (h, w, 3) mean nothing. seen: (h, w)."""
-    return DARK_SHARE * float(luminance(look[~seen].mean(axis=0))) if not seen.all() else 0.0
+def dark_threshold(look: Floats, is_emitter: Bools) -> float:
+    """Return the light below which ratios of a picture (h, w, 3) mean nothing.
+
+    is_emitter: (h, w), where an emitter is in view.
+    """
+    if is_emitter.all():
+        return 0.0
+    return DARK_SHARE * float(luminance(look[~is_emitter].mean(axis=0)))
 
 
 def paint_radius(size: tuple[int, int]) -> int:
@@ -46,7 +51,7 @@ def find_glow_paint(
     image: Floats,
     importance: Floats,
     look: Floats,
-    seen: Bools,
+    is_emitter: Bools,
     transform: ViewTransform | None,
     *,
     dark: float,
@@ -57,11 +62,11 @@ def find_glow_paint(
     one; seen: (h, w), where an emitter is. transform: that shows both; None for light itself. dark:
     see `dark_threshold`, of the whole picture, of which these arrays may be a part.
     """
-    painted_emitters = seen & (importance > 0)
+    painted_emitters = is_emitter & (importance > 0)
     if not painted_emitters.any():
         return painted_emitters
-    counts = (importance * ~seen)[..., None]
-    radius = paint_radius(seen.shape)
+    counts = (importance * ~is_emitter)[..., None]
+    radius = paint_radius(is_emitter.shape)
     paint_nearby, painted, now = (
         box_mean(np.maximum(np.asarray(x, np.float64), 0), radius)
         for x in (counts, counts * image, counts * look)

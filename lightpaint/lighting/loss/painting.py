@@ -38,24 +38,26 @@ def literal_squares(
     return Squares(mixed, total, np.where(total > 0, 1 - a / counted, 0))
 
 
-def ignored_paint(target: Target, seen: Bools, emitters: Emitters) -> Bools:
-    """Return, (h, w), the painted pixels that do not count because an emitter is `seen` there.
+def ignored_paint(target: Target, is_emitter: Bools, emitters: Emitters) -> Bools:
+    """Return, (h, w), the painted pixels that do not count because an emitter is in view there.
 
-    seen: (h, w). Emitters count if somebody painted them; otherwise, at unit emission, they would
-    outshine everything that their light falls on.
+    is_emitter: (h, w), where one is. Emitters count if somebody painted them; otherwise, at unit
+    emission, they would outshine everything that their light falls on.
     """
     skips = target.everything if emitters == "auto" else emitters == "skip"
-    return np.asarray(seen & (target.importance > 0) & skips)
+    return np.asarray(is_emitter & (target.importance > 0) & skips)
 
 
-def resolve_importance(target: Target, seen: Bools, emitters: Emitters = "auto") -> Target:
+def resolve_importance(target: Target, is_emitter: Bools, emitters: Emitters = "auto") -> Target:
     """Return `target` with the final importance of each pixel.
 
-    seen, emitters: as in `ignored_paint`.
+    is_emitter, emitters: as in `ignored_paint`.
 
     Raises TargetError if nothing is left.
     """
-    importance = np.where(ignored_paint(target, seen, emitters), np.float32(0), target.importance)
+    importance = np.where(
+        ignored_paint(target, is_emitter, emitters), np.float32(0), target.importance
+    )
     if not importance.any():
         raise TargetError(
             f"target {target.name}: the camera sees an emitter in every painted pixel, so none "

@@ -103,8 +103,8 @@ def solve_reduced(
     reached: Bools = np.ones(lit.shape, dtype=bool) if lit.all() else reduction.determined(lit)
     x = nearest_unknowns(reduction, start, np.any(reached, axis=1)) if x is None else x.copy()
     options: dict[str, Any] = {"method": method, "tolerance": tolerance, "max_sweeps": max_sweeps}
-    left = _move_fixed_to_right(equations, reduction, lit, start)
-    optima = _solve_blocks(left, equations.coupling, reduction, x, options)
+    sides = _move_fixed_to_right(equations, reduction, lit, start)
+    optima = _solve_blocks(sides, equations.coupling, reduction, x, options)
     multipliers, cap_multipliers = np.zeros(x.size), np.zeros(len(reduction.caps))
     residuals, tolerances, sweeps = np.zeros(3), np.full(3, tolerance), [0, 0, 0]
     for block, optimum in zip(reduction.blocks, optima, strict=True):
@@ -154,16 +154,18 @@ def _move_fixed_to_right(
 
 
 def _block_problems(
-    left: tuple[Doubles, Doubles], across: Doubles | None, reduction: Reduction
+    sides: tuple[Doubles, Doubles], coupling: Doubles | None, reduction: Reduction
 ) -> list[ReducedProblem]:
     problems = []
     for block in reduction.blocks:
         lower, upper = reduction.lower[block.unknowns], reduction.upper[block.unknowns]
-        M, b = _block_equations(*left, block)
-        if across is not None:
+        M, b = _block_equations(*sides, block)
+        if coupling is not None:
             p = block.pairs
             np.add.at(
-                M, (p.column, p.other_column), p.value * across[p.light, p.channel, p.other_channel]
+                M,
+                (p.column, p.other_column),
+                p.value * coupling[p.light, p.channel, p.other_channel],
             )
         problems.append(
             ReducedProblem(block.channels, block.unknowns, M, b, lower, upper, block.caps)
@@ -195,15 +197,15 @@ def _block_equations(M: Doubles, b: Doubles, block: Block) -> tuple[Doubles, Dou
 
 
 def _solve_blocks(
-    left: tuple[Doubles, Doubles],
-    across: Doubles | None,
+    sides: tuple[Doubles, Doubles],
+    coupling: Doubles | None,
     reduction: Reduction,
     x: Doubles,
     options: dict[str, Any],
 ) -> list[Optimum]:
     """Solve each block from its part of x; three alike blocks in the same calls."""
     if (alike := reduction.alike_blocks) is not None:
-        (M, b), lights = left, alike.lights
+        (M, b), lights = sides, alike.lights
         if lights is not None:
             M, b = M[:, lights[:, None], lights], b[:, lights]
         begin = x[alike.unknowns]
@@ -213,7 +215,7 @@ def _solve_blocks(
         begin = x[p.unknowns]
         return minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps, start=begin, **options)
 
-    parts = _block_problems(left, across, reduction)
+    parts = _block_problems(sides, coupling, reduction)
     return parallel_map(solve, parts) if len(parts) > 1 else [solve(p) for p in parts]
 
 

@@ -11,7 +11,7 @@ from fnmatch import fnmatchcase
 from lightpaint.errors import SceneError
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light, check_adjustable, keep, tie
-from lightpaint.scene.lights.similar_emitters import alike_groups, without
+from lightpaint.scene.lights.similar_emitters import alike_groups, remove_separated
 from lightpaint.screen import some_names
 from lightpaint.validation import MAX_LISTED, MAX_NAME
 
@@ -77,7 +77,7 @@ def _similar_lights(
             separated.add(pattern)
         elif not any(fnmatchcase(name, pattern) for name in lights):
             separated |= {name for name in inside if fnmatchcase(name, pattern)}
-    return without(similar, separated)
+    return remove_separated(similar, separated)
 
 
 def _with_rest(lights: Sequence[Light], emitters: Sequence[Emitter]) -> tuple[Light, ...]:

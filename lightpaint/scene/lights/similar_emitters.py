@@ -35,15 +35,18 @@ def alike_groups(
         for members in _of_one_size(similar) if not similar[0].belongs_to else [similar]:
             if len(members) > MAX_SEPARATE:
                 stem = members[0].belongs_to or f"{members[0].plugin}_lights"
-                groups[_free(stem, {*taken, *groups})] = tuple(members)
+                groups[_free_name(stem, {*taken, *groups})] = tuple(members)
     return groups
 
 
-def without(
+def remove_separated(
     groups: Mapping[str, Sequence[Emitter]], separated: Collection[str]
 ) -> dict[str, tuple[Emitter, ...]]:
     """Return the groups without the emitters of these names; single ones are dropped."""
-    left = {name: tuple(m for m in its if m.name not in separated) for name, its in groups.items()}
+    left = {
+        name: tuple(emitter for emitter in emitters if emitter.name not in separated)
+        for name, emitters in groups.items()
+    }
     return {name: members for name, members in left.items() if len(members) > 1}
 
 
@@ -65,7 +68,7 @@ def _of_one_size(emitters: Sequence[Emitter]) -> Iterator[list[Emitter]]:
     yield sorted(run, key=lambda emitter: emitter.node)
 
 
-def _free(stem: str, taken: Collection[str]) -> str:
+def _free_name(stem: str, taken: Collection[str]) -> str:
     """Return `stem`, or `stem_2`, `stem_3`, … if it is taken."""
     names = (stem if k == 1 else f"{stem}_{k}" for k in count(1))
     return next(name for name in names if name not in taken)

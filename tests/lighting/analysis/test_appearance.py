@@ -189,7 +189,7 @@ def test_what_counts_of_the_few_pixels_is_what_counts_of_all(make_basis: Any):
     target = _over(look, (slice(None), slice(0, 240)), 0.6)
     solution = solve(basis, target, hold=3.0)
     sample = PixelSample.of(solution)
-    weights = sample.solve((), sample.others)
+    weights = sample.solve((), sample.other_views)
     np.testing.assert_allclose(weights, solution.weights, rtol=2e-3)  # where both solves stop
 
 
@@ -213,7 +213,7 @@ def test_a_weaker_hold_is_the_strongest_that_brings_half(make_basis: Any, stops:
     assert 0 < weaker.hold < 10
     sample = PixelSample.of(solution)
     holds = (weaker.hold, 1.3 * weaker.hold)  # the steps of the search are finer than that
-    brought, less = (sample.share_of(sample.solve((), sample.others, hold=h)) for h in holds)
+    brought, less = (sample.share_of(sample.solve((), sample.other_views, hold=h)) for h in holds)
     assert brought >= 0.5 * hold.share > less
     assert weaker.share == pytest.approx(brought)
     # And it harms less than none would: of the window, which nobody painted.

@@ -101,7 +101,7 @@ def reasons_of(solution: Solution) -> tuple[Reason, ...]:
     the gain of all, they are joint: first the one without which the others gain least.
     """
     sample = PixelSample.of(solution)
-    if not sample.groups or sample.now <= 0:
+    if not sample.groups or sample.present_error <= 0:
         return ()
     everything = sample.share(sample.groups)
     if everything < MIN_SHARE:
@@ -229,7 +229,7 @@ def _weaker_hold(sample: PixelSample, gain: float) -> float:
     hold = float(sample.problem.fit.hold or 0.0)
 
     def is_enough(hold: float) -> bool:
-        return sample.share_of(sample.solve((), sample.others, hold=hold)) >= gain
+        return sample.share_of(sample.solve((), sample.other_views, hold=hold)) >= gain
 
     # Bisection of logarithms between a hold with too too_strong gain and one with enough.
     too_strong, enough = hold, hold * NO_HOLD

@@ -38,14 +38,14 @@ SAMPLE_PIXELS = 2**11
 class PixelSample:
     """A sample of the pixels of all views, each view in one row.
 
-    problem: of all pixels of all views. mine: the index of the analysed view. names: of the views.
+    problem: of all pixels of all views. view_index: of the analysed view. names: of the views.
     weights: (n, 3), the answer.
     """
 
     problem: Problem
     bases: Sequence[Basis]
     targets: Sequence[Target]
-    mine: int
+    view_index: int
     names: tuple[str, ...]
     look: PaintComparison
     weights: Doubles
@@ -58,36 +58,39 @@ class PixelSample:
         """Return a sample of the pixels that `solution`, or the solution it is a part of, met."""
         problem = (solution.whole or solution).problem
         views = _average_blocks(problem.views, problem.block_side)
-        mine = next(k for k, basis in enumerate(problem.views.bases) if basis is solution.basis)
+        view_index = next(
+            k for k, basis in enumerate(problem.views.bases) if basis is solution.basis
+        )
         painted = [(target.importance > 0).ravel() for target in views.targets]
         # One step for all views, so that each keeps its weight.
         total, rest = (sum(int((x == is_it).sum()) for x in painted) for is_it in (True, False))
         steps = max(total // SAMPLE_PIXELS, 1), max(rest // SAMPLE_PIXELS, 1)
         bases, targets = [], []
-        for basis, target, where in zip(views.bases, views.targets, painted, strict=True):
-            its = [
-                np.flatnonzero(x)[::step] for x, step in zip((where, ~where), steps, strict=True)
+        for basis, target, is_painted in zip(views.bases, views.targets, painted, strict=True):
+            chosen = [
+                np.flatnonzero(x)[::step]
+                for x, step in zip((is_painted, ~is_painted), steps, strict=True)
             ]
-            made = _pixel_row(basis, target, np.sort(np.concatenate(its)))
-            bases.append(made[0])
-            targets.append(made[1])
+            sampled = _pixel_row(basis, target, np.sort(np.concatenate(chosen)))
+            bases.append(sampled[0])
+            targets.append(sampled[1])
         sensors = tuple(basis.origin.sensor for basis in views.bases)
         names = tuple(target.name for target in views.targets)
-        alone = Problem.of(bases[mine], targets[mine], fit=problem.fit)
+        alone = Problem.of(bases[view_index], targets[view_index], fit=problem.fit)
         return PixelSample(
             problem,
             bases,
             targets,
-            mine,
+            view_index,
             sensors if len(set(sensors)) == len(sensors) else names,
             PaintComparison.of_problem(alone),
             solution.weights,
         )
 
     @property
-    def others(self) -> Sequence[int]:
+    def other_views(self) -> Sequence[int]:
         """The indices of the other views."""
-        return [k for k in range(len(self.bases)) if k != self.mine]
+        return [k for k in range(len(self.bases)) if k != self.view_index]
 
     @property
     def groups(self) -> tuple[LimitGroup, ...]:
@@ -97,7 +100,7 @@ class PixelSample:
             "hold": bool(fit.hold or fit.unpainted),
             "colors": fit.colors != "free",
             "constraints": bool(self.problem.constraints),
-            "views": bool(self.others),
+            "views": bool(self.other_views),
         }
         return tuple(name for name, is_on in on.items() if is_on)
 
@@ -118,25 +121,25 @@ class PixelSample:
         return np.asarray(gradient / np.where(power > 0, power, 1))
 
     @cached_property
-    def now(self) -> float:
+    def present_error(self) -> float:
         """Loss of the answer over the painted pixels."""
         return self.cost(self.weights)
 
     def cost(self, weights: Doubles) -> float:
         """Return the error of weights (n, 3) over the paint of the view, in the fit."""
         look = self.look
-        return look.mean(look.fit_errors(look.pixels(self.bases[self.mine].mix(weights))))
+        return look.mean(look.fit_errors(look.pixels(self.bases[self.view_index].mix(weights))))
 
     def share_of(self, weights: Doubles) -> float:
         """Return the share of the error that these weights (n, 3) avoid."""
-        return 1 - self.cost(weights) / self.now
+        return 1 - self.cost(weights) / self.present_error
 
     def share(self, without: Collection[LimitGroup], views: Sequence[int] | None = None) -> float:
         """Return that share for the best weights without some groups of reasons.
 
         views: those to release with the group `views`; all others by default. Results are cached.
         """
-        views = self.others if views is None else views
+        views = self.other_views if views is None else views
         key = frozenset(without), tuple(views)
         if key not in self._shares:
             self._shares[key] = self.share_of(self.solve(without, views))
@@ -145,7 +148,7 @@ class PixelSample:
     def share_without(self, kind: ConstraintKind, lights: Collection[int]) -> float:
         """Return that share without one kind of constraint on some lights, by their places."""
         constraints = self.by_light.without(kind, lights)
-        return self.share_of(self.solve((), self.others, constraints=constraints))
+        return self.share_of(self.solve((), self.other_views, constraints=constraints))
 
     def light_names(self, kind: ConstraintKind, lights: Collection[int]) -> tuple[str, ...]:
         """Return names of lights under one kind of constraint; none for kinds that apply to all."""
@@ -157,7 +160,7 @@ class PixelSample:
         """Return names of the views that hold the lights, for the group `views`."""
         if kind != "views":
             return ()
-        views = self.others
+        views = self.other_views
         if len(views) > 1:
             part = self.share(["views"]) / 2
             views = [k for k in views if self.share(["views"], views=[k]) > part] or views

@@ -1,4 +1,4 @@
-"""The freedom about an answer: directions of the weights, and answers to other equations.
+"""The freedom around an answer: directions of the weights, and answers to other equations.
 
 Weights (n, 3) lie flat in a direction, (3 n), channel by channel.
 """
@@ -54,7 +54,7 @@ class ActiveLimits:
 
 @dataclass(frozen=True)
 class BlockFreedom:
-    """The freedom of the unknowns of one block about an answer.
+    """The freedom of the unknowns of one block around an answer.
 
     columns: (3 n, k), the effect of each on the weights, 0 where a light reaches nothing. emitted:
     the same including such lights. free: (k, m), directions without active bounds and caps.
@@ -73,27 +73,31 @@ def block_freedoms(solution: Solution, equations: NormalEquations) -> Iterator[B
     """
     reduction, lit = solution.problem.local_reduction, solution.equations.reached
     x = solve_reduced(equations, reduction, solution.weights).x
-    rows, left = _active_caps(reduction, x)
+    rows, distances = _active_caps(reduction, x)
     for block in reduction.blocks:
         unknowns = block.unknowns
         columns = _columns(reduction, unknowns, lit)
         lower, upper = reduction.lower[unknowns], reduction.upper[unknowns]
-        may = (lower < upper) & columns.any(axis=0)
-        side = np.where(x[unknowns] <= lower, 1, np.where(x[unknowns] >= upper, -1, 0)) * may
-        inside, bound = np.flatnonzero(may & (side == 0)), np.flatnonzero(side)
+        is_movable = (lower < upper) & columns.any(axis=0)
+        side = np.where(x[unknowns] <= lower, 1, np.where(x[unknowns] >= upper, -1, 0)) * is_movable
+        inside, bound = np.flatnonzero(is_movable & (side == 0)), np.flatnonzero(side)
         caps_here = rows[:, unknowns].any(axis=1)
         sums = rows[caps_here][:, unknowns]
         free, lowering = _keep_sums(sums, inside)
         limits = _active_limits(
-            sums, lowering, bound, side, np.concatenate([(upper - lower)[bound], left[caps_here]])
+            sums,
+            lowering,
+            bound,
+            side,
+            np.concatenate([(upper - lower)[bound], distances[caps_here]]),
         )
         yield BlockFreedom(columns, _columns(reduction, unknowns, np.ones_like(lit)), free, limits)
 
 
 def free_directions(solution: Solution) -> list[Doubles]:
-    """Return the free directions about the answer, (3 n, k), for each independent problem."""
+    """Return the free directions around the answer, (3 n, k), for each independent problem."""
     solved = solution.problem.with_pull(solution.problem.solved)
-    return [room.columns @ room.free for room in block_freedoms(solution, solved)]
+    return [freedom.columns @ freedom.free for freedom in block_freedoms(solution, solved)]
 
 
 def solve_for(solution: Solution, equations: NormalEquations) -> Doubles:
@@ -177,14 +181,14 @@ def _active_limits(
     rows, lowering: of the sums, (j, k) and (k, j), see `_keep_sums`. bound: (b,), unknowns at a
     bound. side: (k,), 1 at the lower, -1 at the upper one. room: (b + j,).
     """
-    ways = np.eye(len(side))[:, bound] * side[bound]
-    pushed = rows @ ways
-    for j, b in np.argwhere(pushed != 0):
+    exits = np.eye(len(side))[:, bound] * side[bound]
+    pushes = rows @ exits
+    for j, b in np.argwhere(pushes != 0):
         # Unknowns inside their bounds compensate the effect on the sum.
-        ways[:, b] += lowering[:, j] * pushed[j, b]
-    can_leave = np.isfinite(ways).all(axis=0), np.isfinite(lowering).all(axis=0)
+        exits[:, b] += lowering[:, j] * pushes[j, b]
+    can_leave = np.isfinite(exits).all(axis=0), np.isfinite(lowering).all(axis=0)
     return ActiveLimits(
-        np.hstack([ways[:, can_leave[0]], lowering[:, can_leave[1]]]),
+        np.hstack([exits[:, can_leave[0]], lowering[:, can_leave[1]]]),
         room[np.concatenate(can_leave)],
         bound[can_leave[0]],
         rows[can_leave[1]],

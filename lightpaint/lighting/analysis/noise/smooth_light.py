@@ -1,6 +1,6 @@
 """Equations of many lights from indirect light that is averaged along surfaces.
 
-The more lights share the questions to emitters, the noisier is each plane, and the more of M is
+The more lights share the samples of emitters, the noisier is each plane, and the more of M is
 noise: its bias and its own noise then decide the answer. An average over 5 x 5 pixels
 (`SurfaceFilter`) takes most of both out and changes the sums little. It is linear and the same for
 both halves, so the noise that is left in M is the sum of averaged half differences.
