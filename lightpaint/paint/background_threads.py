@@ -7,6 +7,7 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from threading import Condition, Event, Thread, current_thread, get_native_id
+from typing import Any
 
 from lightpaint.errors import LightpaintError, NothingToUndoError
 from lightpaint.files import first_line
@@ -74,6 +75,47 @@ class ExactSolveLoop:
             except Exception as error:
                 # A bug here must not end the session: the next stroke is answered again.
                 self._report(Notice(text=error_text(error), tone="warn"))
+
+
+class LatestWork:
+    """A thread's loop over the latest of what it is given; what came before is dropped.
+
+    work: done with it. report: receives errors.
+    """
+
+    def __init__(self, work: Callable[[Any], None], report: Callable[[Message], None]) -> None:
+        self._work, self._report = work, report
+        self._condition = Condition()
+        self._latest: Any = None
+        self._is_open = True
+
+    def give(self, latest: Any) -> None:
+        """Replace what is worked on next. None is nothing."""
+        with self._condition:
+            self._latest = latest
+            self._condition.notify_all()
+
+    def stop(self) -> None:
+        """End the loop."""
+        with self._condition:
+            self._is_open = False
+            self._condition.notify_all()
+
+    def run(self) -> None:
+        """Work on what is given, until `stop` or an error."""
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: self._latest is not None or not self._is_open)
+                if not self._is_open:
+                    return
+                latest, self._latest = self._latest, None
+            try:
+                self._work(latest)
+            except StoppedError:
+                return
+            except Exception as error:
+                self._report(Notice(text=error_text(error), tone="warn"))
+                return
 
 
 class UnsavedRetry:

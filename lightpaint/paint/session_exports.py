@@ -110,7 +110,7 @@ def _write_report(
         # The scenes are already on their film, and the bases have their samples.
         spp = bases[0].origin.spp if settings.checks_as_basis else settings.spp
         rendered: dict[str, Any] = {"resolution": None, "quality": None, "time_s": None, "spp": spp}
-        settings = replace(settings, **rendered)
+        settings = replace(settings, **rendered, error=None)
         job = Job(scenes, targets, answer, None, constraints, settings, by_sensor=True)
     else:
         raise PaintError("a report of several saved bases needs their scene: open that instead")

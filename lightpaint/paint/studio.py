@@ -18,11 +18,13 @@ from lightpaint.basis.denoised_planes import DenoisedPlanes
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
 from lightpaint.paint.background_jobs import BackgroundJobs
 from lightpaint.paint.background_threads import (
     BackgroundThreads,
     ExactSolveLoop,
+    LatestWork,
     StoppedError,
     UnsavedRetry,
     error_text,
@@ -52,6 +54,7 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
+from lightpaint.paint.subject_samples import add_round
 from lightpaint.progress import cancellable
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
@@ -100,6 +103,7 @@ class Studio:
             use_cache=self.subjects[0].settings.use_cache,
         )
         self._solve_loop = ExactSolveLoop(self._solve_exactly, self.publish)
+        self._sampling = LatestWork(self._add_samples, self.publish)
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
         self._threads = BackgroundThreads(self.publish)
         self._jobs = BackgroundJobs(self, self._threads)
@@ -136,6 +140,7 @@ class Studio:
         """End the session; all work is kept, even a stroke whose end never arrived."""
         self._is_open = False
         self._solve_loop.stop()
+        self._sampling.stop()
         self._write_retry.stop()
         with self._lock:
             if self._session is not None:
@@ -296,6 +301,8 @@ class Studio:
                     self._denoiser.denoise(self.session.views)
             self.publish(ProgressReport(what="basis", done=1, total=1, unit=""))
             self._denoiser.write_cache()
+            if self._adds_samples:
+                self._sampling.run()
         except StoppedError:
             pass
         except Exception as error:
@@ -383,6 +390,25 @@ class Studio:
             analyses = analyse(solution)
             judgement_ = judge(analyses, snapshot.painted_views)
             self._publish_answer(lambda: session.accept_solution(snapshot, solution, judgement_))
+            if self._adds_samples:
+                self._sampling.give((snapshot, solution))
+
+    @property
+    def _adds_samples(self) -> bool:
+        """True if samples are added where the newest paint needs them."""
+        return self.has_scenes and self.subjects[0].settings.error is not None
+
+    def _add_samples(self, answer: tuple[SessionSnapshot, Solution]) -> None:
+        """Add a round of samples where the newest paint needs them, until the brush moves."""
+        snapshot, solution = answer
+
+        def is_outdated() -> bool:
+            return not self._is_open or self.session.version != snapshot.version
+
+        if not is_outdated():
+            bases = add_round(self.subjects, snapshot, solution, is_enough=is_outdated)
+            if bases is not None:
+                self._use_bases(bases)
 
     def _publish_answer(self, make: Callable[[], AnswerUpdate | None]) -> None:
         def remember() -> AnswerUpdate | None:

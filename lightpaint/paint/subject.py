@@ -95,7 +95,9 @@ class Subject:
         # Imported here: a basis that exists needs no renderer.
         from lightpaint.pipeline.job_bases import obtain
 
-        scene, settings, target_spp = self.loaded_scene, self.settings, self.target_spp or 1
+        # Further samples for an error follow the paint.
+        settings = replace(self.settings, error=None)
+        scene, target_spp = self.loaded_scene, self.target_spp or 1
         cached = cache.find(scene.identity, sensor_name(scene), settings.seed, scene.size)
         done_spp = 0 if cached is None or not settings.use_cache else cached.origin.spp
         if settings.use_cache and settings.time_s is None:

@@ -38,12 +38,20 @@ ROUND_SIZES, AIM = (1 / 8, 1 / 4, 1 / 2, 1), 0.8
 
 
 @dataclass(frozen=True)
-class State:
+class Certainty:
     """An answer and its errors. light: the least sure one. errors: (n,), as `picture_errors`."""
 
     solution: Solution
     light: str
     errors: Doubles
+
+    @classmethod
+    def of(cls, solution: Solution) -> "Certainty":
+        """Return that of a solution whose basis knows its noise."""
+        uncertainty = error_bars(solution)
+        assert uncertainty is not None
+        errors = picture_errors(solution.basis, uncertainty)
+        return cls(solution, solution.basis.names[int(np.argmax(errors))], errors)
 
     @property
     def error(self) -> float:
@@ -78,7 +86,7 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
 
     before = [basis.origin.mean_spp for basis in bases]
     for _ in range(MAX_ROUNDS):
-        state = _state(job, bases)
+        state = Certainty.of(without_noise(job, solution_of(problem_of(job, bases))))
         most = max(basis.origin.mean_spp for basis in bases)
         if state.error <= settings.error or is_over() or most >= MAX_SPP:
             break
@@ -96,15 +104,7 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
     return bases
 
 
-def _state(job: Job, bases: Sequence[Basis]) -> State:
-    solution = without_noise(job, solution_of(problem_of(job, bases)))
-    uncertainty = error_bars(solution)
-    assert uncertainty is not None
-    errors = picture_errors(solution.basis, uncertainty)
-    return State(solution, solution.basis.names[int(np.argmax(errors))], errors)
-
-
-def _text(state: State, bases: Sequence[Basis]) -> str:
+def _text(state: Certainty, bases: Sequence[Basis]) -> str:
     """Return how sure the lights are, after how many samples."""
     mean = sum(basis.origin.mean_spp for basis in bases) / len(bases)
     extra = sum(basis.origin.extra_spp for basis in bases) / len(bases)
@@ -120,7 +120,7 @@ def _spoken(samples: float) -> str:
     return f"{samples:.2g}" if samples < 10 else f"{samples:.0f}"
 
 
-def aims_of(state: State) -> Doubles:
+def aims_of(state: Certainty) -> Doubles:
     """Return the directions of the weights whose errors are to fall, (n, 3 n), channel by channel.
 
     Each is the error of a light as `picture_errors` counts it, times itself: so the largest error
@@ -135,7 +135,7 @@ def aims_of(state: State) -> Doubles:
     return aims.reshape(n, -1)
 
 
-def needed_counts(state: State, bases: Sequence[Basis], error: float) -> list[Indices]:
+def needed_counts(state: Certainty, bases: Sequence[Basis], error: float) -> list[Indices]:
     """Return the samples to add to each half of each pixel of each view, (h, w) each."""
     views, solution = state.solution.problem.views, state.solution
     variances = pixel_variances(solution, aims_of(state))
@@ -166,7 +166,7 @@ def _half_samples(basis: Basis) -> Doubles:
 def _topped_up(
     job: Job,
     bases: Sequence[Basis],
-    state: State,
+    state: Certainty,
     is_over: Callable[[], bool],
     listen: Listener,
 ) -> list[Basis]:

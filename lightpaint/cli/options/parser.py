@@ -166,6 +166,7 @@ def _paint(parser: argparse.ArgumentParser) -> None:
     add_pattern(parser)
     add_constraints(parser)
     add_budget(parser)
+    add_error(parser)
     add_cache(parser)
     add_view(parser, several=True)
     # The parser is kept for the command that answers exported paintings.

@@ -1,0 +1,165 @@
+"""What samples where a painting needs them are worth, against as many in all pixels.
+
+    python benchmarks/top_up.py [--paintings evening morning] [--error 0.03] [--seeds 6]
+
+For each seed the gallery, at a quarter of its size, is solved twice: by a pilot and further samples
+where they are needed, until the largest error of a light is told to be as small as asked for, and
+by as many samples in all pixels. Errors are those of the lights against a long render, in luminance
+summed over the picture: the mean over lights by their share of it, and that of the worst light over
+what it does or, if that is more, 5 % of the picture's light. Times are seconds of the processor for
+render, solves and error bars, kernels compiled. `gain` is how many times less squared mean error
+the samples where they are needed have at equal time; `bias` is the largest mean error of a light
+over the seeds, in standard errors of that mean; `held`, how many of the intervals hold.
+"""
+
+import argparse
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint import (
+    Basis,
+    Job,
+    Scene,
+    Settings,
+    Target,
+    load_scene,
+    read_basis,
+    read_target,
+    render_basis,
+    write_basis,
+)
+from lightpaint.colour.color import LUMINANCE
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
+from lightpaint.pipeline.needed_samples import add_needed_samples, without_noise
+from lightpaint.pipeline.settings import PILOT_SPP
+from lightpaint.progress import listener, silent
+from lightpaint.report.measures import LEAST_SHARE, picture_errors
+
+REPOSITORY = Path(__file__).parent.parent
+
+#: Seed of the long render, and size of the film.
+LONG_SEED, REDUCTION = 90_000, 4
+
+#: Characters of a column.
+WIDTHS = (8, 8, 11, 10, 8, 8)
+
+
+@dataclass
+class Runs:
+    """Answers of some seeds. errors: of each light, (n,), over its scale. told: their bounds."""
+
+    mean: list[float] = field(default_factory=list)
+    errors: list[npt.NDArray[np.float64]] = field(default_factory=list)
+    told: list[npt.NDArray[np.float64]] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    spp: list[float] = field(default_factory=list)
+
+    def row(self) -> str:
+        """Return the figures of a line."""
+        errors, count = np.array(self.errors), len(self.errors)
+        worst = np.sqrt(np.square(errors).mean(axis=0)).max()
+        bias = np.abs(errors.mean(axis=0) / (errors.std(axis=0, ddof=1) / np.sqrt(count))).max()
+        held = (np.abs(errors) <= np.array(self.told)).mean()
+        return (
+            f"{np.mean(self.spp):8.0f}{np.mean(self.seconds):8.1f}{100 * np.mean(self.mean):9.2f} %"
+            f"{100 * worst:8.1f} %{bias:8.1f}{held:8.2f}"
+        )
+
+    @property
+    def cost(self) -> float:
+        """Squared mean error times seconds."""
+        return float(np.mean(np.square(self.mean)) * np.mean(self.seconds))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--paintings", nargs="+", default=["evening", "morning"])
+    parser.add_argument("--error", type=float, default=0.03)
+    parser.add_argument("--seeds", type=int, default=6)
+    parser.add_argument("--long-spp", type=int, default=1024)
+    parser.add_argument("--keep", type=Path, metavar="FOLDER")
+    options = parser.parse_args()
+    scene = load_scene(REPOSITORY / "scenes" / "gallery" / "scene.xml").reduced(f"1/{REDUCTION}")
+    with tempfile.TemporaryDirectory() as folder:
+        truth = long_render(scene, options.long_spp, options.keep or Path(folder))
+        names = ("spp", "CPU s", "mean", "worst", "bias", "held")
+        print(f"{'':34s}" + "".join(f"{x:>{w}s}" for x, w in zip(names, WIDTHS, strict=True)))
+        for name in options.paintings:
+            compare(name, scene, truth, options, Path(folder))
+
+
+def long_render(scene: Scene, spp: int, keep: Path) -> Basis:
+    """Return the basis that errors are measured against, kept for the next run."""
+    path = keep / f"gallery_{REDUCTION}_{spp}.basis.exr"
+    if not path.is_file():
+        keep.mkdir(parents=True, exist_ok=True)
+        write_basis(path, render_basis(scene, spp=spp, seed=LONG_SEED))
+    return read_basis(path)
+
+
+def compare(
+    name: str, scene: Scene, truth: Basis, options: argparse.Namespace, folder: Path
+) -> None:
+    """Measure one painting."""
+    target = painting(name)
+    best = without_noise(_job(scene, target, options, 0, folder), _solution(truth, target))
+    light = (truth.totals * best.weights) @ LUMINANCE
+    scale = np.maximum(light, LEAST_SHARE * light.sum())
+    where, everywhere = Runs(), Runs()
+    for seed in range(1, options.seeds + 1):
+        job = _job(scene, target, options, seed, folder)
+
+        def top_up(job: Job = job, seed: int = seed) -> Basis:
+            pilot = render_basis(scene, spp=PILOT_SPP, seed=seed)
+            return add_needed_samples(job, [pilot], listener(silent))[0]
+
+        def spread(seed: int = seed) -> Basis:
+            return render_basis(scene, spp=round(where.spp[-1]), seed=seed)
+
+        for runs, make in ((where, top_up), (everywhere, spread)):
+            begin_s = time.process_time()
+            basis = make()
+            solution = without_noise(job, _solution(basis, target))
+            bars = error_bars(solution)
+            runs.seconds.append(time.process_time() - begin_s)
+            assert bars is not None
+            missed = ((solution.weights - best.weights) * truth.totals) @ LUMINANCE
+            runs.mean.append(float(np.abs(missed).sum() / light.sum()))
+            runs.errors.append(missed / scale)
+            runs.told.append(picture_errors(basis, bars))
+            runs.spp.append(basis.origin.mean_spp)
+    title = f"{name}, asked for {100 * options.error:g} %"
+    print(f"{title:34s}")
+    print(f"{'  where they are needed':34s}{where.row()}")
+    print(f"{'  in all pixels':34s}{everywhere.row()}")
+    print(f"  gain {everywhere.cost / where.cost:.1f}x", flush=True)
+
+
+def painting(name: str) -> Target:
+    """Read a shipped painting at the size of the film."""
+    folder = REPOSITORY / "targets" / "gallery"
+    mask = folder / f"{name}.mask.exr"
+    its = read_target(folder / f"{name}.exr", mask=mask if mask.is_file() else None)
+    return its.reduced(REDUCTION)
+
+
+def _job(scene: Scene, target: Target, options: argparse.Namespace, seed: int, to: Path) -> Job:
+    settings = Settings(error=options.error, seed=seed, use_cache=False)
+    return Job((scene,), (target,), to / "out", settings=settings)
+
+
+def _solution(basis: Basis, target: Target) -> Solution:
+    return solution_of(Problem.of(basis, target))
+
+
+if __name__ == "__main__":
+    main()

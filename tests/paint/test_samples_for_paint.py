@@ -1,0 +1,111 @@
+"""Samples that are added in the background, where the newest paint needs them."""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import LIGHTS, write_room
+
+from lightpaint.basis.render import guide_training
+from lightpaint.paint import protocol
+from lightpaint.paint.background_threads import LatestWork
+from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.paint.subject_samples import add_round
+from lightpaint.pipeline.needed_samples import Certainty
+from lightpaint.pipeline.settings import Settings
+from lightpaint.scene.scene_reader import load_scene
+
+
+@pytest.fixture
+def subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Subject:
+    """A room of two lights, whose paint is to be answered to a tenth."""
+    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    room = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["sun"])
+    settings = Settings(error=0.1)
+    return Subject(str(room), tmp_path, scene=load_scene(room), settings=settings)
+
+
+def wait(is_so: Callable[[], Any], seconds: float = 120) -> None:
+    until = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def paint(studio: Studio, stroke: int, light: tuple[float, float, float]) -> None:
+    arrays = {
+        "image": np.broadcast_to(np.float32(light), (6, 8, 3)).copy(),
+        "importance": np.ones((6, 8), np.float32),
+    }
+    studio.handle(protocol.Paint(stroke, (9, 15, 4, 12), True), arrays)
+
+
+def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
+    studio = Studio([subject], MemoryStore)
+    studio.start()
+    try:
+        wait(lambda: studio.store is not None)
+        paint(studio, 1, (0.5, 0.3, 0.2))
+
+        def is_sure() -> bool:
+            snapshot = studio.snapshot()
+            solution = snapshot.solution()
+            extra = snapshot.bases[0].origin.extra_spp
+            return extra > 0 and Certainty.of(solution).error <= 0.1
+
+        wait(is_sure)
+        basis = studio.snapshot().bases[0]
+        # Most of them are where the paint is.
+        where = np.zeros(basis.size, bool)
+        where[9:15, 4:12] = True
+        assert basis.extra[where].mean() > 2 * basis.extra[~where].mean()
+        # Nothing more is taken then.
+        time.sleep(1)
+        assert studio.snapshot().bases[0].origin == basis.origin
+    finally:
+        studio.close()
+        studio.wait()
+
+
+def test_a_round_gives_way_to_the_brush(subject: Subject):
+    studio = Studio([subject], MemoryStore)
+    studio.start()
+    try:
+        wait(lambda: studio.store is not None)
+        paint(studio, 1, (0.5, 0.3, 0.2))
+        snapshot = studio.snapshot()
+        solution = snapshot.solution()
+        assert add_round([subject], snapshot, solution, is_enough=lambda: True) is None
+    finally:
+        studio.close()
+        studio.wait()
+
+
+def test_only_the_latest_is_worked_on():
+    seen: list[int] = []
+    begun, may_go_on = threading.Event(), threading.Event()
+
+    def work(which: int) -> None:
+        seen.append(which)
+        begun.set()
+        may_go_on.wait(10)
+
+    loop = LatestWork(work, lambda _: None)
+    thread = threading.Thread(target=loop.run)
+    thread.start()
+    loop.give(1)
+    begun.wait(10)
+    loop.give(2)
+    loop.give(3)
+    may_go_on.set()
+    wait(lambda: len(seen) == 2)
+    loop.stop()
+    thread.join(10)
+    assert seen == [1, 3]
