@@ -34,7 +34,7 @@ MAX_ROUNDS = 20
 
 #: Parts of the samples so far that a round may add, and the part of the squared error that is asked
 #: for to which the one that is taken is expected to lead.
-ROUND_SIZES, AIM = (1 / 8, 1 / 4, 1 / 2, 1), 0.8
+ROUND_SIZES, AIM = (1 / 4, 1 / 2, 1), 0.7
 
 
 @dataclass(frozen=True)
