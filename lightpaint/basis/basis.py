@@ -63,7 +63,10 @@ class Origin:
     def __post_init__(self) -> None:
         if not 0 <= self.extra_spp <= MAX_SAMPLES:
             raise BasisError(f"{self.extra_spp} extra samples are not 0 or more")
-        if max(max(own) for own in (self.halves, self.passes, *self.each_light)) > MAX_SAMPLES:
+        if (
+            max(max(counts) for counts in (self.halves, self.passes, *self.each_light))
+            > MAX_SAMPLES
+        ):
             raise BasisError(f"{self.halves} samples are more than any render has")
 
     @property
@@ -159,11 +162,11 @@ class Basis(Shown):
         n = len(self.lights)
         object.__setattr__(self, "lights", Lights.of(self.lights))
         for name in ("planes", "noise"):
-            given = getattr(self, name)
-            shape = given.shape if isinstance(given, np.ndarray) else (given.count, *given.size, 3)
+            value = getattr(self, name)
+            shape = value.shape if isinstance(value, np.ndarray) else (value.count, *value.size, 3)
             if len(shape) != 4 or shape[0] != n or shape[3] != 3:
                 raise BasisError(f"images of shape {shape} for {n} lights: need (n, h, w, 3)")
-            object.__setattr__(self, name, as_planes(given))
+            object.__setattr__(self, name, as_planes(value))
         if self.noise.size != self.planes.size:
             raise BasisError("half differences and images differ in shape")
         if self.emitters_seen.shape != self.size:
@@ -188,8 +191,8 @@ class Basis(Shown):
         samples = f"{origin.spp} spp" if self.knows_noise else "noise unknown"
         if origin.extra_spp:
             samples += f" and {origin.extra_spp:.3g} in the mean"
-        about = f"{len(self.lights)} lights, {width}x{height}, {samples}, of {origin.scene}"
-        return f"Basis({about}: {some_of(self.names, room=400)})"
+        summary = f"{len(self.lights)} lights, {width}x{height}, {samples}, of {origin.scene}"
+        return f"Basis({summary}: {some_of(self.names, room=400)})"
 
     def to_dataframe(self) -> Any:
         """Return a pandas.DataFrame with a row for each light, by its name.
@@ -346,11 +349,11 @@ class Basis(Shown):
         # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
         # is as exact as the sum, and needs no copy of the basis.
         for start in range(0, counted.size, BLOCK_PIXELS):
-            its = counted[start : start + BLOCK_PIXELS]
+            weights = counted[start : start + BLOCK_PIXELS]
             block = self.planes.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
-            totals += np.ones(its.size) @ block
+            totals += np.ones(weights.size) @ block
             block *= block
-            power += its @ block
+            power += weights @ block
         return power, totals
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
@@ -365,12 +368,12 @@ class Basis(Shown):
         The last one is kept: an analysis and a report of the same weights ask for it many times.
         """
         key = np.asarray(weights, np.float64).tobytes()
-        found = self._predicted.get(key)
-        if found is None:
-            found = Estimate(read_only(self.mix(weights)), read_only(self.noise.mix(weights)))
+        estimate = self._predicted.get(key)
+        if estimate is None:
+            estimate = Estimate(read_only(self.mix(weights)), read_only(self.noise.mix(weights)))
             self._predicted.clear()
-            self._predicted[key] = found
-        return found
+            self._predicted[key] = estimate
+        return estimate
 
     @cached_property
     def _predicted(self) -> dict[bytes, Estimate]:
@@ -385,12 +388,12 @@ def meter_exposure(image: Floats, *bases: Basis) -> float:
     """
     if not all(basis.knows_noise for basis in bases):
         return choose_exposure(image)
-    seen = [basis.emitters_seen.ravel() for basis in bases]
-    return choose_exposure(image, np.concatenate(seen).reshape(image.shape[:2]))
+    is_emitter = [basis.emitters_seen.ravel() for basis in bases]
+    return choose_exposure(image, np.concatenate(is_emitter).reshape(image.shape[:2]))
 
 
-def free_name(name: str, taken: Collection[str]) -> str:
+def free_name(name: str, used: Collection[str]) -> str:
     """Return `name`, with underscores added while another light has it."""
-    while name in taken:
+    while name in used:
         name += "_"
     return name

@@ -86,8 +86,8 @@ def _read(path: Path) -> Basis | None:
 def cached_spp(scene_identity: str, sensor: str, seed: int, size: tuple[int, int]) -> int:
     """Return the samples per pixel of the cached basis for these arguments; 0 if there is none."""
     path = _path(scene_identity, sensor, seed, size)
-    kept = _entry(path).origin if is_own(path) else None
-    return 0 if kept is None else kept.spp
+    origin = _entry(path).origin if is_own(path) else None
+    return 0 if origin is None else origin.spp
 
 
 def find_most_sampled(
@@ -97,17 +97,18 @@ def find_most_sampled(
 
     samples: of all pixels together, that it has at least. largest: bytes of its file, at most.
     """
-    found: list[tuple[int, Origin, tuple[int, int]]] = []
+    candidates: list[tuple[int, Origin, tuple[int, int]]] = []
     for entry in entries():
-        of, size = entry.origin, entry.image_size
-        if of is None or size is None or entry.size > largest:
+        origin, size = entry.origin, entry.image_size
+        if origin is None or size is None or entry.size > largest:
             continue
-        taken = size[0] * size[1] * of.spp
-        if (of.scene_identity, of.sensor) == (scene_identity, sensor) and taken >= samples:
-            found.append((taken, of, size))
-    if not found:
+        count = size[0] * size[1] * origin.spp
+        is_same = (origin.scene_identity, origin.sensor) == (scene_identity, sensor)
+        if is_same and count >= samples:
+            candidates.append((count, origin, size))
+    if not candidates:
         return None
-    _, origin, size = max(found, key=lambda one: one[0])
+    _, origin, size = max(candidates, key=lambda candidate: candidate[0])
     return find(scene_identity, sensor, origin.seed, size)
 
 
@@ -181,8 +182,10 @@ def companion_path(basis: Basis, ending: str) -> Path:
 def is_cached(basis: Basis) -> bool:
     """Return True if `basis`, or the same with more samples, is in the cache."""
     path = _path_of(basis)
-    kept = _entry(path).origin if is_own(path) else None
-    return kept is not None and (kept == basis.origin or kept.mean_spp > basis.origin.mean_spp)
+    origin = _entry(path).origin if is_own(path) else None
+    return origin is not None and (
+        origin == basis.origin or origin.mean_spp > basis.origin.mean_spp
+    )
 
 
 def _prune(path: Path) -> None:
@@ -198,8 +201,8 @@ def _prune(path: Path) -> None:
             continue
         rest -= entry.size
         if rest < 0:
-            for gone in (*companions_of(entry.path), entry.path):
-                gone.unlink(missing_ok=True)
+            for file in (*companions_of(entry.path), entry.path):
+                file.unlink(missing_ok=True)
 
 
 def _is_leftover(path: Path) -> bool:
@@ -212,8 +215,8 @@ def _is_leftover(path: Path) -> bool:
 
 def entries() -> list[Entry]:
     """Return all entries of the cache, the longest unused first."""
-    there = [path for path in folder().glob(f"*{SUFFIX}") if BASIS_NAME.fullmatch(path.name)]
-    files = sorted(filter(is_own, there), key=lambda path: path.stat().st_mtime)
+    basis_files = [path for path in folder().glob(f"*{SUFFIX}") if BASIS_NAME.fullmatch(path.name)]
+    files = sorted(filter(is_own, basis_files), key=lambda path: path.stat().st_mtime)
     return [_entry(path) for path in files]
 
 
@@ -225,13 +228,13 @@ def entries_named(pattern: str) -> list[Entry]:
     return [entry for entry in entries() if any(fnmatchcase(x, pattern) for x in _names(entry))]
 
 
-def delete_entries(kept: Iterable[Entry]) -> int:
+def delete_entries(dropped: Iterable[Entry]) -> int:
     """Delete these. Returns how many bytes that freed."""
     freed = 0
-    for entry in kept:
+    for entry in dropped:
         try:
-            for gone in (*companions_of(entry.path), entry.path):
-                gone.unlink(missing_ok=True)
+            for file in (*companions_of(entry.path), entry.path):
+                file.unlink(missing_ok=True)
         except OSError as error:
             raise OutputError(f"cannot delete {entry.path}: {error.strerror or error}") from error
         freed += entry.size
@@ -262,5 +265,5 @@ def _entry(path: Path) -> Entry:
         origin, image_size, identities = read_origin(path)
     except LightpaintError:
         return Entry(path, size, None)
-    known = frozenset(identities) - {""}
-    return Entry(path, size, origin, image_size, len(identities), known)
+    known_identities = frozenset(identities) - {""}
+    return Entry(path, size, origin, image_size, len(identities), known_identities)

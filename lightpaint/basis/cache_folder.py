@@ -62,13 +62,13 @@ def folder() -> Path:
     Raises OutputError for a folder that LIGHTPAINT_CACHE names and that has other files in it, not
     having been made, or begun, for this.
     """
-    named = os.environ.get(VARIABLE)
-    if not named:
+    named_folder = os.environ.get(VARIABLE)
+    if not named_folder:
         return user_cache_path("lightpaint") / "bases"
-    path = Path(named)
-    if others := _foreign_names(path):
+    path = Path(named_folder)
+    if foreign := _foreign_names(path):
         raise OutputError(
-            f"{VARIABLE} names {path}, which has other files in it ({some_names(others)}): name a "
+            f"{VARIABLE} names {path}, which has other files in it ({some_names(foreign)}): name a "
             "folder that is new or empty, where bases may be kept and deleted"
         )
     return path
@@ -89,21 +89,21 @@ def is_own(path: Path) -> bool:
     try:
         # What belongs to somebody else may be a link, or a pipe that never ends.
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as f:
-            its = os.fstat(f.fileno())
-            return is_trusted_owner(its) and MARKS[ending] in f.read(MARK_WITHIN[ending])
+            status = os.fstat(f.fileno())
+            return is_trusted_owner(status) and MARKS[ending] in f.read(MARK_WITHIN[ending])
     except OSError:
         return False
 
 
-def is_trusted_owner(its: os.stat_result) -> bool:
+def is_trusted_owner(status: os.stat_result) -> bool:
     """Return whether a file or folder belongs to who runs this, or to who runs the machine."""
-    return not hasattr(os, "geteuid") or its.st_uid in (os.geteuid(), 0)
+    return not hasattr(os, "geteuid") or status.st_uid in (os.geteuid(), 0)
 
 
 def companions_of(path: Path) -> list[Path]:
     """Return the data derived from the basis at `path`."""
     name = path.name.removesuffix(SUFFIX)
-    return [other for other, its in _companions() if its == name]
+    return [companion for companion, stem in _companions() if stem == name]
 
 
 def delete_orphans(unused_s: float = 0.0) -> int:
@@ -111,18 +111,18 @@ def delete_orphans(unused_s: float = 0.0) -> int:
     freed = 0
     for path, name in _companions():
         with suppress(OSError):
-            its = path.stat()
+            status = path.stat()
             is_alone = not path.with_name(name + SUFFIX).exists()
-            if is_alone and time.time() - its.st_mtime >= unused_s:
+            if is_alone and time.time() - status.st_mtime >= unused_s:
                 path.unlink()
-                freed += its.st_size
+                freed += status.st_size
     return freed
 
 
 def _companions() -> list[tuple[Path, str]]:
     """Return data derived from bases, with the stem of each basis."""
-    found = ((path, COMPANION_NAME.fullmatch(path.name)) for path in folder().glob("*"))
-    return [(path, match[1]) for path, match in found if match is not None and is_own(path)]
+    matches = ((path, COMPANION_NAME.fullmatch(path.name)) for path in folder().glob("*"))
+    return [(path, match[1]) for path, match in matches if match is not None and is_own(path)]
 
 
 def _foreign_names(path: Path) -> list[str]:
@@ -130,14 +130,14 @@ def _foreign_names(path: Path) -> list[str]:
     with suppress(OSError):
         if "created by lightpaint" in (path / TAG).read_text("utf-8", "replace")[:1000]:
             return []
-    found: list[str] = []
+    names: list[str] = []
     with suppress(OSError):
         for name in _names_in(path):
             if not (name.startswith(".") or _is_own_name(name)):
-                found.append(name)
-            if len(found) == NAMES_SHOWN:
+                names.append(name)
+            if len(names) == NAMES_SHOWN:
                 break
-    return found
+    return names
 
 
 def _is_own_name(name: str) -> bool:

@@ -47,8 +47,8 @@ class Checksums:
 
         Raises BasisError if a light is gone, or one is there that was not written with them.
         """
-        if gone := [name for name in self.lights if name not in names]:
-            raise BasisError(f"has lost the light {one_line(gone[0])!r}: make it again")
+        if missing := [name for name in self.lights if name not in names]:
+            raise BasisError(f"has lost the light {one_line(missing[0])!r}: make it again")
         if new := [name for name in names if name not in self.lights]:
             raise BasisError(
                 f"has the light {one_line(new[0])!r}, which was not written with the others: take "
@@ -70,11 +70,11 @@ def checksum(text: str, channels: Channels) -> str:
     return f"{crc:08x}"
 
 
-def check(want: str, what: str, text: str, channels: Channels) -> None:
+def check(expected: str, part: str, text: str, channels: Channels) -> None:
     """Raise BasisError unless text and pixels are those that were written."""
-    if checksum(text, channels) == want:
+    if checksum(text, channels) == expected:
         return
     raise BasisError(
-        f"has a changed {what}: it is not as it was written, so another program has edited or "
+        f"has a changed {part}: it is not as it was written, so another program has edited or "
         "converted the file; take the original, or make it again with lightpaint basis"
     )

@@ -164,16 +164,16 @@ def obtain_denoised_planes(
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
         return None
-    found = read_denoised_planes(basis)
-    if found is None and pixels <= most:
+    planes = read_denoised_planes(basis)
+    if planes is None and pixels <= most:
         halves, scales = np.empty(_shape(basis), np.float16), np.ones(len(basis.lights))
         for k in range(len(basis.lights)):
             halves[k], scales[k] = denoise_to_halves(basis, k)
             if progress is not None:
                 progress(k + 1, len(basis.lights))
-        found = DenoisedPlanes.of(basis, halves, scales)
-        cache_denoised_planes(basis, found)
-    return found
+        planes = DenoisedPlanes.of(basis, halves, scales)
+        cache_denoised_planes(basis, planes)
+    return planes
 
 
 def denoise_to_halves(basis: Basis, k: int) -> tuple[Halves, float]:
@@ -188,16 +188,16 @@ def read_denoised_planes(basis: Basis) -> DenoisedPlanes | None:
         path = cache.companion_path(basis, DENOISED_SUFFIX)
         if not is_own(path):
             return None
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
-            if str(kept["made_of"]) != _content_key(basis):
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as file_arrays:
+            if str(file_arrays["made_of"]) != _content_key(basis):
                 return None
-            found = DenoisedPlanes(*(kept[name] for name in ARRAY_NAMES))
-        its = [getattr(found, name) for name in ARRAY_NAMES]
+            planes = DenoisedPlanes(*(file_arrays[name] for name in ARRAY_NAMES))
+        arrays = [getattr(planes, name) for name in ARRAY_NAMES]
         shapes = [_shape(basis), (len(basis.lights),), _shape(basis)[1:]]
         types = ["float16", "float64", "float32"]
-        if [x.shape for x in its] == shapes and [x.dtype.name for x in its] == types:
+        if [x.shape for x in arrays] == shapes and [x.dtype.name for x in arrays] == types:
             path.touch()
-            return found
+            return planes
     return None
 
 
@@ -215,10 +215,10 @@ def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
 
 
 def _mixed(halves: Halves, scales: Doubles, weights: Doubles) -> Floats:
-    own = weights * scales[:, None]
+    scaled_weights = weights * scales[:, None]
 
     def strip(top: int) -> Floats:
-        return mix(halves[:, top : top + STRIP_ROWS].astype(np.float32), own)
+        return mix(halves[:, top : top + STRIP_ROWS].astype(np.float32), scaled_weights)
 
     return np.concatenate(parallel_map(strip, range(0, halves.shape[1], STRIP_ROWS)))
 
@@ -229,9 +229,9 @@ def _shape(basis: Basis) -> tuple[int, int, int, int]:
 
 def _content_key(basis: Basis) -> str:
     """Return everything that the denoised planes depend on."""
-    others: list[Floats] = [basis.present_weights]
+    other_inputs: list[Floats] = [basis.present_weights]
     if basis.features is not None:
-        others += [basis.features.albedo, basis.features.normal]
+        other_inputs += [basis.features.albedo, basis.features.normal]
 
     def digest(which: int | Floats) -> bytes:
         if not isinstance(which, int):
@@ -242,8 +242,8 @@ def _content_key(basis: Basis) -> str:
             plane = np.stack([plane, basis.indirect.planes.plane(which)])
         return hashlib.blake2b(np.ascontiguousarray(plane).data).digest()
 
-    made = repr((FORMAT, denoiser_text(basis.features, raw=""), _shape(basis)))
-    content = hashlib.blake2b(made.encode(), digest_size=16)
-    for one in parallel_map(digest, [*range(len(basis.lights)), *others]):
-        content.update(one)
+    parameters = repr((FORMAT, denoiser_text(basis.features, raw=""), _shape(basis)))
+    content = hashlib.blake2b(parameters.encode(), digest_size=16)
+    for hash_of_input in parallel_map(digest, [*range(len(basis.lights)), *other_inputs]):
+        content.update(hash_of_input)
     return content.hexdigest()

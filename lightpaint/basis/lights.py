@@ -62,9 +62,9 @@ class BasisLight:
 
     def __repr__(self) -> str:
         emission = " ".join(f"{v:.4g}" for v in self.emission)
-        kept = ", kept" if self.is_fixed else ""
-        what = " ".join(filter(None, (self.plugin, self.parameter, emission, self.unit)))
-        return f"BasisLight({self.name!r}, {what}{kept})"
+        note = ", kept" if self.is_fixed else ""
+        description = " ".join(filter(None, (self.plugin, self.parameter, emission, self.unit)))
+        return f"BasisLight({self.name!r}, {description}{note})"
 
 
 @dataclass(frozen=True)

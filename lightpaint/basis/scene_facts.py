@@ -70,8 +70,8 @@ def facts_key(asking: Mapping[str, Any]) -> str:
 
     asking: all that decides how it is loaded and on which film, as plain values.
     """
-    around = {x: y for x, y in os.environ.items() if x.startswith(ENVIRONMENT_PREFIXES)}
-    key = [FORMAT, dict(asking), os.getcwd(), around, _code_version()]
+    environment = {x: y for x, y in os.environ.items() if x.startswith(ENVIRONMENT_PREFIXES)}
+    key = [FORMAT, dict(asking), os.getcwd(), environment, _code_version()]
     return hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:32]
 
 
@@ -83,13 +83,13 @@ def recall_facts(key: str) -> SceneFacts | None:
         for file in folder().glob(f"*.{key}{FACTS_SUFFIX}"):
             if not is_own(file):
                 continue
-            said = strict_json(file.read_text("utf-8"))
-            if said["format"] == FORMAT and _is_unchanged(said["places"], said["texts"]):
-                its = said["known"]
-                its |= {name: tuple(its[name]) for name in ("size", "remarks")}
-                lights = tuple(read_record(BasisLight, light) for light in its["lights"]["each"])
-                requests = SceneRequests(**its["lights"]["requests"])
-                return SceneFacts(**{**its, "lights": Lights(lights, requests)})
+            record = strict_json(file.read_text("utf-8"))
+            if record["format"] == FORMAT and _is_unchanged(record["places"], record["texts"]):
+                facts = record["known"]
+                facts |= {name: tuple(facts[name]) for name in ("size", "remarks")}
+                lights = tuple(read_record(BasisLight, light) for light in facts["lights"]["each"])
+                requests = SceneRequests(**facts["lights"]["requests"])
+                return SceneFacts(**{**facts, "lights": Lights(lights, requests)})
     return None
 
 
@@ -107,7 +107,7 @@ def remember_facts(
     """
     if bases.file_of(basis) is None:
         return False
-    known = SceneFacts(
+    facts = SceneFacts(
         scene.identity,
         scene.sensor_names[scene.sensor],
         scene.size,
@@ -123,13 +123,13 @@ def remember_facts(
             return False
         if any(_reads_more(path) for path in scene.files):
             return False
-        said = {
+        record = {
             "format": FORMAT,
             "places": places,
             "texts": {str(path): _digest(path) for path in sorted(texts)},
-            "known": asdict(known),
+            "known": asdict(facts),
         }
-        text = json.dumps(said, allow_nan=False)
+        text = json.dumps(record, allow_nan=False)
         if strict_json(text)["known"]["lights"]["requests"] != asdict(scene.requests):
             return False  # TOML knows values that JSON does not
         write_text(bases.companion_path(basis, f".{key}{FACTS_SUFFIX}"), text)
@@ -147,10 +147,17 @@ def _is_unchanged(places: Mapping[str, Any], texts: Mapping[str, str]) -> bool:
 def _stamp(path: Path) -> list[int] | None:
     """Return a value that changes when the file does; None if it does not exist."""
     try:
-        its = path.stat()
+        status = path.stat()
     except (FileNotFoundError, NotADirectoryError):
         return None
-    return [its.st_size, its.st_mtime_ns, its.st_ctime_ns, its.st_ino, its.st_dev, its.st_mode]
+    return [
+        status.st_size,
+        status.st_mtime_ns,
+        status.st_ctime_ns,
+        status.st_ino,
+        status.st_dev,
+        status.st_mode,
+    ]
 
 
 def _is_new(stamp: list[int] | None, began_s: float) -> bool:
@@ -167,9 +174,9 @@ def _reads_more(path: Path) -> bool:
 
     Raises ValueError for what is not read here, as in UTF-16.
     """
-    for found in markup(path.read_bytes()):
-        tag = found["tag"]
-        if tag == b"path" or (tag not in (None, b"include") and "filename" in attributes(found)):
+    for element in markup(path.read_bytes()):
+        tag = element["tag"]
+        if tag == b"path" or (tag not in (None, b"include") and "filename" in attributes(element)):
             return True
     return False
 
@@ -177,21 +184,21 @@ def _reads_more(path: Path) -> bool:
 @cache
 def _code_version() -> str:
     """Return the version of the code that reads scenes, from its files."""
-    said = [__version__, sys.version, *(list(_files_of_package(name)) for name in LIBRARIES)]
+    versions = [__version__, sys.version, *(list(_files_of_package(name)) for name in LIBRARIES)]
     package = Path(__file__).parents[1]
-    said += [list(_files_in_folder(package / folder)) for folder in OWN_FOLDERS]
-    return hashlib.sha256(repr(said).encode()).hexdigest()
+    versions += [list(_files_in_folder(package / folder)) for folder in OWN_FOLDERS]
+    return hashlib.sha256(repr(versions).encode()).hexdigest()
 
 
 def _files_of_package(package: str) -> Iterator[tuple[str, int, int]]:
-    found = find_spec(package)
-    if found is not None and found.origin is not None:
-        yield from _files_in_folder(Path(found.origin).parent)
+    spec = find_spec(package)
+    if spec is not None and spec.origin is not None:
+        yield from _files_in_folder(Path(spec.origin).parent)
 
 
 def _files_in_folder(folder: Path) -> Iterator[tuple[str, int, int]]:
     """Return the files of a folder, by name, size and time."""
     for entry in sorted(os.scandir(folder), key=lambda entry: entry.path):
         if entry.is_file():
-            its = entry.stat()
-            yield entry.path, its.st_size, its.st_mtime_ns
+            status = entry.stat()
+            yield entry.path, status.st_size, status.st_mtime_ns

@@ -42,9 +42,9 @@ def describe_sum(
     beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
     truly_missing, truly_exceeding = missing_and_exceeding(beyond, whole)
     if truly_missing + truly_exceeding <= NEGLIGIBLE_SHARE:
-        off = missing + exceeding
-        return f"the groups add up to the beauty (to {off:.1g} of its light)", False
-    told = (
+        deviation = missing + exceeding
+        return f"the groups add up to the beauty (to {deviation:.1g} of its light)", False
+    text = (
         f"the groups lack {share_text(missing)} of the light of the beauty: "
         f"that is kept as it is, as the light {name}"
     )
@@ -54,12 +54,12 @@ def describe_sum(
             f"light in all, which the light {name} takes away: is the beauty denoised or clamped, "
             "a light in two groups, or one of them no light?"
         )
-        told = (
-            f"{warning} {told[0].upper()}{told[1:]}"
+        text = (
+            f"{warning} {text[0].upper()}{text[1:]}"
             if truly_missing > NEGLIGIBLE_SHARE
             else warning
         )
-    return told, True
+    return text, True
 
 
 def missing_and_exceeding(rest: Floats, whole: Floats) -> tuple[float, float]:
@@ -127,23 +127,25 @@ class LayerSum:
         size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
         most = NEGLIGIBLE_SHARE * size
         # Excesses only add up, so that a few pixels are enough to tell that it is another picture.
-        few = (slice(None, None, COARSE_STEP), slice(None, None, COARSE_STEP))
+        coarse = (slice(None, None, COARSE_STEP), slice(None, None, COARSE_STEP))
         return bool(
             size > 0
-            and self._excess(beauty, few, less_itself=less_itself) <= most
+            and self._excess(beauty, coarse, less_itself=less_itself) <= most
             and self._excess(beauty, (), less_itself=less_itself) <= most
         )
 
-    def _excess(self, beauty: RenderLayer, where: tuple[slice, ...], *, less_itself: bool) -> float:
+    def _excess(
+        self, beauty: RenderLayer, pixels: tuple[slice, ...], *, less_itself: bool
+    ) -> float:
         """Return their difference beyond rounding, summed over these pixels."""
-        image, bound = beauty.image[where], self.bound[where]
+        image, bound = beauty.image[pixels], self.bound[pixels]
         if less_itself:
             # x − (total − x); the bound is that of the same layers.
-            off = _deviation(2 * image.astype(np.float64), self.total[where])
+            deviation = _deviation(2 * image.astype(np.float64), self.total[pixels])
         else:
-            off = _deviation(image, self.total[where])
+            deviation = _deviation(image, self.total[pixels])
             bound = bound + _rounded(image, is_half=beauty.is_half)
-        return float(np.maximum(off - bound, 0).sum())
+        return float(np.maximum(deviation - bound, 0).sum())
 
 
 def _deviation(picture: Floats, total: Floats) -> Floats:
@@ -181,11 +183,11 @@ def unrelated_layer(
     if beauty is not None and LayerSum.of(layers).is_of(beauty):
         return None
     # A few pixels tell that most pairs are none.
-    few, whole = list(map(_coarsened, layers)), beauty and _coarsened(beauty)
-    for k in _unrelated_candidates(few, whole):
+    coarse_layers, whole = list(map(_coarsened, layers)), beauty and _coarsened(beauty)
+    for k in _unrelated_candidates(coarse_layers, whole):
         others = [*layers[:k], *layers[k + 1 :]]
-        if beauty is None and (found := find_beauty(others)) is not None:
-            return layers[k], found
+        if beauty is None and (whole_found := find_beauty(others)) is not None:
+            return layers[k], whole_found
         if beauty is not None and LayerSum.of(others).is_of(beauty):
             return layers[k], beauty
     return None
@@ -194,16 +196,16 @@ def unrelated_layer(
 def _unrelated_candidates(layers: Sequence[RenderLayer], beauty: RenderLayer | None) -> list[int]:
     """Return indices of layers without which the others may add up to the picture."""
     added = LayerSum.of(layers)
-    found = []
+    candidates = []
     for k, layer in enumerate(layers):
         less = added.without(layer)
         if beauty is not None and less.is_of(beauty):
-            found.append(k)
+            candidates.append(k)
         if beauty is None and any(
             less.is_of(other, less_itself=True) for j, other in enumerate(layers) if j != k
         ):
-            found.append(k)
-    return found
+            candidates.append(k)
+    return candidates
 
 
 def _coarsened(layer: RenderLayer) -> RenderLayer:

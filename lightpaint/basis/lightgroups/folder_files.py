@@ -59,15 +59,17 @@ def candidate_files(
             f"{folder} holds {len(files)} EXR files, more than {MAX_FILES}: is it a sequence of "
             "frames? give a folder with the light groups of one"
         )
-    others = [Path(file) for file in leave_out]
-    why = {file: _reason_against(file, others) for file in files}
-    left = [file for file in files if not why[file]]
-    why |= {file: "not named .exr" for file in visible if file not in why and _is_readable(file)}
-    told = _list_with_reasons({file: reason for file, reason in why.items() if reason})
+    left_out = [Path(file) for file in leave_out]
+    reasons = {file: _reason_against(file, left_out) for file in files}
+    left = [file for file in files if not reasons[file]]
+    reasons |= {
+        file: "not named .exr" for file in visible if file not in reasons and _is_readable(file)
+    }
+    text = _list_with_reasons({file: reason for file, reason in reasons.items() if reason})
     if not left:
-        none = f"{folder} holds no .exr file" if not told else f"{folder} holds no light: {told}"
+        none = f"{folder} holds no .exr file" if not text else f"{folder} holds no light: {text}"
         raise BasisError(f"{none}; give the EXR with the light groups, or a folder of them")
-    return left, [f"left out of the lights: {told}"] if told else []
+    return left, [f"left out of the lights: {text}"] if text else []
 
 
 def _visible(folder: Path) -> list[Path]:
@@ -115,10 +117,10 @@ def _is_same(file: Path, other: Path) -> bool:
         return False
 
 
-def _list_with_reasons(why: dict[Path, str]) -> str:
+def _list_with_reasons(reasons: dict[Path, str]) -> str:
     """Return files with reasons: `a.exr, b.exr (made by lightpaint); c.exr (painting or mask)`."""
-    told = []
-    for reason in dict.fromkeys(why.values()):
-        names = [file.name for file, its in why.items() if its == reason]
-        told.append(f"{some_names(names)} ({reason})")
-    return "; ".join(told)
+    texts = []
+    for reason in dict.fromkeys(reasons.values()):
+        names = [file.name for file, reason_of_file in reasons.items() if reason_of_file == reason]
+        texts.append(f"{some_names(names)} ({reason})")
+    return "; ".join(texts)

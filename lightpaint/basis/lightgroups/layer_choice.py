@@ -42,32 +42,32 @@ class LayerChoice:
 
 
 def choose_layers(
-    layers: Mapping[str, Sequence[str]], *, pattern: str | None = None, where: str
+    layers: Mapping[str, Sequence[str]], *, pattern: str | None = None, file_name: str
 ) -> LayerChoice:
     """Tell lights, beauty and everything else apart.
 
     layers: name of each layer → other names that a pattern may meet it by.
-    pattern: `Light_{name}`, instead of the known conventions. where: the file, for messages.
+    pattern: `Light_{name}`, instead of the known conventions. file_name: for messages.
     Raises BasisError, listing the layers, where no convention fits or several do.
     """
     if pattern is not None:
-        return _by_pattern(layers, pattern, where)
+        return _by_pattern(layers, pattern, file_name)
     fitting = []
     for convention in CONVENTIONS:
-        found = [m for name in layers if (m := convention.layer.fullmatch(name))]
-        if any(not OTHER_VERSION.fullmatch(m[0]) for m in found):
-            fitting.append((convention, found))
+        matches = [m for name in layers if (m := convention.layer.fullmatch(name))]
+        if any(not OTHER_VERSION.fullmatch(m[0]) for m in matches):
+            fitting.append((convention, matches))
     if len(fitting) == 1:
-        return _by_convention(layers, *fitting[0], where)
+        return _by_convention(layers, *fitting[0], file_name)
     if fitting:
-        told = [f"{len(found)} as of {convention.renderer}" for convention, found in fitting]
+        counts = [f"{len(matches)} as of {convention.renderer}" for convention, matches in fitting]
         raise BasisError(
-            f"{where} names its layers in several ways ({some_names(told)}): say which are the "
-            f"lights, like pattern={_example_pattern(layers)!r}; {_layer_list(layers)}"
+            f"{file_name} names its layers in several ways ({some_names(counts)}): say which are "
+            f"the lights, like pattern={_example_pattern(layers)!r}; {_layer_list(layers)}"
         )
     raise BasisError(
-        f"{where} has no layers named like the light groups of a known renderer: say which they "
-        f"are, like pattern={_example_pattern(layers)!r}; {_layer_list(layers)}"
+        f"{file_name} has no layers named like the light groups of a known renderer: say which "
+        f"they are, like pattern={_example_pattern(layers)!r}; {_layer_list(layers)}"
     )
 
 
@@ -102,24 +102,24 @@ def _shared_head(names: Sequence[str]) -> str:
 def _by_convention(
     layers: Mapping[str, Sequence[str]],
     convention: Convention,
-    found: list[re.Match[str]],
-    where: str,
+    matches: list[re.Match[str]],
+    file_name: str,
 ) -> LayerChoice:
     remarks = []
-    left = [m[0] for m in found if OTHER_VERSION.fullmatch(m[0])]
-    found = [m for m in found if m[0] not in left]
+    left = [m[0] for m in matches if OTHER_VERSION.fullmatch(m[0])]
+    matches = [m for m in matches if m[0] not in left]
     if left:
         remarks.append(f"{some_names(left)}: taken for another version of a layer, and left out")
-    views = list(dict.fromkeys(m.groupdict().get("view") or "" for m in found))
+    views = list(dict.fromkeys(m.groupdict().get("view") or "" for m in matches))
     view = views[0]
     if len(views) > 1:
         remarks.append(
             f"of the view layers {some_names(views)} the first is taken: "
             f"pattern='{views[1]}.Combined_{NAME_FIELD}' takes {views[1]}"
         )
-    found = [m for m in found if (m.groupdict().get("view") or "") == view]
-    _check_not_stereo([m[0] for m in found], where)
-    lights = _unique_lights(_light_names(convention, found), where)
+    matches = [m for m in matches if (m.groupdict().get("view") or "") == view]
+    _check_not_stereo([m[0] for m in matches], file_name)
+    lights = _unique_lights(_light_names(convention, matches), file_name)
     # By its name alone: no other group can be left out of a single one.
     whole = {n: x for n, x in lights.items() if n == convention.whole and len(lights) > 1}
     lights = {name: layer for name, layer in lights.items() if name not in whole}
@@ -137,9 +137,9 @@ def _by_convention(
     )
 
 
-def _light_names(convention: Convention, found: list[re.Match[str]]) -> list[tuple[str, str]]:
+def _light_names(convention: Convention, matches: list[re.Match[str]]) -> list[tuple[str, str]]:
     """Name of the light and of its layer; with what stands before them where that differs."""
-    prefixes = [m.groupdict().get("prefix") or "" for m in found]
+    prefixes = [m.groupdict().get("prefix") or "" for m in matches]
     several = len(set(prefixes)) > 1
     return [
         (
@@ -147,11 +147,11 @@ def _light_names(convention: Convention, found: list[re.Match[str]]) -> list[tup
             + convention.light.replace(NAME_FIELD, m["name"]),
             m[0],
         )
-        for prefix, m in zip(prefixes, found, strict=True)
+        for prefix, m in zip(prefixes, matches, strict=True)
     ]
 
 
-def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -> LayerChoice:
+def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, file_name: str) -> LayerChoice:
     if pattern.count(NAME_FIELD) != 1:
         raise BasisError(
             f"pattern={pattern!r} must have {NAME_FIELD} once, where the name of the light stands, "
@@ -159,15 +159,15 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -
         )
     before, after = pattern.split(NAME_FIELD)
     fits = re.compile(f"{re.escape(before)}(.+){re.escape(after)}", re.DOTALL)
-    found = []
-    for layer, others in layers.items():
-        match = next((m for name in (layer, *others) if (m := fits.fullmatch(name))), None)
+    matches = []
+    for layer, other_names in layers.items():
+        match = next((m for name in (layer, *other_names) if (m := fits.fullmatch(name))), None)
         if match:
-            found.append((match[1], layer))
-    if not found:
-        raise BasisError(f"pattern={pattern!r} fits no layer of {where}: {_layer_list(layers)}")
+            matches.append((match[1], layer))
+    if not matches:
+        raise BasisError(f"pattern={pattern!r} fits no layer of {file_name}: {_layer_list(layers)}")
     # A pattern as wide as {name} also meets the beauty.
-    names = [layer for layer in layers if layer not in [taken for _, taken in found]]
+    names = [layer for layer in layers if layer not in [matched for _, matched in matches]]
     first = {
         (
             before.rstrip(SEPARATORS) + after
@@ -176,31 +176,31 @@ def _by_pattern(layers: Mapping[str, Sequence[str]], pattern: str, where: str) -
     } - {""}
     beauty = next((name for name in names if name.casefold() in first), beauty_name(names))
     if beauty is None:
-        beauty = beauty_name(layer for _, layer in found)
-    found = [(name, layer) for name, layer in found if layer != beauty]
-    return LayerChoice(f"pattern {pattern}", _unique_lights(found, where), beauty=beauty)
+        beauty = beauty_name(layer for _, layer in matches)
+    matches = [(name, layer) for name, layer in matches if layer != beauty]
+    return LayerChoice(f"pattern {pattern}", _unique_lights(matches, file_name), beauty=beauty)
 
 
-def _check_not_stereo(names: Sequence[str], where: str) -> None:
+def _check_not_stereo(names: Sequence[str], file_name: str) -> None:
     """Raise BasisError for stereo: the same names once with `.left` and once with `.right`."""
     left, right = (
         {name.removesuffix(eye) for name in names if name.endswith(eye)}
         for eye in (".left", ".right")
     )
-    if both := sorted(left & right):
-        head = both[0].rpartition("_")[0]
+    if in_both := sorted(left & right):
+        head = in_both[0].rpartition("_")[0]
         raise BasisError(
-            f"{where} holds the views left and right, and a solve is of one: say which, like "
+            f"{file_name} holds the views left and right, and a solve is of one: say which, like "
             f"pattern='{head}_{NAME_FIELD}.left'"
         )
 
 
-def _unique_lights(found: Sequence[tuple[str, str]], where: str) -> dict[str, str]:
+def _unique_lights(pairs: Sequence[tuple[str, str]], file_name: str) -> dict[str, str]:
     lights: dict[str, str] = {}
-    for name, layer in found:
+    for name, layer in pairs:
         if name in lights:
             raise BasisError(
-                f"{where} has the light {name!r} twice, in {lights[name]} and in {layer}: "
+                f"{file_name} has the light {name!r} twice, in {lights[name]} and in {layer}: "
                 "say which are meant with pattern=..."
             )
         lights[name] = layer

@@ -44,13 +44,13 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
     lights = {name: layers[layer] for name, layer in choice.lights.items()}
     beauty = layers[choice.beauty] if choice.beauty is not None else None
     if beauty is None:
-        used = {id(layer) for layer in lights.values()}
-        others = [layer for layer in layers.values() if id(layer) not in used]
+        light_layers = {id(layer) for layer in lights.values()}
+        others = [layer for layer in layers.values() if id(layer) not in light_layers]
         beauty = find_beauty_of_lights(others, list(lights.values()))
     remarks = list(choice.remarks)
     if choice.renderer == ONE_FILE_PER_LIGHT:
-        beauty, told = _remove_non_lights(lights, beauty)
-        remarks += told
+        beauty, remarks_on_files = _remove_non_lights(lights, beauty)
+        remarks += remarks_on_files
     for name, layer in choice.whole.items():
         if beauty is None or beauty is layers[layer]:
             beauty = layers[layer]
@@ -77,18 +77,18 @@ def _remove_non_lights(
     if beauty is None and len(lights) > 2:
         beauty = find_beauty(list(lights.values()))
         _drop(lights, beauty)
-    found = unrelated_layer(list(lights.values()), beauty)
-    if found is None:
+    unrelated = unrelated_layer(list(lights.values()), beauty)
+    if unrelated is None:
         return beauty, []
-    stranger, whole = found
+    stranger, whole = unrelated
     _drop(lights, stranger)
     _drop(lights, whole)
-    told = f"without it the others add up to {whole.file.name}"
-    return whole, [f"left out of the lights: {stranger.file.name} ({told})"]
+    reason = f"without it the others add up to {whole.file.name}"
+    return whole, [f"left out of the lights: {stranger.file.name} ({reason})"]
 
 
 def _drop(lights: dict[str, RenderLayer], layer: RenderLayer | None) -> None:
-    for name in [name for name, its in lights.items() if its is layer]:
+    for name in [name for name, light_layer in lights.items() if light_layer is layer]:
         del lights[name]
 
 
@@ -113,4 +113,4 @@ def _choose_roles(path: Path, layers: dict[str, RenderLayer], pattern: str | Non
     if pattern is None and len(by_file) == len(layers) > 1 and not any(map(is_known, layers)):
         return choose_files(layers)
     others = {name: layer.others for name, layer in layers.items()}
-    return choose_layers(others, pattern=pattern, where=str(path))
+    return choose_layers(others, pattern=pattern, file_name=str(path))

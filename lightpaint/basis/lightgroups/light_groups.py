@@ -118,9 +118,9 @@ def read_light_groups(
         ('Arnold', ('fill', 'key', 'rim'))
     """
     path = Path(path)
-    layers, told = read_layers(path, leave_out=leave_out)
+    layers, remarks = read_layers(path, leave_out=leave_out)
     candidates, passes = split_passes(layers)
-    return _light_groups(path, roles_of(path, candidates, pattern), passes, told)
+    return _light_groups(path, roles_of(path, candidates, pattern), passes, remarks)
 
 
 def _check_light(
@@ -129,9 +129,13 @@ def _check_light(
     """Raise BasisError for a group that takes light away: all that follows would be of no use."""
     for name, layer in lights.items():
         light = np.where(holes, 0, layer.image.astype(np.float32) @ LUMINANCE)
-        given, taken = float(light[light > 0].sum()), -float(light[light < 0].sum())
-        if taken > MAX_NEGATIVE_SHARE * given:
-            part = f"{taken / given:.2g} times what it gives" if given else "and gives none"
+        light_given, light_taken = float(light[light > 0].sum()), -float(light[light < 0].sum())
+        if light_taken > MAX_NEGATIVE_SHARE * light_given:
+            part = (
+                f"{light_taken / light_given:.2g} times what it gives"
+                if light_given
+                else "and gives none"
+            )
             raise BasisError(
                 f"{path}: the light group {name!r} takes light away, {part}, which no light does: "
                 "render it again, or leave it out (pattern=...)"
@@ -200,16 +204,16 @@ class _Missing:
 def _missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
     lights, beauty = list(roles.lights.values()), roles.beauty
     if beauty is None:
-        told = "no beauty among the layers, so that nothing tells whether the groups are all of it"
+        text = "no beauty among the layers, so that nothing tells whether the groups are all of it"
         if roles.renderer == ONE_FILE_PER_LIGHT:
-            told += ", and each of them a light"
-        return _Missing(None, None, None, told)
+            text += ", and each of them a light"
+        return _Missing(None, None, None, text)
     whole = _without_holes(beauty.image, holes).astype(np.float64)
     rest = whole - sum(_without_holes(layer.image, holes).astype(np.float64) for layer in lights)
     missing, exceeding = missing_and_exceeding(rest, whole)
     name = free_name(REST_NAME, roles.lights)
-    told, is_missing = describe_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
-    return _Missing(rest if is_missing else None, missing, exceeding, told)
+    text, is_missing = describe_sum(rest, whole, [*lights, beauty], missing, exceeding, name)
+    return _Missing(rest if is_missing else None, missing, exceeding, text)
 
 
 def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) -> list[str]:
@@ -217,11 +221,11 @@ def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) 
     black = [name for name, layer in lights.items() if not layer.image.any()]
     if not black:
         return []
-    told = f"the file holds nothing of {some_names(black)}: black in every pixel, so kept as it is"
+    text = f"the file holds nothing of {some_names(black)}: black in every pixel, so kept as it is"
     if missing is None or missing <= NEGLIGIBLE_SHARE:
-        return [f"{told}; is the light off, or the group renamed?"]
+        return [f"{text}; is the light off, or the group renamed?"]
     return [
-        f"{told}; {share_text(missing)} of the light of the beauty is in no group: was the group "
+        f"{text}; {share_text(missing)} of the light of the beauty is in no group: was the group "
         "renamed after its lights were given it?"
     ]
 
@@ -242,21 +246,21 @@ def _basis(
 ) -> Basis:
     """Return the basis in linear Rec.709; `rest`, if there is one, is a light that is kept."""
     lights = roles.lights
-    made = [_light(name, layer.name, "light group") for name, layer in lights.items()]
+    basis_lights = [_light(name, layer.name, "light group") for name, layer in lights.items()]
     height, width = holes.shape
     images = np.empty((len(lights) + (rest is not None), height, width, 3), np.float32)
     first = next(iter(lights.values()))
     for image, layer in zip(images, lights.values(), strict=False):
         image[:] = layer.in_rec709(_without_holes(layer.image, holes))
     if rest is not None:
-        made.append(
+        basis_lights.append(
             _light(free_name(REST_NAME, lights), "beauty less the groups", "rest", is_fixed=True)
         )
         images[-1] = first.in_rec709(rest)
     unknown = as_planes(np.zeros_like(images))
     indirect = _indirect_planes(roles, passes, images, holes)
     return Basis(
-        lights=Lights(tuple(made)),
+        lights=Lights(tuple(basis_lights)),
         planes=as_planes(images),
         noise=unknown,
         emitters_seen=np.zeros(holes.shape, dtype=bool),

@@ -86,5 +86,5 @@ def beauty_name(names: Iterable[str], *, first: str = "") -> str | None:
     by_folded: dict[str, str] = {}
     for name in names:
         by_folded.setdefault(name.casefold(), name)
-    wanted = (first.casefold(), *BEAUTY_NAMES)
-    return next((by_folded[name] for name in wanted if name in by_folded), None)
+    candidates = (first.casefold(), *BEAUTY_NAMES)
+    return next((by_folded[name] for name in candidates if name in by_folded), None)

@@ -116,39 +116,42 @@ def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
     read = {file: _of_file(file) for file in files}
     plain = [file.stem for file, layers in read.items() if [x.name for x in layers] == [""]]
     short = short_names(plain)
-    made = []
+    layers_of_folder = []
     for file, layers in read.items():
         for x in layers:
             name = x.name or file.stem
             # What a renderer calls a file is a better name than what is left of it.
             if not x.name and not is_known(name):
                 name = short.get(name, name)
-            made.append(replace(x, name=name, others=(file.stem, file.name, *x.others)))
-    return made
+            layers_of_folder.append(replace(x, name=name, others=(file.stem, file.name, *x.others)))
+    return layers_of_folder
 
 
 def _of_file(path: Path) -> list[RenderLayer]:
     parts = read_parts(path)
     layers = []
     for part in parts:
-        shown, primaries = part.in_display_window(), _primaries(path, part)
-        colours = colour_channels(shown.channels)
-        vectors = vector_channels(shown.channels)
+        window, primaries = part.in_display_window(), _primaries(path, part)
+        colours = colour_channels(window.channels)
+        vectors = vector_channels(window.channels)
         for prefix, channels in [*colours.items(), *vectors.items()]:
-            image = _rgb(path, shown.channels, channels)
-            alpha = channel_named(shown.channels, prefix, *ALPHA_NAMES)
-            others = [part.name, f"{part.name}.{prefix}"]
+            image = _rgb(path, window.channels, channels)
+            alpha = channel_named(window.channels, prefix, *ALPHA_NAMES)
+            other_names = [part.name, f"{part.name}.{prefix}"]
             if len(parts) == 1 and not prefix:
-                others += [path.stem, path.name]  # of a file of one layer, it is that one's name
+                other_names += [
+                    path.stem,
+                    path.name,
+                ]  # of a file of one layer, it is that one's name
             layers.append(
                 RenderLayer(
                     name=part.name if prefix == "" and len(parts) > 1 else prefix,
                     file=path,
                     part=part.name if len(parts) > 1 else "",
                     channels=channels,
-                    others=tuple(others),
+                    others=tuple(other_names),
                     image=image,
-                    alpha=None if alpha is None else shown.channels[alpha],
+                    alpha=None if alpha is None else window.channels[alpha],
                     primaries=primaries,
                     is_vector=vectors.get(prefix) == channels,
                 )

@@ -16,7 +16,7 @@ from lightpaint.errors import BasisError
 
 
 def _choose(*names: str, pattern: str | None = None) -> LayerChoice:
-    return choose_layers(dict.fromkeys(names, ()), pattern=pattern, where="a.exr")
+    return choose_layers(dict.fromkeys(names, ()), pattern=pattern, file_name="a.exr")
 
 
 CASES: list[tuple[str, list[str], dict[str, str], str | None]] = [
@@ -158,7 +158,7 @@ def test_a_pattern_finds_what_no_convention_does():
     assert found.lights == {"key": "L[1].key!", "fill": "L[1].fill!"}
     assert found.beauty == "beauty"
     # Parts and files have names too.
-    found = choose_layers({"x": ("key.light",), "y": ("z",)}, pattern="{name}.light", where="a")
+    found = choose_layers({"x": ("key.light",), "y": ("z",)}, pattern="{name}.light", file_name="a")
     assert found.lights == {"key": "x"}
     # So wide a pattern must not take the picture for a light.
     assert _choose("rgba", "key", "fill", pattern="{name}").beauty == "rgba"
