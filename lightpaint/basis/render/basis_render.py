@@ -43,6 +43,7 @@ def render_basis(
     *,
     spp: int | None = None,
     time_s: float | None = None,
+    until_spp: int | None = None,
     seed: int = 0,
     start: Basis | None = None,
     keep: Callable[[Basis], bool] | None = None,
@@ -55,6 +56,8 @@ def render_basis(
         scene: As `load_scene` returns it.
         spp: Samples per pixel (the scene's own number by default).
         time_s: Instead, seconds to render for, besides what `start` took; whole steps.
+        until_spp: With a time and in one pass, samples per pixel at which it ends though there is
+            time left.
         seed: Any number >= 0; other seeds give independent bases.
         start: An earlier basis of the same scene, sensor and seed: its samples count, and only what
             is missing to `spp` is rendered, or as many more as `time_s` allows. With its `sums` the
@@ -75,7 +78,7 @@ def render_basis(
     height, width = scene.size
     if spp is not None and time_s is not None:
         raise SceneError("give a number of samples or a time to render for, not both")
-    budget = Budget(scene.spp if spp is None else spp, time_s)
+    budget = Budget(scene.spp if spp is None else spp, time_s, until_spp)
     if len(scene.lights) * height * width * 3 >= 2**32:
         raise SceneError(
             f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "

@@ -1,5 +1,6 @@
 """The basis to solve with: an earlier one where it fits, with what it lacks rendered."""
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -30,6 +31,9 @@ from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
+#: Seconds that a render is asked for at least: in less it renders one step, too.
+SHORTEST_S = 1e-3
+
 #: `render_basis`, or another that takes and gives the same.
 Render = Callable[..., Basis]
 #: Hears how many of how many lights are taken from earlier runs.
@@ -57,7 +61,7 @@ def obtain_basis(
     means, and other noise, than those of a render from nothing.
 
     time_s: instead of spp, seconds of rendering to add to what was kept. Where some lights have
-    fewer samples than others, the time is theirs.
+    fewer samples than others, the time is theirs until they have as many.
     use_cache: False neither looks for one nor keeps it.
     exact_spp: whether it has just as many samples as are asked for, and the same ones, whatever
     was kept: then nothing is taken of another state of the scene. One with more samples stays kept.
@@ -125,8 +129,17 @@ def _completed(
 ) -> Basis:
     """Return `start` with the samples that are missing, of lights that have fewest first.
 
-    how: other arguments of `render`, which adds as many samples to all lights in one pass.
+    spp: None for the time in `how`. how: other arguments of `render`, which adds as many samples to
+    all lights in one pass.
     """
+    end_s = None if how["time_s"] is None else time.monotonic() + how["time_s"]
+
+    def budget(goal: int | None) -> dict[str, Any]:
+        if end_s is None:
+            return {"spp": goal}
+        left_s = max(end_s - time.monotonic(), SHORTEST_S)
+        return {"spp": None, "time_s": left_s} | ({} if goal is None else {"until_spp": goal})
+
     while start is not None and method_of(scene) == ONE_PASS:
         names, goal = least_sampled_lights(start, spp)
         if not names:
@@ -136,11 +149,12 @@ def _completed(
         def keep(part: Basis, whole: Basis = whole) -> bool:
             return bool(how["keep"](merge(scene, whole, part)))
 
-        part = render(alone, **how | {"spp": goal, "start": restrict(whole, alone), "keep": keep})
+        options = how | budget(goal) | {"keep": keep}
+        part = render(alone, start=restrict(whole, alone), **options)
         start = merge(scene, whole, part)
-        if spp is None:
+        if end_s is not None and time.monotonic() >= end_s:
             return start
-    return render(scene, **how, spp=spp, start=start)
+    return render(scene, start=start, **how | budget(spp))
 
 
 def _marked(basis: Basis, *, is_composed: bool) -> Basis:

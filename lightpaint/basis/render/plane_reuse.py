@@ -105,8 +105,8 @@ def gather_planes(scene: Scene, kept: Basis | None, *, spp: int | None, seed: in
 def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int | None]:
     """Return which lights are to be rendered next, and how many samples per pixel they come to.
 
-    Those with fewest, up to those that come next, until all have `spp`. For None, which stands for
-    a time, those with fewest, without a goal. No names: all have enough, or as many as each other.
+    Those with fewest, up to those that come next, until all have `spp`; None for a time, which is
+    for all of them then. No names: all have enough, or as many as each other.
     """
     counts = counts_of(basis)
     totals = [sum(its[:2]) for its in counts]
@@ -115,9 +115,8 @@ def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int 
         return [], spp
     halves = counts[totals.index(fewest)][:2]
     names = [name for name, its in zip(basis.names, counts, strict=True) if its[:2] == halves]
-    if spp is None:
-        return names, None
-    return names, min([spp, *(total for total in totals if total > fewest)])
+    goals = [total for total in totals if total > fewest]
+    return names, min(goals if spp is None else [spp, *goals], default=None)
 
 
 def restrict(basis: Basis, scene: Scene) -> Basis | None:

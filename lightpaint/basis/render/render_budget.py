@@ -20,7 +20,8 @@ PASS_DIVISOR = 4
 
 @dataclass(frozen=True)
 class Budget:
-    """The budget of a basis: `spp` samples per pixel in all, or `time_s` seconds from now.
+    """The budget of a basis: `spp` samples per pixel in all, or `time_s` seconds from now, in which
+    one pass renders no more than `until_spp`.
 
     A time is wall time from the first pass on. Compiling kernels counts, keeping what is done,
     and loading the scene where that is done for every light.
@@ -28,6 +29,7 @@ class Budget:
 
     spp: int
     time_s: float | None = None
+    until_spp: int | None = None
 
     def __post_init__(self) -> None:
         if self.time_s is not None and not 0 < self.time_s < math.inf:
@@ -74,8 +76,11 @@ def steps(pixels: int, budget: Budget, done: int, progress: Progress) -> Iterato
             progress("basis", k + 1, count)
         return
     clock = Clock(budget.time_s, progress)
-    while clock.left_s > 0:
-        yield largest
+    wanted = math.inf if budget.until_spp is None else half_of(budget.until_spp)
+    while clock.left_s > 0 and done < wanted:
+        spp = int(min(largest, wanted - done))
+        yield spp
+        done += spp
         clock.report()
 
 

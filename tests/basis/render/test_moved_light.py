@@ -18,6 +18,7 @@ from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.render import cached_render as obtain_module
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.render.render_budget import Budget, steps
 from lightpaint.batch.work.basis_parts import PartwiseRender
 from lightpaint.batch.work.work import run_item
 from lightpaint.batch.work.work_items import ItemResult, SceneFilm
@@ -210,8 +211,25 @@ def test_unequal_numbers_of_samples(tmp_path: Path, rendered: Rendered) -> None:
 def test_a_time_is_spent_on_what_lacks(tmp_path: Path, rendered: Rendered) -> None:
     obtain_basis(room(tmp_path), spp=4)
     basis = obtain_basis(room(tmp_path, MOVED), time_s=0.01)
-    assert [its[0] for its in rendered[1:]] == [("bulb",)]
-    assert {its[:2] for its in basis.origin.each_light} > {(2, 2)}
+    # No more than the others have: what is left of a time is for all.
+    assert rendered[1:] == [(("bulb",), 4, True)]
+    assert (basis.origin.halves, basis.origin.each_light) == ((2, 2), ())
+
+
+def test_what_is_left_of_a_time_is_for_all_lights(tmp_path: Path, rendered: Rendered) -> None:
+    """As soon as the one that was moved has as many samples as the others."""
+    obtain_basis(room(tmp_path), spp=4)
+    scene = room(tmp_path, MOVED)
+    asked: list[dict[str, Any]] = []
+
+    def render(scene: Scene, *, time_s: float, until_spp: int | None = None, **how: Any) -> Basis:
+        asked.append({"names": len(scene.lights), "time_s": time_s, "until_spp": until_spp})
+        return render_basis(scene, **how | {"spp": until_spp or 8})
+
+    basis = obtain_basis(scene, time_s=1000.0, render=render)
+    assert [(its["names"], its["until_spp"]) for its in asked] == [(1, 4), (len(NAMES), None)]
+    assert 0 < asked[1]["time_s"] < asked[0]["time_s"] <= 1000
+    assert (basis.origin.halves, basis.origin.each_light) == ((4, 4), ())
 
 
 def test_exactly_what_is_asked_for_is_rendered_as_a_whole(
@@ -446,3 +464,9 @@ def test_workers_render_the_moved_lamp_alone(tmp_path: Path) -> None:
     assert lights == {("bulb",)}
     assert taken(second, first) == {*NAMES} - {"bulb"}
     agrees(second, render_basis(scene, spp=16, seed=5))
+
+
+@pytest.mark.parametrize("done", [0, 2, 5])
+def test_a_time_ends_where_no_more_samples_are_wanted(done: int) -> None:
+    budget = Budget(4, time_s=1e6, until_spp=9)
+    assert sum(steps(100, budget, done, silent)) == 5 - done
