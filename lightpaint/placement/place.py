@@ -38,6 +38,7 @@ SAMPLES = ((4, 0), (9, 2), (36, 8), (36, 8))
 SEARCHED = ("point", "spot", "directional")
 
 
+@keywords()
 @dataclass(frozen=True)
 class Move:
     """A move of a light that is worth it.
@@ -91,6 +92,7 @@ class Move:
         return f"{self.name}: {', '.join(done)}: {self.gain_share:.0%} of what was missed"
 
 
+@keywords()
 @dataclass(frozen=True)
 class Placement:
     """Better places of lights.
