@@ -15,19 +15,17 @@ full disk ends nothing: what cannot be written stays in memory, in order, `unsav
 `flush` or the next step writes it.
 """
 
-import json
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from threading import RLock
-from typing import Any
 
 from lightpaint.errors import LightpaintError, OutputError, PaintError
 from lightpaint.files import first_line
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
-from lightpaint.paint.store.compression import is_marked, pack_patches, unpack_patch
+from lightpaint.paint.store.compression import pack_patches, unpack_patch
 from lightpaint.paint.store.database import (
     DamagedError,
     check_pages,
@@ -45,7 +43,21 @@ from lightpaint.paint.store.lazy_arrays import (
     StoredPatch,
     pack_arrays,
 )
-from lightpaint.paint.store.steps import Identity, Patch, Step, StoredLook
+from lightpaint.paint.store.session_rows import (
+    array_names,
+    array_row,
+    delete_look,
+    look_rows,
+    pixels_row,
+    places_json,
+    read_position,
+    step_rows,
+    to_json,
+    write_look,
+    write_position,
+    write_step,
+)
+from lightpaint.paint.store.steps import Identity, Step, StoredLook
 from lightpaint.storage.json_records import strict_json
 
 #: Errors that a value raises which is not as it was written.
@@ -146,10 +158,7 @@ class Store:
         """Append `step` after those that are done; undone steps are cut off."""
         with self._lock:
             patches = step.patches
-            fields, places = (
-                _to_json(step.fields),
-                json.dumps([_place_json(patch) for patch in patches]),
-            )
+            fields, places = to_json(step.fields), places_json(patches)
             blobs = pack_patches(patches) if patches else None
             del self.steps[self.position :], self._ids[self.position :]
             last_kept = self._ids[-1] if self._ids else 0
@@ -160,15 +169,8 @@ class Store:
             self._ids.append(number)
             self.position += 1
 
-            def write(database: sqlite3.Connection) -> None:
-                database.execute("DELETE FROM step WHERE id > ?", (last_kept,))
-                database.execute("DELETE FROM pixels WHERE step > ?", (last_kept,))
-                values = (number, step.kind, step.label, fields, places)
-                database.execute("INSERT INTO step VALUES (?, ?, ?, ?, ?)", values)
-                if blobs is not None:
-                    database.execute("INSERT INTO pixels VALUES (?, ?, ?)", (number, *blobs))
-
-            self._enqueue(write)
+            row = (number, step.kind, step.label, fields, places)
+            self._enqueue(partial(write_step, row=row, blobs=blobs, last_kept=last_kept))
 
     def move_to(self, position: int) -> None:
         """Undo or redo steps: `position` of them are done."""
@@ -191,22 +193,13 @@ class Store:
     def put_look(self, look: StoredLook) -> None:
         """Keep a look, replacing the one of its number if there is one."""
         with self._lock:
-            fields, arrays = _to_json(look.fields), look.arrays
+            fields, arrays = to_json(look.fields), look.arrays
             number, blobs = look.id, None
             if not (isinstance(arrays, LookArrays) and arrays.matches(self, number)):
                 blobs = pack_arrays(arrays)
                 self._arrays[number] = blobs
             self._looks[number] = self._make_look(number, fields)
-
-            def write(database: sqlite3.Connection) -> None:
-                said = (number, fields)
-                database.execute("INSERT OR REPLACE INTO look VALUES (?, ?)", said)
-                if blobs is not None:
-                    database.execute("DELETE FROM look_array WHERE look = ?", (number,))
-                    rows = [(number, name, *row) for name, row in blobs.items()]
-                    database.executemany("INSERT INTO look_array VALUES (?, ?, ?, ?, ?)", rows)
-
-            self._enqueue(write)
+            self._enqueue(partial(write_look, number=number, fields=fields, arrays=blobs))
 
     def drop_look(self, number: int) -> None:
         """Forget a look. Raises PaintError if there is none of that number."""
@@ -214,12 +207,7 @@ class Store:
             if self._looks.pop(number, None) is None:
                 raise PaintError(f"no look {number}")
             self._arrays.pop(number, None)
-
-            def write(database: sqlite3.Connection) -> None:
-                database.execute("DELETE FROM look WHERE id = ?", (number,))
-                database.execute("DELETE FROM look_array WHERE look = ?", (number,))
-
-            self._enqueue(write)
+            self._enqueue(partial(delete_look, number=number))
 
     def flush(self) -> str | None:
         """Write the steps that are in memory only. Returns why that is not possible, or None."""
@@ -231,8 +219,7 @@ class Store:
                 with transaction(self._database):
                     for write in self._pending:
                         write(self._database)
-                    about = ("position", self.position)
-                    self._database.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", about)
+                    write_position(self._database, self.position)
             except LightpaintError as error:
                 self.unsaved = f"what was done last is in memory only: {error}"
                 return self.unsaved
@@ -287,16 +274,13 @@ class Store:
 
     def _read_all(self) -> None:
         """Read all of the file but pixels."""
-        execute = self._database.execute
-        rows = execute("SELECT id, kind, label, fields, places FROM step ORDER BY id").fetchall()
-        for row in rows:
+        for row in step_rows(self._database):
             self.steps.append(self._make_step(*row))
             self._ids.append(row[0])
         self._last = self._ids[-1] if self._ids else 0
-        self.position = len(self.steps)
-        for (position,) in execute("SELECT value FROM about WHERE name = 'position'"):
-            self.position = min(int(position), len(self.steps))
-        for number, fields in execute("SELECT id, fields FROM look ORDER BY id").fetchall():
+        position = read_position(self._database)
+        self.position = len(self.steps) if position is None else min(position, len(self.steps))
+        for number, fields in look_rows(self._database):
             self._looks[number] = look = self._make_look(number, fields)
             if not isinstance(look.fields["name"], str):
                 raise TypeError("a look without a name")
@@ -325,8 +309,7 @@ class Store:
             blobs = self._blobs.get(number)
             if blobs is None:
                 with self._as_damage():
-                    query = "SELECT before, change FROM pixels WHERE step = ?"
-                    blobs = self._database.execute(query, (number,)).fetchone()
+                    blobs = pixels_row(self._database, number)
         if blobs is None:
             raise PaintError(f"a step that was cut off: {number}")
         with self._as_damage():
@@ -348,22 +331,19 @@ class Store:
         with self._lock:
             if number in self._arrays:
                 return list(self._arrays[number])
-            query = "SELECT name FROM look_array WHERE look = ? ORDER BY rowid"
             with self._as_damage():
-                return [name for (name,) in self._database.execute(query, (number,))]
+                return array_names(self._database, number)
 
     def look_array(self, number: int, name: str) -> PackedArray:
         """Return one array of a look, and read no other. Raises KeyError if there is none."""
         with self._lock:
             if number in self._arrays:
                 return self._arrays[number][name]
-            query = "SELECT dtype, shape, data FROM look_array WHERE look = ? AND name = ?"
             with self._as_damage():
-                row = self._database.execute(query, (number, name)).fetchone()
+                row = array_row(self._database, number, name)
         if row is None:
             raise KeyError(name)
-        dtype, shape, data = row
-        return dtype, shape, data
+        return row
 
 
 def _recover(path: Path, identity: Identity | None, error: DamagedError | None) -> str:
@@ -381,16 +361,3 @@ class MemoryStore(Store):
 
     def __init__(self, identity: Identity | None = None) -> None:
         super().__init__(None, identity)
-
-
-def _place_json(patch: Patch) -> list[int]:
-    """Return view and region of a patch as they are stored, with a 1 if it is marked."""
-    return [*map(int, (patch.view, *patch.region)), *([1] if is_marked(patch) else [])]
-
-
-def _to_json(fields: Mapping[str, Any]) -> str:
-    """Return fields as JSON. Raises PaintError for values that JSON cannot express."""
-    try:
-        return json.dumps(dict(fields), ensure_ascii=False, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise PaintError(f"this cannot be kept: {first_line(error)}") from None
