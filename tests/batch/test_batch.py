@@ -241,6 +241,12 @@ def test_a_full_disk_stops_with_one_line_and_goes_on_after(
     assert contents(here / "out") == contents(here / "whole")
 
 
+def test_one_look_is_not_several(here: Path) -> None:
+    for _ in range(2):
+        done = run(here, "batch", "looks.toml", "-o", "one", "--only", "third")
+    assert "1 look was done earlier and is unchanged" in done.stderr
+
+
 def test_a_basis_that_takes_too_much_memory_fails_its_looks_alone(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
