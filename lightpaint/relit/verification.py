@@ -48,11 +48,11 @@ class Verification(Shown):
         z_pattern: The correlation of the differences of the two halves, block by block, in standard
             errors (see `_pattern`): noise has none, a local error has.
         rmse: Of the pixels, in radiance.
-        z_lights: For each light that shines, the difference along its picture, in standard errors
-            (light_tests.py); empty if not computed.
         noise_rmse: The same for noise alone.
         delta_e_mean: CIEDE2000 at an exposure metered on the render, mean.
         delta_e_95: The same, 95th percentile.
+        z_lights: For each light that shines, the difference along its picture, in standard errors
+            (light_tests.py); empty if not computed.
         power: For each light that shines, the probability that this render would have disagreed
             with an error of 5 % in it (detection_power.py); None if not computed.
         limit: Standard errors at which a difference counts as real; farther out where the render
