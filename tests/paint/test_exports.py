@@ -33,7 +33,8 @@ def test_a_verifying_render_writes_nothing_beside_the_scene(tmp_path: Path) -> N
     picture, said, _ = render_verification(subject, basis, lighting, hears)
     assert seen
     assert all(files == there for files in seen)
-    assert "A render of 4 samples per pixel" in said
+    # It may end when it can tell, before all four samples.
+    assert "samples per pixel confirms it" in said
     np.testing.assert_allclose(picture.mean(), 2 * basis.present_look.mean(), rtol=0.1)  # noise
 
 
