@@ -1,6 +1,6 @@
 """Remarks for the user before a job runs, in plain text."""
 
-from lightpaint.basis.render.basis_render import memory_needed
+from lightpaint.basis.render.basis_render import memory_needed, renders_in_bands
 from lightpaint.basis.render.integrators import remark_on_separate_renders
 from lightpaint.images.denoiser import MISSING_REMARK, oidn_is_installed
 from lightpaint.images.pixel_blocks import Size, left_over, whole_factor
@@ -76,7 +76,8 @@ def remarks_of_pictures() -> list[str]:
 
 def remarks_of_memory(scene: Scene) -> list[str]:
     """Return a remark if the basis of `scene` takes much memory."""
-    if (needed := memory_needed(scene)) <= MUCH_MEMORY:
+    needed = memory_needed(scene, in_bands=renders_in_bands(scene))
+    if needed <= MUCH_MEMORY:
         return []
     return [
         f"{len(scene.lights)} lights of {scene.size[1]}x{scene.size[0]} pixels: "

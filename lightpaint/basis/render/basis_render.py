@@ -9,10 +9,11 @@ import numpy as np
 from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis, IndirectLight, Origin
 from lightpaint.basis.lights import BasisLight, Lights
-from lightpaint.basis.planes import as_planes
+from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.basis.render.banded_film import BAND_BYTES, BandedFilm, WholeFilm, is_banded
 from lightpaint.basis.render.guide_training import train
 from lightpaint.basis.render.half_sums import HalfCounts, add_halves, mean_and_half_difference
-from lightpaint.basis.render.integrators import has_indirect_planes, why_not_one_pass
+from lightpaint.basis.render.integrators import has_indirect_planes, plane_count, why_not_one_pass
 from lightpaint.basis.render.render_budget import Budget, Keeper, half_of, steps
 from lightpaint.basis.render.separate_renders import (
     LightSums,
@@ -84,7 +85,7 @@ def render_basis(
             f"{len(scene.lights)} lights at {width}x{height} are more than one basis can hold: "
             "use resolution=... or fewer lights"
         )
-    check_memory(scene)
+    check_memory(scene, in_bands=renders_in_bands(scene, start))
     if start is not None and not is_of(scene, start, seed):
         raise BasisError("the basis to go on from was made of another scene, sensor, film or seed")
     if start is not None and budget.met_by(start.origin.spp):
@@ -122,19 +123,34 @@ def with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
     return replace(basis, features=features, objects=objects)
 
 
-def memory_needed(scene: Scene) -> int:
-    """Return the peak memory of rendering a basis, in bytes, for any number of samples."""
+def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:
+    """Return whether `render_basis` keeps the sums of a film in a file, of which memory has a band.
+
+    start: what it goes on from. Without its exact sums that takes whole planes.
+    """
+    can_be_read = start is None or start.sums is not None
+    return can_be_read and method_of(scene) == ONE_PASS and is_banded(scene)
+
+
+def memory_needed(scene: Scene, *, in_bands: bool = False) -> int:
+    """Return the peak memory of rendering a basis, in bytes, for any number of samples.
+
+    in_bands: as `renders_in_bands` says.
+    """
     height, width = scene.size
     images = len(scene.lights) * height * width * 3 * 4
+    if in_bands:
+        # Half floats of images and half differences, and of indirect light; the rest is of a band.
+        return images * plane_count(scene) // len(scene.lights) + 6 * BAND_BYTES
     # Sums of two halves, the images and half differences made of them, and a copy of both
     # where they are written to a file; passes are small beside that.
     sets = 12 if has_indirect_planes(scene) else 6
     return sets * images + 512 * SAMPLES_PER_PASS
 
 
-def check_memory(scene: Scene) -> None:
+def check_memory(scene: Scene, *, in_bands: bool = False) -> None:
     """Raise SceneError if a basis of `scene` would not fit, instead of being killed for it."""
-    needed, free = memory_needed(scene), _free_memory()
+    needed, free = memory_needed(scene, in_bands=in_bands), _free_memory()
     if free is not None and needed > free:
         height, width = scene.size
         raise SceneError(
@@ -273,23 +289,52 @@ def basis_of_sums(
         seen = seen | start.emitters_seen
         if is_split and start.indirect is not None:
             add_halves(indirect, start.indirect.planes, start.indirect.noise, begun)
-    images, half_differences = map(as_planes, mean_and_half_difference(totals, spp))
+    pairs = [mean_and_half_difference(totals, spp)]
+    if is_split:
+        pairs.append(mean_and_half_difference(indirect, spp))
+    return _one_pass_basis(
+        [(as_planes(mean), as_planes(half)) for mean, half in pairs],
+        scene,
+        seed,
+        seen,
+        half_spp,
+        guide_table,
+        start=start,
+        is_finished=is_finished,
+        sums=kept,
+    )
+
+
+def _one_pass_basis(
+    pairs: Sequence[tuple[Planes, Planes]],
+    scene: Scene,
+    seed: int,
+    seen: Bools,
+    half_spp: int,
+    guide_table: Floats | None,
+    *,
+    start: Basis | None = None,
+    is_finished: bool,
+    sums: tuple[Floats, Floats] | None,
+) -> Basis:
+    """Return the one-pass basis of images and half differences: of all light, and of indirect
+    light where it is apart. For the others see `basis_of_sums`.
+    """
+    (images, noise), *indirect = pairs
     origin = origin_of(
         scene, seed, ONE_PASS, (half_spp, half_spp), FINISHED if is_finished else UNFINISHED
     )
     return Basis(
         basis_lights(scene),
         images,
-        half_differences,
+        noise,
         seen,
         origin if start is None else replace(origin, extra_spp=start.origin.extra_spp),
         guide_table,
-        indirect=IndirectLight(*map(as_planes, mean_and_half_difference(indirect, spp)))
-        if is_split
-        else None,
+        indirect=IndirectLight(*indirect[0]) if indirect else None,
         extra=None if start is None else start.extra,
         source=str(scene.path),
-        sums=kept,
+        sums=sums,
     )
 
 
@@ -315,47 +360,43 @@ def _render_together(
     """Render all lights by one path tracer (see one_pass.py), step by step."""
     from lightpaint.basis.render.one_pass import Tracer
 
-    height, width = scene.size
-    rows = range(height)
     begun = done = 0 if start is None else start.origin.halves[0]
     guide_table = None if start is None else start.guide_table
     tracer = Tracer(scene, view_seed(seed, scene.sensor), guide_table)
     before = None if start is None else start.sums
-    halves = [tracer.planes(rows, None if before is None else before[half]) for half in range(2)]
-    ahead = 0  # samples of a pixel that half A has before half B
+    rest = start if before is None else None  # what the sums do not begin with
+    film: WholeFilm | BandedFilm
+    film = (BandedFilm if renders_in_bands(scene, start) else WholeFilm)(tracer, done, before)
 
     def basis(*, is_last: bool = False, is_finished: bool = False) -> Basis:
-        seen = np.add(*(planes.seen() for planes in halves)) > 0
+        seen = film.seen()
         if start is not None:
             seen |= start.emitters_seen
-        rest = start if before is None else None  # what the sums do not begin with
-        sums = []
-        for half, planes in enumerate(halves):
-            sums.append(planes.sums())
-            if is_last:  # saves as much memory again
-                halves[half] = tracer.planes(range(0))
+        of_render = scene, seed, seen, done, tracer.guide_table
+        if isinstance(film, BandedFilm):
+            sums = None if is_finished else (film.sums.array[0], film.sums.array[1])
+            pairs = film.planes(done)
+            return _one_pass_basis(pairs, *of_render, is_finished=is_finished, sums=sums)
+        halves = film.sums(is_last=is_last)
         return basis_of_sums(
-            scene, seed, sums, seen, done, tracer.guide_table, start=rest, is_finished=is_finished
+            scene, seed, halves, seen, done, tracer.guide_table, start=rest, is_finished=is_finished
         )
 
     try:
         with tracing() as let_others_through:
-            for spp in steps(height * width, budget, done, progress):
+            for spp in steps(film.band_pixels, budget, done, progress):
                 if not tracer.is_trained:
                     train(tracer, let_others_through)
-                for half, planes in enumerate(halves):
-                    let_others_through()
-                    tracer.add(planes, half, rows, done, spp)
-                    ahead = spp if half == 0 else 0
+                film.add(done, spp, let_others_through)
                 done += spp
                 keeper.now_and_then(basis)
         return basis(is_last=True, is_finished=is_final)
     except KeyboardInterrupt:
         if keeper.keep is None:
             raise
-        if ahead:
-            with tracing():
-                tracer.add(halves[1], 1, rows, done, ahead)
+        if ahead := film.ahead:
+            with tracing() as let_others_through:
+                film.add(done, ahead, let_others_through)
             done += ahead
         if done == begun == 0:
             raise Interrupted("too early for anything to be kept") from None

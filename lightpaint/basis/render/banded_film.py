@@ -1,0 +1,236 @@
+"""The sums of a one-pass render: of the whole film on the device or, of a large one, band by band.
+
+The samples of a pixel are added in their order, whichever rows are traced at a time. So a film in
+bands has the bits of one that is traced whole. Its sums lie in a file without a name, of which
+memory holds a band, and its planes are made of them when they are asked for.
+"""
+
+import mmap
+import os
+import tempfile
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Floats
+from lightpaint.basis.file_planes import RowPlanes
+from lightpaint.basis.render.half_sums import mean_and_half_difference
+from lightpaint.basis.render.integrators import plane_count
+from lightpaint.errors import SceneError
+from lightpaint.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from lightpaint.basis.render.one_pass import Tracer
+
+#: Bytes of the sums of both halves up to which a film is traced whole, and bytes of a band of them.
+WHOLE_MAX_BYTES, BAND_BYTES = 2**30, 2**27
+
+
+def is_banded(scene: Scene) -> bool:
+    """Return whether the sums of `scene` lie in a file while it is rendered in one pass."""
+    height, width = scene.size
+    return 2 * 12 * plane_count(scene) * height * width > WHOLE_MAX_BYTES
+
+
+class Film(ABC):
+    """The sums of both halves of the samples of a film, whose rows are traced in bands.
+
+    tracer: traces them. begun: samples per pixel of each half that come before.
+    """
+
+    def __init__(self, tracer: "Tracer", begun: int, band_rows: int) -> None:
+        self._tracer, self._begun = tracer, begun
+        height, self._width = tracer.scene.size
+        tops = range(0, height, band_rows)
+        self._bands = [range(top, min(top + band_rows, height)) for top in tops]
+        #: Samples per pixel that are added, of each half and band.
+        self._added = np.zeros((2, len(self._bands)), np.int64)
+
+    @property
+    def band_pixels(self) -> int:
+        """Pixels that are traced at a time."""
+        return len(self._bands[0]) * self._width
+
+    @property
+    def ahead(self) -> int:
+        """Samples per pixel of a half that an interrupt has left some pixels ahead of others."""
+        return int(self._added.max() - self._added.min())
+
+    def add(self, first: int, spp: int, pause: Callable[[], None]) -> None:
+        """Add samples of all pixels to both halves, except to pixels that have them already.
+
+        first: samples of a half that come before. pause: called before each kernel.
+        """
+        goal = first + spp - self._begun
+        for half, added in enumerate(self._added):
+            for k, rows in enumerate(self._bands):
+                if (missing := goal - int(added[k])) > 0:
+                    pause()
+                    self._trace(half, rows, self._begun + goal - missing, missing)
+                    added[k] = goal
+
+    @abstractmethod
+    def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
+        """Add samples of a band to a half."""
+
+    @abstractmethod
+    def seen(self) -> Bools:
+        """Return where an emitter was seen, (h, w)."""
+
+
+class WholeFilm(Film):
+    """Sums that the device holds, in a single band.
+
+    start: those of both halves that they begin with, (planes, h, w, 3); None for zeros.
+    """
+
+    def __init__(
+        self, tracer: "Tracer", begun: int, start: tuple[Floats, Floats] | None = None
+    ) -> None:
+        super().__init__(tracer, begun, tracer.scene.size[0])
+        before = (None, None) if start is None else start
+        self._halves = [tracer.planes(self._bands[0], sums) for sums in before]
+
+    def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
+        self._tracer.add(self._halves[half], half, rows, first, spp)
+
+    def seen(self) -> Bools:
+        return np.asarray(np.add(*(planes.seen() for planes in self._halves)) > 0)
+
+    def sums(self, *, is_last: bool) -> list[Floats]:
+        """Return the sums of both halves, (planes, h, w, 3). is_last: whether they are released."""
+        made = []
+        for half, planes in enumerate(self._halves):
+            made.append(planes.sums())
+            if is_last:  # saves as much memory again
+                self._halves[half] = self._tracer.planes(range(0))
+        return made
+
+
+class BandedFilm(Film):
+    """Sums in a file, of which the device holds a band. start: as of `WholeFilm`.
+
+    Raises SceneError if the disk has no room for them.
+    """
+
+    def __init__(
+        self, tracer: "Tracer", begun: int, start: tuple[Floats, Floats] | None = None
+    ) -> None:
+        (height, width), planes = tracer.scene.size, plane_count(tracer.scene)
+        super().__init__(tracer, begun, max(1, BAND_BYTES // (12 * planes * width)))
+        self.sums = FileSums((2, planes, height, width, 3))
+        self._seen = np.zeros((height, width), dtype=bool)
+        for half, before in enumerate(start or ()):
+            for rows in self._bands:
+                self.sums.write(half, rows, before[:, rows.start : rows.stop])
+
+    def _trace(self, half: int, rows: range, first: int, spp: int) -> None:
+        planes = self._tracer.planes(rows, self.sums.read(half, rows))
+        self._tracer.add(planes, half, rows, first, spp)
+        self._seen[rows.start : rows.stop] |= planes.seen() > 0
+        self.sums.write(half, rows, planes.sums())
+
+    def seen(self) -> Bools:
+        return self._seen.copy()
+
+    def planes(self, spp: int) -> list[tuple["SumPlanes", "SumPlanes"]]:
+        """Return images and half differences of all light and, where it is apart, indirect light.
+
+        They are made of the sums as these are when they are asked for. spp: samples of a half.
+        """
+        n = len(self._tracer.scene.lights)
+        direct, indirect = slice(0, n), slice(n, 2 * n)
+        is_split = self.sums.array.shape[1] > n
+        parts = [(direct, indirect), (indirect,)] if is_split else [(direct,)]
+        return [
+            (
+                SumPlanes(self.sums, part, spp, is_noise=False),
+                SumPlanes(self.sums, part, spp, is_noise=True),
+            )
+            for part in parts
+        ]
+
+
+class FileSums:
+    """An array of zeros, (2, planes, h, w, 3) float32, in a file that goes when it does.
+
+    Memory lets go of what is read and written at once. Raises SceneError if the disk has no room.
+    """
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        needed = 4 * int(np.prod(shape))
+        try:
+            with tempfile.TemporaryFile() as file:
+                if hasattr(os, "posix_fallocate"):  # else a full disk ends the process later
+                    os.posix_fallocate(file.fileno(), 0, needed)
+                self.array = np.memmap(file, np.float32, "r+", shape=shape)  # keeps it open
+        except OSError as error:
+            raise SceneError(
+                f"rendering needs {needed / 1e9:.1f} GB in {tempfile.gettempdir()} "
+                f"({error.strerror or error}): set TMPDIR to a folder with more room, or use "
+                "resolution=... or fewer lights"
+            ) from error
+
+    def read(self, half: int, rows: range) -> Floats:
+        """Return a copy of some rows of a half, (planes, rows, w, 3)."""
+        made = np.array(self.array[half, :, rows.start : rows.stop])
+        self._release()
+        return made
+
+    def write(self, half: int, rows: range, sums: Floats) -> None:
+        """Write some rows of a half."""
+        self.array[half, :, rows.start : rows.stop] = sums
+        self._release()
+
+    def halves(self, parts: Sequence[slice], lights: slice, rows: slice) -> list[Floats]:
+        """Return the sums of both halves of some lights and rows, with all `parts` added up."""
+        made = []
+        for half in self.array:
+            total, *others = (half[part][lights, rows] for part in parts)
+            total = np.array(total)
+            for other in others:
+                total += other
+            made.append(total)
+        self._release()
+        return made
+
+    def _release(self) -> None:
+        """Let go of the memory of what was read or written, which stays in the file."""
+        if hasattr(mmap, "MADV_DONTNEED"):
+            self.array._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
+
+
+class SumPlanes(RowPlanes):
+    """Planes made of the sums in a file when they are asked for.
+
+    parts: which planes of the sums are added up. spp: samples per pixel of each half. is_noise:
+    whether they are half differences, or means.
+    """
+
+    def __init__(self, sums: FileSums, parts: Sequence[slice], spp: int, *, is_noise: bool) -> None:
+        self._sums, self._parts, self._spp, self._is_noise = sums, tuple(parts), spp, is_noise
+
+    @property
+    def count(self) -> int:
+        """n."""
+        return int(self._parts[0].stop - self._parts[0].start)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        height, width = self._sums.array.shape[2:4]
+        return height, width
+
+    def plane(self, i: int) -> Floats:
+        """Return the plane of light i, (h, w, 3)."""
+        return np.asarray(self._planes(slice(i, i + 1), slice(None))[0])
+
+    def rows(self, top: int, bottom: int) -> Floats:
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        return self._planes(slice(None), slice(max(top, 0), max(bottom, 0)))
+
+    def _planes(self, lights: slice, rows: slice) -> Floats:
+        halves = self._sums.halves(self._parts, lights, rows)
+        return mean_and_half_difference(halves, (self._spp, self._spp))[int(self._is_noise)]

@@ -1,0 +1,124 @@
+"""A large film is rendered in bands: to the same bits, and with one band at a time in memory."""
+
+import errno
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from renderer import assert_equal_bits
+
+import lightpaint.scene.scene_render
+from lightpaint.basis import basis_file, cache
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.half_floats import EncodedPlanes
+from lightpaint.basis.render import banded_film, guide_training
+from lightpaint.basis.render.banded_film import FileSums, SumPlanes
+from lightpaint.basis.render.basis_render import memory_needed, render_basis, renders_in_bands
+from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.errors import SceneError
+from lightpaint.progress import Interrupted
+from lightpaint.scene.scene import Scene
+
+#: Rows of a band: three bands and a shorter one of the twenty rows of the test room.
+ROWS = 6
+
+
+@pytest.fixture(autouse=True)
+def small_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps of four samples of a pixel of a band in each half."""
+    monkeypatch.setattr(lightpaint.scene.scene_render, "SAMPLES_PER_PASS", 4 * 4 * 24 * ROWS)
+    monkeypatch.setattr(guide_training, "TRAINING_SAMPLES", (2**12,))
+
+
+@pytest.fixture
+def whole(small_room: Scene) -> Basis:
+    return render_basis(small_room, spp=20, seed=3)
+
+
+@pytest.fixture
+def in_bands(monkeypatch: pytest.MonkeyPatch, whole: Basis, small_room: Scene) -> list[int]:
+    """Bands from here on. Returns the bytes of the sums that memory has at a time."""
+    _, width = small_room.size
+    planes = 2 * len(small_room.lights)
+    monkeypatch.setattr(banded_film, "WHOLE_MAX_BYTES", 0)
+    monkeypatch.setattr(banded_film, "BAND_BYTES", 12 * planes * width * ROWS)
+    assert renders_in_bands(small_room)
+    read: list[int] = []
+    plain = FileSums.read
+
+    def counted(sums: FileSums, half: int, rows: range) -> Any:
+        made = plain(sums, half, rows)
+        read.append(made.nbytes)
+        return made
+
+    monkeypatch.setattr(FileSums, "read", counted)
+    return read
+
+
+def test_bands_have_the_bits_of_the_whole_film(
+    small_room: Scene, whole: Basis, in_bands: list[int]
+) -> None:
+    found = render_basis(small_room, spp=20, seed=3)
+    assert isinstance(found.planes, SumPlanes)
+    assert_equal_bits(found, whole)
+    assert found.indirect is not None
+    for mine in (found.planes, found.noise, found.indirect.planes, found.indirect.noise):
+        its = mine.array()
+        assert mine.plane(1).tobytes() == its[1].tobytes()
+        assert mine.rows(3, 9).tobytes() == its[:, 3:9].tobytes()
+    assert max(in_bands) <= banded_film.BAND_BYTES
+    assert len(in_bands) > 8
+
+
+@pytest.mark.parametrize("after", [2, 6, 11])
+def test_an_interrupted_band_goes_on_to_the_same_bits(
+    small_room: Scene,
+    whole: Basis,
+    in_bands: list[int],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    after: int,
+) -> None:
+    """Bands that are behind are brought to those that were rendered, and none twice."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    plain = FileSums.write
+
+    def interrupted(sums: FileSums, half: int, rows: range, values: Any) -> None:
+        plain(sums, half, rows, values)
+        if len(in_bands) == after:
+            in_bands.append(0)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(FileSums, "write", interrupted)
+        with pytest.raises(Interrupted, match="are kept"):
+            obtain_basis(small_room, spp=20, seed=3)
+    sensor = small_room.sensor_names[small_room.sensor]
+    part = cache.find(small_room.identity, sensor, 3, small_room.size)
+    assert part is not None
+    assert 0 < part.origin.spp < 20
+    found = obtain_basis(small_room, spp=20, seed=3)
+    assert isinstance(found.planes, EncodedPlanes)
+    assert_equal_bits(found, basis_file.as_stored(whole))
+
+
+def test_memory_is_that_of_half_floats_and_some_bands(
+    small_room: Scene, in_bands: list[int]
+) -> None:
+    whole, banded = (memory_needed(small_room, in_bands=x) for x in (False, True))
+    height, width = small_room.size
+    assert whole - banded > 9 * len(small_room.lights) * height * width * 12
+
+
+def test_a_full_disk_is_one_clear_line(
+    small_room: Scene, in_bands: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    with pytest.raises(SceneError, match=r"0\.0 GB in .*No space left on device.*TMPDIR"):
+        render_basis(small_room, spp=2)
