@@ -34,7 +34,7 @@ def is_banded(scene: Scene) -> bool:
     return 2 * 12 * plane_count(scene) * height * width > WHOLE_MAX_BYTES
 
 
-class Film(ABC):
+class FilmSums(ABC):
     """The sums of both halves of the samples of a film, whose rows are traced in bands.
 
     tracer: traces them. begun: samples per pixel of each half that come before.
@@ -80,7 +80,7 @@ class Film(ABC):
         """Return where an emitter was seen, (h, w)."""
 
 
-class WholeFilm(Film):
+class WholeFilm(FilmSums):
     """Sums that the device holds, in a single band.
 
     start: those of both halves that they begin with, (planes, h, w, 3); None for zeros.
@@ -109,7 +109,7 @@ class WholeFilm(Film):
         return made
 
 
-class BandedFilm(Film):
+class BandedFilm(FilmSums):
     """Sums in a file, of which the device holds a band. start: as of `WholeFilm`.
 
     Raises SceneError if the disk has no room for them.
@@ -197,7 +197,7 @@ class FileSums:
         return made
 
     def _release(self) -> None:
-        """Let go of the memory of what was read or written, which stays in the file."""
+        """Release the memory of what was read or written, which stays in the file."""
         if hasattr(mmap, "MADV_DONTNEED"):
             self.array._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
 
