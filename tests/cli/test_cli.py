@@ -648,7 +648,13 @@ def test_budgets_that_contradict_each_other_are_refused(basis_file: Path, tmp_pa
     assert "not a number of seconds" in refused(*refuse, "--time", 0)
     assert "invalid choice" in refused(*refuse, "--quality", "good")
     assert "will do" in refused(*refuse, "--resolution", "100x100")
-    for option in (("--time", 3), ("--quality", "final"), ("--resolution", "1/2")):
+    solve = [tmp_path, "solve", CORNELL, WARM]
+    assert "error is 0.02 and spp 4" in refused(*solve, "--error", "2%", "--spp", 4)
+    for wrong in ("0", "nan", "100%"):
+        assert "expected a share of at least" in refused(*solve, "--error", wrong)
+    assert "not a share like 2%" in refused(*solve, "--error", "two")
+    given = (("--time", 3), ("--error", "2%"), ("--quality", "final"), ("--resolution", "1/2"))
+    for option in given:
         told = refused(tmp_path, "solve", basis_file, WARM, *option)
         assert f"{option[0]} cannot change a saved basis" in told
 
