@@ -26,7 +26,7 @@ class Preset:
         return 1 if self.pixels is None else reduction_to(film, self.pixels)
 
 
-PRESETS: dict[Quality, Preset] = {"preview": Preset(64, 2**15), "final": Preset(512)}
+PRESETS: dict[Quality, Preset] = {"preview": Preset(32, 2**15), "final": Preset(256)}
 
 
 def on_film(scene: Scene, quality: Quality | None, resolution: str | None) -> Scene:

@@ -183,7 +183,7 @@ def test_presets_take_the_smallest_reduction_that_is_small_enough(tmp_path: Path
     assert on_film(scene, None, None) is scene
     assert samples(None, spp=None, time_s=None) is None
     assert on_film(scene, "preview", None).size == (10, 2000)
-    assert samples("preview", spp=None, time_s=None) == 64
+    assert samples("preview", spp=None, time_s=None) == 32
     # What is given goes before the preset.
     assert on_film(scene, "preview", "1/4").size == (5, 1000)
     assert samples("preview", spp=3, time_s=None) == 3

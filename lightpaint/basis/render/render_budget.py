@@ -10,7 +10,8 @@ from lightpaint.errors import SceneError
 from lightpaint.progress import Progress
 from lightpaint.scene.scene_render import largest_pass, plan_passes
 
-#: Seconds of work that a crash may cost.
+#: Seconds of work that a crash may cost: on the clock and of the processor, so that a machine that
+#: is busy with other work does not write more often.
 KEEP_EVERY_S = 30.0
 
 #: Passes of a basis are shorter by this factor than those of a picture: they are the steps in which
@@ -107,14 +108,23 @@ class Keeper:
 
     def __init__(self, keep: Callable[[Basis], bool] | None) -> None:
         self.keep = keep
-        self.kept_s, self.every_s = time.monotonic(), KEEP_EVERY_S
+        self.kept_s, self.every_s = _now_s(), KEEP_EVERY_S
 
     def now_and_then(self, make: Callable[[], Basis]) -> None:
         """Keep what `make` makes, if the last time is long enough ago."""
-        now_s = time.monotonic()
-        if self.keep is None or now_s - self.kept_s <= self.every_s:
+        now_s = _now_s()
+        if self.keep is None or min(_passed(self.kept_s, now_s)) <= self.every_s:
             return
         self.keep(make())
-        self.kept_s = time.monotonic()
+        self.kept_s = _now_s()
         # Where writing takes long, it must not become the work itself.
-        self.every_s = max(KEEP_EVERY_S, 10 * (self.kept_s - now_s))
+        self.every_s = max(KEEP_EVERY_S, 10 * _passed(now_s, self.kept_s)[0])
+
+
+def _now_s() -> tuple[float, float]:
+    """Return seconds on the clock and of the processor, of this process."""
+    return time.monotonic(), time.process_time()
+
+
+def _passed(begin_s: tuple[float, float], end_s: tuple[float, float]) -> tuple[float, float]:
+    return end_s[0] - begin_s[0], end_s[1] - begin_s[1]

@@ -134,8 +134,8 @@ def add_budget(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quality",
         choices=("preview", "final"),
-        help="preview: 64 samples per pixel on about 30,000 pixels, each a block of film pixels; "
-        "final: 512 on the whole film; --spp, --time and --resolution take precedence",
+        help="preview: 32 samples per pixel on about 30,000 pixels, each a block of film pixels; "
+        "final: 256 on the whole film; --spp, --time and --resolution take precedence",
     )
     add_resolution(parser)
     add_seed(parser)

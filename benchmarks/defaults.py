@@ -1,0 +1,262 @@
+"""What the defaults spend, and how good they are, against an earlier version.
+
+    python benchmarks/defaults.py --before CHECKOUT [--parts demo second first weights]
+
+Seconds of the processor of whole processes, in turns with those of CHECKOUT, an earlier version.
+
+- demo: `lightpaint demo` with nothing kept and no kernel compiled.
+- second: `lightpaint solve` of each painting of the gallery with the basis kept that the demo
+  rendered, verification included; and how much of the light the verification checked: the share of
+  lights in which it would probably have seen an error of 5 %.
+- first: a first picture with nothing kept and no kernel compiled: the fewest samples whose present
+  look, denoised, has a mean ΔE of 3 or less to a long render.
+- weights: the mean relative error of the lights' weights, each with its share of the picture, by
+  the samples that the version's demo takes, and the mean ΔE of the denoised prediction to the long
+  render at the same weights. On a quarter of the film, several seeds, against a long render.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parent.parent
+GALLERY = "scenes/gallery/scene.xml"
+PAINTINGS = {
+    "evening": ["evening.exr"],
+    "morning": ["morning.exr", "--mask", "morning.mask.exr"],
+    "opening": ["opening.png"],
+    "after-hours": ["after-hours.png"],
+    "overcast": ["overcast.png"],
+    "last-sun": ["last-sun.png"],
+}
+PARTS = ("demo", "second", "first", "weights")
+
+#: Most mean ΔE of a first picture.
+CLOSE = 3.0
+
+#: Chance from which on an error would probably have been seen.
+LIKELY = 0.5
+
+#: Seed of the long render, which no other has.
+LONG_SEED = 90_000
+
+#: Runs what follows `-c` and prints the processor's seconds of it and of its children.
+TIMED = """
+import resource, subprocess, sys
+code = subprocess.run([sys.executable, *sys.argv[1:]], stdout=sys.stderr).returncode
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(used.ru_utime + used.ru_stime)
+sys.exit(code)
+"""
+
+#: One picture of the scene as it is, denoised, written as NumPy's array.
+FIRST = """
+import sys
+import numpy as np
+import lightpaint as lp
+from lightpaint.images.denoiser import denoised
+scene, spp, out = sys.argv[1:]
+basis = lp.render_basis(lp.load_scene(scene), spp=int(spp))
+try:
+    from lightpaint.basis.denoised_mixes import denoise_present_look
+    picture = denoise_present_look(basis)
+except ImportError:  # an earlier version
+    picture = denoised(basis.present_look, basis.features)
+np.save(out, picture)
+"""
+
+#: Weights for each painting and the denoised prediction of several seeds, as NumPy's arrays.
+WEIGHTS = """
+import json, sys
+import numpy as np
+import lightpaint as lp
+from lightpaint.images.denoiser import denoised
+try:
+    from lightpaint.basis.denoised_mixes import denoise_mix
+except ImportError:
+    def denoise_mix(basis, weights):
+        return denoised(basis.mix(weights), basis.features)
+root, paintings, seeds, out = sys.argv[1:]
+scene, found = lp.load_scene(root + "/scenes/gallery/scene.xml"), {}
+for seed in range(int(seeds)):
+    basis = lp.render_basis(scene.reduced("1/4"), spp=scene.spp, seed=seed + 1)
+    for name, [file, *mask] in json.loads(paintings).items():
+        target = lp.read_target(file, mask=mask[0] if mask else None)
+        weights = lp.solve(basis, target).lighting.weights_for(basis)
+        found.setdefault(f"weights of {name}", []).append(weights)
+        found.setdefault(f"pictures of {name}", []).append(denoise_mix(basis, weights))
+np.savez(out, spp=scene.spp, **found)
+"""
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--before", type=Path, required=True, metavar="CHECKOUT")
+    parser.add_argument("--parts", nargs="+", default=list(PARTS), choices=PARTS)
+    parser.add_argument("--long-spp", type=int, default=512)
+    parser.add_argument("--seeds", type=int, default=8)
+    options = parser.parse_args()
+    checkouts = {"before": options.before.absolute(), "now": ROOT}
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        if {"demo", "second"} & set(options.parts):
+            demo(checkouts, place)
+        if "second" in options.parts:
+            second(checkouts, place)
+        if "first" in options.parts:
+            first(checkouts, place, options.long_spp)
+        if "weights" in options.parts:
+            weights(checkouts, place, options.long_spp, options.seeds)
+
+
+def seconds_of(arguments: Sequence[str], checkout: Path, home: Path) -> float:
+    """Run Python with `arguments` in a version; return the processor's seconds."""
+    home.mkdir(exist_ok=True)
+    (home / "cache").mkdir(exist_ok=True)
+    known = {"HOME": str(home), "LIGHTPAINT_CACHE": str(home / "cache")}
+    done = subprocess.run(
+        [sys.executable, "-c", TIMED, *arguments],
+        env={**os.environ, "PYTHONPATH": str(checkout), **known},
+        capture_output=True,
+        cwd=home,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    return float(done.stdout)
+
+
+def command(*arguments: str) -> list[str]:
+    """Return Python's arguments for a command of lightpaint."""
+    return ["-c", "import sys; from lightpaint.cli import main; sys.exit(main())", *arguments]
+
+
+def verified(folder: Path) -> tuple[int, float]:
+    """Return the samples of a verification, and the share of the light that it checked."""
+    report = json.loads((folder / "report.json").read_text())
+    power = report["verification"]["power"]["lights"]
+    lights = report["lights"]
+    seen = sum(lights[name]["share"] for name, chance in power.items() if chance >= LIKELY)
+    return report["verification"]["spp"], seen
+
+
+def demo(checkouts: dict[str, Path], place: Path) -> None:
+    """Measure the demo with nothing kept."""
+    found = {
+        which: seconds_of(command("demo", "-q"), at, place / which)
+        for which, at in checkouts.items()
+    }
+    print_row("demo, cold", found)
+
+
+def second(checkouts: dict[str, Path], place: Path) -> None:
+    """Measure the paintings of a kept scene."""
+    total = dict.fromkeys(checkouts, 0.0)
+    for name, files in PAINTINGS.items():
+        found, notes = {}, []
+        for which, at in checkouts.items():
+            files_at = [str(at / "targets/gallery" / x) if "." in x else x for x in files]
+            scene = str(place / which / "lightpaint-demo/gallery/scene.xml")
+            arguments = command("solve", scene, *files_at, "-o", name, "-q")
+            found[which] = seconds_of(arguments, at, place / which)
+            total[which] += found[which]
+            spp, share = verified(place / which / name)
+            notes.append(f"{spp} samples check {100 * share:.0f} %")
+        print_row(f"second painting, {name}", found, " / ".join(notes))
+    print_row("second painting, all six", total)
+
+
+def first(checkouts: dict[str, Path], place: Path, long_spp: int) -> None:
+    """Measure how long a first picture takes that is close to a long render."""
+    import lightpaint as lp
+
+    scene = str(ROOT / GALLERY)
+    # A picture of ordinary paths, so that it is nobody's own.
+    truth = lp.render_basis(
+        lp.load_scene(scene).reduced("1/2"), spp=long_spp // 4, seed=LONG_SEED
+    ).present_look
+    found, notes = {}, []
+    for which, at in checkouts.items():
+        for spp in (2, 4, 8, 16, 32, 64):
+            out = place / f"{which}-{spp}.npy"
+            home = place / f"first-{which}-{spp}"
+            found[which] = seconds_of(["-c", FIRST, scene, str(spp), str(out)], at, home)
+            off = delta_e_mean(np.load(out), truth)
+            if off <= CLOSE:
+                break
+        notes.append(f"{spp} samples, ΔE {off:.1f}")
+    print_row("first picture, cold", found, " / ".join(notes))
+
+
+def weights(checkouts: dict[str, Path], place: Path, long_spp: int, seeds: int) -> None:
+    """Measure errors of weights and pictures."""
+    import lightpaint as lp
+
+    paintings = {
+        name: [str(ROOT / "targets/gallery" / x) for x in files if "." in x]
+        for name, files in PAINTINGS.items()
+    }
+    scene = lp.load_scene(ROOT / GALLERY).reduced("1/4")
+    basis = lp.render_basis(scene, spp=long_spp, seed=LONG_SEED)
+    found = {}
+    for which, at in checkouts.items():
+        out = place / f"{which}.npz"
+        arguments = ["-c", WEIGHTS, str(at), json.dumps(paintings), str(seeds), str(out)]
+        seconds_of(arguments, at, place / which)
+        with np.load(out) as kept:
+            found[which] = dict(kept)
+    for name, [file, *mask] in paintings.items():
+        target = lp.read_target(file, mask=mask[0] if mask else None)
+        truth = lp.solve(basis, target).lighting.weights_for(basis)
+        lit = basis.images * truth[:, None, None, :]
+        share = np.einsum("nhwc,hwc->n", lit, lit.sum(axis=0), dtype=np.float64)
+        errors, notes = {}, []
+        for which, its in found.items():
+            made = its[f"weights of {name}"]
+            off = np.abs(luminance(made - truth)) / np.maximum(luminance(truth), 1e-9)
+            each = 100 * off @ share / share.sum()
+            errors[which] = float(each.mean())
+            pairs = zip(its[f"pictures of {name}"], made, strict=True)
+            off_e = np.mean([delta_e_mean(x, basis.mix(w)) for x, w in pairs])
+            notes.append(f"± {each.std() / np.sqrt(seeds):.2f}, picture ΔE {off_e:.2f}")
+        print_row(f"error of weights in %, {name}", errors, " / ".join(notes))
+    print("samples: " + ", ".join(f"{its['spp']} {which}" for which, its in found.items()))
+
+
+def luminance(weights: Any) -> Any:
+    """Return the luminance of linear colours."""
+    return weights @ np.array([0.2126, 0.7152, 0.0722])
+
+
+def delta_e_mean(picture: Any, truth: Any) -> float:
+    """Return the mean CIEDE2000 of two pictures, at the exposure metered on the second.
+
+    The larger is averaged over blocks to the size of the smaller.
+    """
+    from lightpaint.colour.color_difference import delta_e
+    from lightpaint.colour.display.exposure import choose_exposure
+    from lightpaint.images.pixel_blocks import block_mean
+
+    picture = block_mean(np.asarray(picture, np.float32), picture.shape[0] // truth.shape[0])
+    scale = 2.0 ** choose_exposure(truth)
+    return float(delta_e(picture * scale, truth * scale).mean())
+
+
+def print_row(title: str, found: dict[str, float], note: str = "") -> None:
+    """Print figures of both versions, and their ratio."""
+    before, now = found["before"], found["now"]
+    print(f"{title:38s}{before:8.2f}{now:8.2f}{now / before:7.2f}   {note}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
