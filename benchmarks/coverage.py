@@ -153,7 +153,7 @@ def rendered_bases(scene: Scene, seeds: int, spp: int, factor: int) -> Iterator[
     Each is a stretch of the pixels' sequences: as evenly spread as the first, and scrambled alike.
     factor: of the samples that the last one has.
     """
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
     tracer, rows, half_spp = Tracer(scene, 0), range(scene.size[0]), spp // 2
     table = train(tracer, lambda: None)

@@ -45,7 +45,7 @@ def main() -> None:
 def measure(scene: Scene, pairs: list[tuple[int, ...]], spp: int, repeats: int) -> None:
     """Render and print one table. The first of the pairs is what others are compared with."""
     use_variant()
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
     seconds, training, variances = defaultdict(list), defaultdict(list), defaultdict(list)
     rows, half_spp = range(scene.size[0]), spp // 2

@@ -110,7 +110,7 @@ def one_pass(scene: Scene, *, seed: int, spp: int, plain: bool = True) -> np.nda
     from lightpaint.scene.runtime.variant import use_variant
 
     use_variant()
-    from lightpaint.basis.render.one_pass import Tracer, trace_plainly
+    from lightpaint.basis.render.tracer.one_pass import Tracer, trace_plainly
 
     if plain:
         loaded = scene.load({light.name: (1.0, 1.0, 1.0) for light in scene.lights})

@@ -22,7 +22,7 @@ from lightpaint.errors import SceneError
 from lightpaint.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
 #: Bytes of the sums of both halves up to which a film is traced whole, and bytes of a band of them.
 WHOLE_MAX_BYTES, BAND_BYTES = 2**30, 2**27

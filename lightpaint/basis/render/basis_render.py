@@ -358,7 +358,7 @@ def _render_together(
     is_final: bool = True,
 ) -> Basis:
     """Render all lights by one path tracer (see one_pass.py), step by step."""
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
     begun = done = 0 if start is None else start.origin.halves[0]
     guide_table = None if start is None else start.guide_table

@@ -14,7 +14,7 @@ from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import view_seed
 
 if TYPE_CHECKING:
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
 #: Camera samples of the training passes. Each samples by what those before have learned.
 TRAINING_SAMPLES = (2**16, 2**17, 2**17)
@@ -23,7 +23,7 @@ TRAINING_SAMPLES = (2**16, 2**17, 2**17)
 @MITSUBA.taken()
 def train_guide(scene: Scene, seed: int) -> Floats:
     """Learn which emitters to choose where in `scene`, and return the `Basis.guide_table`."""
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
     tracer = Tracer(scene, view_seed(seed, scene.sensor))
     try:

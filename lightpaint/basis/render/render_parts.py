@@ -132,7 +132,7 @@ class PartRenderer:
         if part.light is not None:
             return self._of_light(part, part.light)
         if self._tracer is None:
-            from lightpaint.basis.render.one_pass import Tracer
+            from lightpaint.basis.render.tracer.one_pass import Tracer
 
             self._tracer = Tracer(self._scene, self._seed, self._guide_table)
         rows, size = range(part.top, part.bottom), (part.bottom - part.top, self._scene.size[1])

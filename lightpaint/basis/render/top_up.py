@@ -48,7 +48,7 @@ def top_up(
 
     Raises BasisError for a basis of something else, and Interrupted for Ctrl-C.
     """
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
     if basis.origin.method != ONE_PASS or not is_of(scene, basis, basis.origin.seed):
         raise BasisError("the basis to top up is not a one-pass basis of this scene and film")

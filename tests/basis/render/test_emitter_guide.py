@@ -28,7 +28,7 @@ BEHIND = '<emitter type="point" id="behind"><point name="position" x="0" y="1" z
 
 def probabilities(received: np.ndarray, asked: np.ndarray, lights: list[int]) -> np.ndarray:
     use_variant()
-    from lightpaint.basis.render.emitter_guide import _probabilities
+    from lightpaint.basis.render.tracer.emitter_guide import _probabilities
 
     sampled = np.ones(len(lights), dtype=bool)
     return _probabilities(received, asked, np.asarray(lights), sampled)
@@ -37,7 +37,7 @@ def probabilities(received: np.ndarray, asked: np.ndarray, lights: list[int]) ->
 @given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(1, 5))
 def test_probabilities_are_probabilities(seed: int, emitters: int, cells: int) -> None:
     use_variant()
-    from lightpaint.basis.render.emitter_guide import EVEN_SHARE
+    from lightpaint.basis.render.tracer.emitter_guide import EVEN_SHARE
 
     rng = np.random.default_rng(seed)
     asked = rng.integers(0, 5, (cells, emitters)).astype(float)
@@ -56,7 +56,7 @@ def test_an_untrained_guide_chooses_evenly() -> None:
 
 def test_a_light_is_asked_where_it_matters_however_faint_it_is() -> None:
     use_variant()
-    from lightpaint.basis.render.emitter_guide import EVEN_SHARE
+    from lightpaint.basis.render.tracer.emitter_guide import EVEN_SHARE
 
     asked = np.full((2, 2), 1e6)
     found = probabilities(np.array([[1e6, 0], [0, 1.0]]), asked, [0, 1])

@@ -74,7 +74,7 @@ def test_an_interrupt_between_the_halves_of_a_step_waits_for_the_second(
     small_room: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     use_variant()
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
     kept: list[Basis] = []
     add, calls = Tracer.add, 0

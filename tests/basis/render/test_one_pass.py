@@ -369,7 +369,7 @@ def test_any_number_of_emitter_samples_has_the_same_mean(
 ) -> None:
     """By chance, by choice and, on a glossy wall beside a panel, by both."""
     use_variant()
-    from lightpaint.basis.render import one_pass as module
+    from lightpaint.basis.render.tracer import one_pass as module
 
     lights = LIGHTS["panel"] + LIGHTS["beam"] + LIGHTS["sky"]
     scene = load_scene(write_room(tmp_path, lights=lights))
@@ -531,7 +531,11 @@ def test_passes_make_up_two_equal_halves_of_the_samples(pixels: int, spp: int) -
     assert max(sizes[0]) * pixels <= max(SAMPLES_PER_PASS, pixels)
 
 
-def test_what_does_not_fit_is_refused_before_it_is_tried(tmp_path: Path) -> None:
+def test_what_does_not_fit_is_refused_before_it_is_tried(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free_memory = "lightpaint.basis.render.basis_render._free_memory"
+    monkeypatch.setattr(free_memory, lambda: 2**33)
     path = write_room(tmp_path)
     huge = load_scene(path, parameters={"width": 10_000_000})
     with pytest.raises(SceneError, match="5 lights at 10000000x20"):
@@ -551,8 +555,8 @@ def test_what_is_no_number_is_left_out(small_room: Scene) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from lightpaint.basis.render.light_planes import LightPlanes
-    from lightpaint.basis.render.one_pass import Tracer
+    from lightpaint.basis.render.tracer.light_planes import LightPlanes
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
     tracer = Tracer(small_room, 0)
     planes = LightPlanes(tracer.light_of, len(small_room.lights), (1, 3))

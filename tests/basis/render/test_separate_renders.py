@@ -143,7 +143,9 @@ def test_a_time_is_kept_and_adds_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:
     # Quarters of a second of this process, which get as much done on a busy machine.
-    clock = SimpleNamespace(monotonic=lambda: 4 * time.process_time())
+    clock = SimpleNamespace(
+        monotonic=lambda: 4 * time.process_time(), process_time=time.process_time
+    )
     monkeypatch.setattr("lightpaint.basis.render.render_budget.time", clock)
     scene = load_scene(write_room(tmp_path, lights=THREE, integrator=integrator))
     reports: list[tuple[int, int, str]] = []

@@ -12,7 +12,7 @@ def pairs(dimension: int, *, pixels: int = 1, first: int = 0, terms: int, stream
     import drjit as dr
     import mitsuba as mi
 
-    from lightpaint.basis.render.sobol import SobolPairs
+    from lightpaint.basis.render.tracer.sobol import SobolPairs
 
     index = dr.arange(mi.UInt32, pixels * terms)
     pixel = index // terms

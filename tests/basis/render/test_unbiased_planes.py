@@ -153,7 +153,7 @@ def test_each_plane_is_the_render_of_its_light_alone(tmp_path: Path, kind: str) 
 
 def mutated(name: str) -> Any:
     """A replacement of a function of the paths, by which light is counted twice or too little."""
-    from lightpaint.basis.render import path_tracer
+    from lightpaint.basis.render.tracer import path_tracer
 
     mis, count = path_tracer._mis, path_tracer.Rules.emitter_samples_at
     calls = iter(range(10**6))

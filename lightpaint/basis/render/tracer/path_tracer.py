@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from lightpaint.basis.render.emitter_guide import BELOW_1
-from lightpaint.basis.render.sobol import APERTURE, FILM, TIME
+from lightpaint.basis.render.tracer.emitter_guide import BELOW_1
+from lightpaint.basis.render.tracer.sobol import APERTURE, FILM, TIME
 
 #: Steps of this, taken modulo 1, are spread evenly in whatever number.
 GOLDEN_RATIO = 0.6180339887

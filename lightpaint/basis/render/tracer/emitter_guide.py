@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.render.sobol import hashed
+from lightpaint.basis.render.tracer.sobol import hashed
 
 #: Share of the samples that is spread evenly over the emitters of a cell.
 EVEN_SHARE = 0.1

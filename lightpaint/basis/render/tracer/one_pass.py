@@ -22,15 +22,15 @@ import mitsuba as mi
 import numpy as np
 
 from lightpaint.arrays import Floats, Indices
-from lightpaint.basis.render.emitter_guide import EmitterGuide
 from lightpaint.basis.render.integrators import (
     depth_limit,
     has_indirect_planes,
     needs_a_bounce,
 )
-from lightpaint.basis.render.light_planes import LightPlanes, lights_by_instance
-from lightpaint.basis.render.path_tracer import Rules, View, trace_paths, trace_samples
-from lightpaint.basis.render.sobol import SobolPairs
+from lightpaint.basis.render.tracer.emitter_guide import EmitterGuide
+from lightpaint.basis.render.tracer.light_planes import LightPlanes, lights_by_instance
+from lightpaint.basis.render.tracer.path_tracer import Rules, View, trace_paths, trace_samples
+from lightpaint.basis.render.tracer.sobol import SobolPairs
 from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
