@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles
-from lightpaint.lighting.algebra.clipped_newton import RIDGE
+from lightpaint.lighting.algebra.clipped_newton import RIDGE, solve_ridged
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic
 from lightpaint.progress import cancellation_check
 
@@ -104,7 +104,7 @@ def _newton(q: Quadratic, x: Doubles, gradient: Doubles, working: _Working) -> D
         # The same step corrects round-off in held caps.
         at_lower = np.abs(value - q.cap_lower[held_caps]) <= np.abs(value - q.cap_upper[held_caps])
         rest[f:] = np.where(at_lower, q.cap_lower[held_caps], q.cap_upper[held_caps]) - value
-    move[free] = np.linalg.solve(matrix, rest)[:f]
+    move[free] = solve_ridged(matrix, rest, f)[:f]
     return move
 
 

@@ -8,7 +8,7 @@ caller certifies the result, so a failure costs nothing but time.
 import numpy as np
 
 from lightpaint.arrays import Doubles, Indices
-from lightpaint.lighting.algebra.clipped_newton import RIDGE
+from lightpaint.lighting.algebra.clipped_newton import RIDGE, solve_ridged
 from lightpaint.lighting.algebra.quadratic import EPSILON, Quadratic, kkt_residual
 from lightpaint.progress import cancellation_check
 
@@ -69,6 +69,6 @@ def _newton(
     A = q.A[held_caps][:, free]
     matrix[f:, :f], matrix[:f, f:] = A, -A.T
     right[:f], right[f:] = -gradient[free], shortfall
-    solved = np.linalg.solve(matrix, right) if f else right
+    solved = solve_ridged(matrix, right, f) if f else right
     move[free] = solved[:f]
     return move, np.asarray(solved[f:])

@@ -20,6 +20,9 @@ from lightpaint.progress import cancellation_check
 #: to an optimum without the ridge.
 RIDGE = 8 * EPSILON
 
+#: Ridge in its place where that one is lost in rounding.
+FIRM_RIDGE = 1e-12
+
 #: Steps after which methods take over that cannot cycle.
 MAX_STEPS = 10
 
@@ -77,5 +80,19 @@ def _newton(M: Doubles, gradient: Doubles, free: Bools) -> tuple[Doubles, Double
         right *= is_free
     diagonal += RIDGE * rows.size**0.5
     move = np.zeros_like(gradient)
-    move[:, rows] = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+    move[:, rows] = solve_ridged(matrix, right[:, :, None], rows.size)[:, :, 0]
     return move, matrix
+
+
+def solve_ridged(matrix: Doubles, right: Doubles, unknowns: int) -> Doubles:
+    """Return `matrix`⁻¹ `right`, as numpy.linalg.solve does.
+
+    Where the ridge is lost in rounding, as with unknowns that are alike to the last bit, a firmer
+    one takes its place, in the first `unknowns` rows.
+    """
+    try:
+        return np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        ridge = np.zeros(matrix.shape[-1])
+        ridge[:unknowns] = FIRM_RIDGE
+        return np.linalg.solve(matrix + np.diag(ridge), right)

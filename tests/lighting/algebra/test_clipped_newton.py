@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from least_squares import solve_free
 
-from lightpaint.lighting.algebra.clipped_newton import MAX_STEPS, clipped_newton
+from lightpaint.lighting.algebra.clipped_newton import MAX_STEPS, clipped_newton, solve_ridged
 from lightpaint.lighting.algebra.optimum import MAX_BATCHED_UNKNOWNS, minimise
 from lightpaint.lighting.algebra.quadratic import kkt_residual, scaled
 from lightpaint.lighting.normal_equations import NormalEquations
@@ -125,3 +125,14 @@ def test_few_lights_and_pixels_that_are_not_finite():
     equations.b[1, 2] = np.nan
     with pytest.raises(ValueError, match="finite"):
         solve_free(equations, np.ones((4, 3)))
+
+
+def test_a_matrix_that_is_singular_to_the_last_bit_is_solved():
+    """By the ridge: unknowns that are alike share alike; a row that is no unknown's stays exact."""
+    alike = np.ones((2, 2))
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.solve(alike, np.ones(2))
+    np.testing.assert_allclose(solve_ridged(alike, np.ones(2), 2), [0.5, 0.5], rtol=1e-3)  # ridge
+    with_sum = np.array([[1, 1, 1], [1, 1, 1], [1, 1, 0.0]])
+    x = solve_ridged(with_sum, np.array([1, 1, 0.25]), 2)
+    assert x[:2].sum() == pytest.approx(0.25, rel=1e-3)  # ridge
