@@ -15,7 +15,7 @@ from lightpaint.paint.store.steps import Patch
 StepRow = tuple[int, str, str, str, str]
 
 
-def write_step(
+def insert_step(
     database: sqlite3.Connection,
     *,
     row: StepRow,
@@ -46,7 +46,7 @@ def pixels_row(database: sqlite3.Connection, step: int) -> tuple[bytes, bytes] |
     return row
 
 
-def write_position(database: sqlite3.Connection, position: int) -> None:
+def update_position(database: sqlite3.Connection, position: int) -> None:
     """Write how many of the steps are done."""
     database.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", ("position", position))
 
@@ -57,7 +57,7 @@ def read_position(database: sqlite3.Connection) -> int | None:
     return None if row is None else int(row[0])
 
 
-def write_look(
+def insert_look(
     database: sqlite3.Connection, *, number: int, fields: str, arrays: PackedArrays | None
 ) -> None:
     """Write a look in the place of that of its number. arrays: None to keep those it has."""

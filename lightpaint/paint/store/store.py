@@ -47,15 +47,15 @@ from lightpaint.paint.store.session_rows import (
     array_names,
     array_row,
     delete_look,
+    insert_look,
+    insert_step,
     look_rows,
     pixels_row,
     places_json,
     read_position,
     step_rows,
     to_json,
-    write_look,
-    write_position,
-    write_step,
+    update_position,
 )
 from lightpaint.paint.store.steps import Identity, Step, StoredLook
 from lightpaint.storage.json_records import strict_json
@@ -170,7 +170,7 @@ class Store:
             self.position += 1
 
             row = (number, step.kind, step.label, fields, places)
-            self._enqueue(partial(write_step, row=row, blobs=blobs, last_kept=last_kept))
+            self._enqueue(partial(insert_step, row=row, blobs=blobs, last_kept=last_kept))
 
     def move_to(self, position: int) -> None:
         """Undo or redo steps: `position` of them are done."""
@@ -199,7 +199,7 @@ class Store:
                 blobs = pack_arrays(arrays)
                 self._arrays[number] = blobs
             self._looks[number] = self._make_look(number, fields)
-            self._enqueue(partial(write_look, number=number, fields=fields, arrays=blobs))
+            self._enqueue(partial(insert_look, number=number, fields=fields, arrays=blobs))
 
     def drop_look(self, number: int) -> None:
         """Forget a look. Raises PaintError if there is none of that number."""
@@ -219,7 +219,7 @@ class Store:
                 with transaction(self._database):
                     for write in self._pending:
                         write(self._database)
-                    write_position(self._database, self.position)
+                    update_position(self._database, self.position)
             except LightpaintError as error:
                 self.unsaved = f"what was done last is in memory only: {error}"
                 return self.unsaved

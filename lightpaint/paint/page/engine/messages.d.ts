@@ -93,7 +93,7 @@ export interface HistoryInfo {
 }
 
 /**
- * The values in effect for settings that nobody has set, as of `lightpaint.Fit`.
+ * The values in effect for settings that nobody has set, as in `lightpaint.Fit`.
  */
 export interface ResolvedFit {
   space: string | null;
@@ -518,7 +518,7 @@ export interface Ask {
 }
 
 /**
- * The constraints on several lights from now on, by name, as of `Ask`: one step. Answered by
+ * The constraints on several lights from now on, by name, as in `Ask`: one step. Answered by
  * `answer`.
  */
 export interface AskAll {
@@ -533,7 +533,7 @@ export interface TieLights {
 }
 
 /**
- * Settings of the answer, as of `Fit`. Answered by `answer`.
+ * Settings of the answer, as in `Fit`. Answered by `answer`.
  *
  * values: of hold, space, colors, literal, prefer_current, sparse; null for the default that
  * follows from the painting.
