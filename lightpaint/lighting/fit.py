@@ -20,7 +20,7 @@ Colors = Literal["free", "gentle", "white"]
 
 #: Weight of all unpainted pixels relative to all painted ones, for a painting over the current
 #: look: benchmarks/intent.py compares other values.
-DEFAULT_HOLD = 3.0
+DEFAULT_HOLD = 4.0
 
 F = TypeVar("F", bound="Fit")
 

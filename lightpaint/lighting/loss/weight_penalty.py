@@ -13,7 +13,7 @@ from lightpaint.lighting.normal_equations import NormalEquations
 
 #: Strength of the pull to the present colours: the share of a picture's change by another hue that
 #: counts as an error, in proportion to the painted pixels.
-COLOR_PULL = 2.0
+COLOR_PULL = 1.5
 
 #: Largest factor of dimming that strengthens the pull to a light's colour.
 MAX_DIMMING = 100.0

@@ -23,8 +23,8 @@ const TILE = 64;
 const MIN_IMPORTANCE = 1e-3;
 
 /** Importance of the rest of a picture beside that of a stroke, and by how much at most a stroke
- * counts more than the rest: that makes up for a stroke over a thirtieth of the picture. */
-const REST_SHARE = 3;
+ * counts more than the rest: that makes up for a stroke over a fortieth of the picture. */
+const REST_SHARE = 4;
 const MAX_ACCENT = 10;
 
 /** By how much what covers that part of a picture counts more than the rest of it, where all is

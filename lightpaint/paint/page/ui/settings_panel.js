@@ -50,7 +50,7 @@ const DESCRIPTIONS = {
 };
 
 /** Strengths to begin with; the first is what is automatic, where something is held. */
-const HOLD = 3;
+const HOLD = 4;
 const PREFER_CURRENT = 0.01;
 
 /** @param {{ui: Ui, app: App}} props */

@@ -120,7 +120,7 @@ export function crowd(host) {
   host.export = ({ what }) => ({
     kind: 'exported',
     files: what.map((one) => `${host.state().folder}/${one}.with_a_long_name_of_its_own`),
-    command: `lightpaint solve ${host.state().folder}/painting.exr --hold 3 --lock '${named(3)}=12.5%'`,
+    command: `lightpaint solve ${host.state().folder}/painting.exr --hold 4 --lock '${named(3)}=12.5%'`,
     is_unpainted: false,
   });
 }
