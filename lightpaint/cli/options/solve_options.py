@@ -89,7 +89,7 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
         metavar="H",
         help="weight that keeps unpainted pixels at the current look, relative to all painted "
         "pixels; "
-        "0 ignores them (default: 3 if the current look was painted over, else 0)",
+        "0 ignores them (default: 4 if the current look was painted over, else 0)",
     )
     parser.add_argument(
         "--colors",
