@@ -20,6 +20,7 @@ from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import DEFAULT_HOLD
 from lightpaint.pipeline.settings import Settings
 
 #: float64 through logarithms, cube roots and the inverse of a 3 x 3 matrix.
@@ -157,4 +158,4 @@ def test_words_that_ask_for_another_solve() -> None:
     assert vary("fewer lights", settings, few, 12)[1].sparse == 2
     assert vary("white only", settings, asked, 5)[0].colors == "white"
     assert vary("held harder", settings, asked, 5)[0].hold == 8.0
-    assert vary("held harder", Settings(unpainted=0.5), asked, 5)[0].hold == 12.0
+    assert vary("held harder", Settings(unpainted=0.5), asked, 5)[0].hold == 4 * DEFAULT_HOLD

@@ -74,7 +74,7 @@ def test_a_painting_over_the_beauty_is_known_as_such(
 ):
     """It was read as sRGB, and all of it counted: `3.6 (3.4 as the scene is now)`."""
     save(tmp_path / "warm.png", key_brighter(shot), view)
-    done = run(tmp_path, "solve", "shot.exr", "warm.png")
+    done = run(tmp_path, "solve", "shot.exr", "warm.png", "--hold", "3")
     assert done.returncode == 0, done.stderr
     assert f"what differs from the look of shot.exr through {view.spoken}" in done.stderr
     report = json.loads((tmp_path / "warm" / "report.json").read_text())

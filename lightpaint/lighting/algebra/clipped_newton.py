@@ -91,8 +91,8 @@ def solve_ridged(matrix: Doubles, right: Doubles, unknowns: int) -> Doubles:
     one takes its place, in the first `unknowns` rows.
     """
     try:
-        return np.linalg.solve(matrix, right)
+        return np.asarray(np.linalg.solve(matrix, right), np.float64)
     except np.linalg.LinAlgError:
         ridge = np.zeros(matrix.shape[-1])
         ridge[:unknowns] = FIRM_RIDGE
-        return np.linalg.solve(matrix + np.diag(ridge), right)
+        return np.asarray(np.linalg.solve(matrix + np.diag(ridge), right), np.float64)
