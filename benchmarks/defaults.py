@@ -1,4 +1,4 @@
-"""What the defaults spend, and how good they are, against an earlier version.
+"""Measure the time and the errors of the defaults, against an earlier version.
 
     python benchmarks/defaults.py --before CHECKOUT [--parts demo second first weights]
 

@@ -1,4 +1,4 @@
-"""What samples where a painting needs them are worth, against as many in all pixels.
+"""Compare samples where a painting needs them with as many in all pixels.
 
     python benchmarks/top_up.py [--paintings evening morning] [--error 0.03] [--seeds 6]
 

@@ -22,7 +22,7 @@ JUMPS_S = (0.0, 1e7, -1e7, 3e9, -1.7e9, -2e6)
 
 @pytest.fixture
 def jumping(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever looks at the clock finds another time."""
+    """Make the clock jump by years between any two readings."""
     real, looks = time.time, count()
     monkeypatch.setattr(time, "time", lambda: real() + JUMPS_S[next(looks) % len(JUMPS_S)])
 

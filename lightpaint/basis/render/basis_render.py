@@ -422,7 +422,7 @@ def _render_one_by_one(
     *,
     is_final: bool = True,
 ) -> Basis:
-    """Render one light after the other, by the scene's own integrator (see separate.py)."""
+    """Render one light after the other, by the scene's own integrator (see separate_renders.py)."""
     sums = LightSums(len(scene.lights), scene.size) if start is None else LightSums.of(start)
     seen = emitters_seen(scene) if start is None else start.emitters_seen
     nothing = origin_of(scene, seed, SEPARATE, (0, 0), (0, 0))

@@ -92,7 +92,7 @@ def room(folder: Path, **how: str) -> Scene:
 
 
 def light_alone(scene: Scene, name: str) -> Estimate:
-    """What Mitsuba's own integrator makes of one light."""
+    """Render one light alone with Mitsuba's own integrator."""
     emission = {x.name: WHITE if x.name == name else BLACK for x in scene.lights}
     return render(scene, emission, spp=SPP, stream=Stream.VERIFICATION)
 

@@ -1,4 +1,4 @@
-"""What a person is told a reason costs is what he gains by removing it."""
+"""The stated cost of a reason equals the gain from removing it."""
 
 from dataclasses import replace
 from typing import Any

@@ -559,7 +559,7 @@ def test_keys_among_numbers_are_none_of_the_pictures(painter: Painter) -> None:
 
 
 def test_undo_takes_back_what_a_field_has_taken(painter: Painter) -> None:
-    """Who types a level and thinks better of it is still in the field."""
+    """Ctrl+Z in a field undoes what is being typed, and the step once the field has taken it."""
     painter.stroke()
     painter.still()
     field = painter.page.get_by_role("textbox", name=re.compile(", level$")).first
