@@ -37,7 +37,7 @@ from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.pipeline.sources import SceneFile
+from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 

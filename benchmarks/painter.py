@@ -53,7 +53,7 @@ from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 
 ARGUMENTS = ["--no-sandbox"]
 

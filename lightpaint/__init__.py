@@ -71,13 +71,13 @@ if TYPE_CHECKING:
     from lightpaint.lighting.solution import Solution as Solution
     from lightpaint.lighting.solve import solve as solve
     from lightpaint.paint.notebook.widget import Painter as Painter
-    from lightpaint.pipeline.job import Job as Job
+    from lightpaint.pipeline.job.job import Job as Job
+    from lightpaint.pipeline.job.settings import Settings as Settings
+    from lightpaint.pipeline.job.sources import Painting as Painting
+    from lightpaint.pipeline.job.sources import SceneFile as SceneFile
     from lightpaint.pipeline.one_call import paint_with_light as paint_with_light
     from lightpaint.pipeline.pipeline import run as run
-    from lightpaint.pipeline.results import Look as Look
-    from lightpaint.pipeline.settings import Settings as Settings
-    from lightpaint.pipeline.sources import Painting as Painting
-    from lightpaint.pipeline.sources import SceneFile as SceneFile
+    from lightpaint.pipeline.results.results import Look as Look
     from lightpaint.pipeline.templates import render_template as render_template
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis
     from lightpaint.placement.freedom import Freedom as Freedom
@@ -109,21 +109,21 @@ _HOMES = {
     "Estimate": "images.estimate",
     "Fit": "lighting.fit",
     "Freedom": "placement.freedom",
-    "Job": "pipeline.job",
+    "Job": "pipeline.job.job",
     "LightGroups": "basis.lightgroups.light_groups",
     "Lighting": "lighting.answer.lighting",
     "LightpaintError": "errors",
-    "Look": "pipeline.results",
+    "Look": "pipeline.results.results",
     "Move": "placement.place",
     "Objects": "images.object_map",
-    "Painting": "pipeline.sources",
+    "Painting": "pipeline.job.sources",
     "Placement": "placement.place",
     "Pose": "scene.pose",
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
-    "SceneFile": "pipeline.sources",
+    "SceneFile": "pipeline.job.sources",
     "Appearance": "lighting.analysis.appearance.appearance",
-    "Settings": "pipeline.settings",
+    "Settings": "pipeline.job.settings",
     "Solution": "lighting.solution",
     "Suggestion": "placement.suggestion",
     "Target": "target.target",

@@ -22,7 +22,7 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.frames import parse_request
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.server.session_clients import Connections
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import cancellable, cancellation_check
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import read_lights_file

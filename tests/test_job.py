@@ -27,7 +27,7 @@ from lightpaint.errors import (
     TargetError,
 )
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.pipeline.sources import BasisFile, GroupsFile
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 

@@ -12,8 +12,8 @@ from lightpaint.basis.render import guide_training
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
+from lightpaint.pipeline.job.settings import PILOT_SPP, Settings
 from lightpaint.pipeline.one_call import paint_with_light
-from lightpaint.pipeline.settings import PILOT_SPP, Settings
 from lightpaint.report.measures import picture_errors
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

@@ -10,7 +10,7 @@ import pytest
 from lightpaint import Painting, SceneFile
 from lightpaint.batch.work.work_items import SceneFilm
 from lightpaint.images.formats.exr import write_rgb
-from lightpaint.pipeline.sources import BasisFile, GroupsFile
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile
 
 
 def _painted(path: Path, light: float) -> None:

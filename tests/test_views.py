@@ -31,9 +31,9 @@ from lightpaint.paint.store.steps import ViewIdentity
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject_factory import make_subjects
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.one_call import paint_with_light
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import SceneFile
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 

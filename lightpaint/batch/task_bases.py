@@ -14,9 +14,9 @@ from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import job_fields
 from lightpaint.batch.work.work_items import SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import Listener
 from lightpaint.scene.quality_presets import on_film, samples
 

@@ -21,8 +21,8 @@ from lightpaint.cli.output import terminal
 from lightpaint.cli.output.documents import files_document
 from lightpaint.errors import LOOK_ERRORS, OutputError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.pipeline.job import Job
-from lightpaint.pipeline.result_folder import ResultFolder
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.results.result_folder import ResultFolder
 
 
 @dataclass

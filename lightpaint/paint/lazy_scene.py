@@ -10,8 +10,8 @@ from lightpaint.basis import scene_facts
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.scene_facts import SceneFacts
 from lightpaint.errors import PaintError
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import SceneFile, vars_of
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile, vars_of
 from lightpaint.scene.scene import Scene
 
 

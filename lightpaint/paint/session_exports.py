@@ -18,9 +18,9 @@ from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.subject import Subject, painting_path, picture_path
-from lightpaint.pipeline.answer_folder import LIGHTING, RELIT, write_answer
-from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.pipeline import run
+from lightpaint.pipeline.results.answer_folder import LIGHTING, RELIT, write_answer
 from lightpaint.progress import Progress
 from lightpaint.relit.relight import relight
 from lightpaint.relit.sequential_verification import verify_in_stages

@@ -85,7 +85,11 @@ class SessionFile:
 
     def _on_scene_loaded(self, k: int, lazy_scene: LazyScene, scene: Scene) -> None:
         """Complete the identity with the scene of view k, of which nothing was cached."""
-        from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
+        from lightpaint.pipeline.job.remarks import (
+            remarks_of_film,
+            remarks_of_memory,
+            remarks_of_scene,
+        )
 
         self._loaded[k] = scene
         if (identity := session_identity(self._subjects, self._loaded)) is not None:

@@ -15,7 +15,7 @@ from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.quality_presets import samples
 from lightpaint.scene.scene import Scene

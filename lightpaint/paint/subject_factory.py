@@ -19,8 +19,8 @@ from lightpaint.paint.lazy_scene import LazyScene
 from lightpaint.paint.session_file import check_view_names, session_identity
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import (
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import (
     BasisFile,
     GroupsFile,
     SceneFile,

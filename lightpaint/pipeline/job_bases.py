@@ -9,8 +9,8 @@ from lightpaint.basis.cache_folder import folder
 from lightpaint.basis.denoised_planes import MAX_PIXELS, obtain_denoised_planes
 from lightpaint.basis.render.basis_render import render_basis, samples_for
 from lightpaint.basis.render.cached_render import Render, obtain_basis
-from lightpaint.pipeline.job import Job, PaintedView
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.job import Job, PaintedView
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener, Progress, labelled, listener
 from lightpaint.scene.scene import Scene
 

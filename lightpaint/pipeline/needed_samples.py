@@ -21,9 +21,9 @@ from lightpaint.lighting.analysis.noise.uncertainty import error_bars
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.settings import PILOT_SPP
 from lightpaint.pipeline.job_bases import view_listener
-from lightpaint.pipeline.settings import PILOT_SPP
 from lightpaint.progress import Listener
 from lightpaint.report.measures import LEAST_SHARE, picture_errors
 from lightpaint.report.phrases import spoken_percent

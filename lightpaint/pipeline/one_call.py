@@ -11,11 +11,11 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import BasisFile, Painting, SceneFile, check_needed
 from lightpaint.pipeline.pipeline import run
-from lightpaint.pipeline.results import Look
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import BasisFile, Painting, SceneFile, check_needed
+from lightpaint.pipeline.results.results import Look
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target

@@ -9,12 +9,12 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis, analyse, with_findings
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solution_of
-from lightpaint.pipeline.answer_folder import AnswerFolder, new_answer, reload_relit
-from lightpaint.pipeline.job import Job, PaintedView
+from lightpaint.pipeline.job.job import Job, PaintedView
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
 from lightpaint.pipeline.needed_samples import add_needed_samples, problem_of, without_noise
-from lightpaint.pipeline.results import Look, write_predicted, write_report
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.results.answer_folder import AnswerFolder, new_answer, reload_relit
+from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.placement.light_search import suggest_lights
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.detection_power import LightShares, with_light_tests

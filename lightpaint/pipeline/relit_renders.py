@@ -10,9 +10,9 @@ from lightpaint.images.denoiser import denoised, denoiser_text
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.formats.png import write_png
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.pipeline.answer_folder import answer_files, new_answer
-from lightpaint.pipeline.remarks import remarks_of_pictures
-from lightpaint.pipeline.result_folder import ResultFolder
+from lightpaint.pipeline.job.remarks import remarks_of_pictures
+from lightpaint.pipeline.results.answer_folder import answer_files, new_answer
+from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.progress import Progress, listener, silent
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene

@@ -16,9 +16,9 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.denoiser import Features, denoised, denoiser_text
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.keywords import keywords
+from lightpaint.pipeline.job.remarks import remarks_of_pictures
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.remarks import remarks_of_pictures
-from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.scene import Scene

@@ -23,8 +23,8 @@ from lightpaint.basis.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
 from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.errors import LightpaintError, OutputError, SceneError
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.settings import Settings
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

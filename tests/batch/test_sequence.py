@@ -21,7 +21,7 @@ from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 
 #: float64 through logarithms, cube roots and the inverse of a 3 x 3 matrix.
 PRECISION = 1e-9

@@ -20,7 +20,7 @@ from lightpaint.cli.output.vocabulary import spoken
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
-from lightpaint.pipeline.sources import BasisFile, GroupsFile
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile
 from lightpaint.target.target import Target
 
 

@@ -39,7 +39,7 @@ from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Identity, Step
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject_factory import make_subject, make_subjects
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.version import __version__
 
 

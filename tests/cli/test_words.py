@@ -15,8 +15,8 @@ from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.options.source_options import LOADING
 from lightpaint.cli.output.vocabulary import _ARGUMENT, OPTIONS, SPELLINGS, spoken
 from lightpaint.paint.launch import paint_in_browser
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import NOT_IN_GROUPS
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import NOT_IN_GROUPS
 from lightpaint.relit.export_forms import Source
 from lightpaint.target.target_reader import read_target
 

@@ -13,8 +13,8 @@ from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.paint.session_exports import answer_png, render_verification
 from lightpaint.paint.subject_factory import make_subject
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import SceneFile
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile
 
 
 @pytest.mark.filterwarnings("ignore:.*samples.*")

@@ -39,7 +39,7 @@ from lightpaint.paint.session.picture_table import PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 
 HOST = "127.0.0.1:8421"
 HERE = Address("127.0.0.1", 8421, Reach.MACHINE, frozenset({"127.0.0.1"}))

@@ -25,9 +25,9 @@ from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subject
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import silent
 
 
@@ -110,7 +110,7 @@ def test_a_known_scene_is_painted_without_being_loaded(
         raise AssertionError("the scene is loaded")
 
     with monkeypatch.context() as patch:
-        patch.setattr("lightpaint.pipeline.sources.load_scene", loads)
+        patch.setattr("lightpaint.pipeline.job.sources.load_scene", loads)
         subject = opened(path)
         assert session_identity([subject]) == identity
         assert subject.target_spp == basis.origin.spp

@@ -17,8 +17,8 @@ from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_samples import add_round
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.needed_samples import Certainty
-from lightpaint.pipeline.settings import Settings
 from lightpaint.scene.scene_reader import load_scene
 
 

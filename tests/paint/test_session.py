@@ -29,7 +29,7 @@ from lightpaint.paint.store.session_requests import (
 )
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 
 SIZE = (18, 32)
 

@@ -30,7 +30,7 @@ from lightpaint.paint.store.compression import pack, unpack
 from lightpaint.paint.store.database import set_aside
 from lightpaint.paint.store.steps import Identity, Patch, Step, StoredLook, ViewIdentity, replay
 from lightpaint.paint.store.store import MemoryStore, Store
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 
 ACTIONS = st.lists(
     st.tuples(st.just("append"), st.integers(0, 10**6))

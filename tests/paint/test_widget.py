@@ -32,7 +32,7 @@ from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.pipeline.settings import Settings, SettingsByName
+from lightpaint.pipeline.job.settings import Settings, SettingsByName
 from lightpaint.viewer.bundle import BundleError, bundled, source
 
 pytest.importorskip("anywidget", reason="anywidget")

@@ -15,7 +15,7 @@ import lightpaint as lp
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.problem import Problem
-from lightpaint.pipeline.results import Look
+from lightpaint.pipeline.results.results import Look
 from lightpaint.relit.verification_render import compare
 from lightpaint.scene.scene import Scene
 

@@ -12,7 +12,7 @@ from renderer import LIGHTS, write_room
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline.remarks import remarks_of_scene
+from lightpaint.pipeline.job.remarks import remarks_of_scene
 from lightpaint.scene.emission import EmissionKind, Scaling
 from lightpaint.scene.lights.emitters import Emitter, point_emitter
 from lightpaint.scene.lights.light_choice import choose_lights

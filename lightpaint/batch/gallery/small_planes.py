@@ -20,7 +20,7 @@ from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LightpaintError
 from lightpaint.file_reading import read_text
 from lightpaint.files import write_text
-from lightpaint.pipeline.sources import content
+from lightpaint.pipeline.job.sources import content
 from lightpaint.report.page.mixer import light_data, planes_for_page
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__

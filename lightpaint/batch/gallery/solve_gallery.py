@@ -13,8 +13,8 @@ from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.plan.journal import JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.task import Kind, Task
-from lightpaint.pipeline.job import Job
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 
 
 def entry_of(job: Job, folder: Path | None = None, variation: str = "") -> LookEntry:

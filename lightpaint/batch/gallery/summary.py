@@ -28,7 +28,7 @@ from lightpaint.images.denoiser import denoised
 from lightpaint.images.estimate import read_estimate
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline.result_folder import RECORD
+from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.relit.export.exports import plain_cell
 from lightpaint.storage.json_records import strict_json
 from lightpaint.version import __version__

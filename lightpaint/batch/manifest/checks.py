@@ -15,8 +15,8 @@ from lightpaint.errors import LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import GroupsFile
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import GroupsFile
 from lightpaint.relit.export.usd import check_usd
 from lightpaint.relit.export_forms import FORMS
 from lightpaint.screen import some_names

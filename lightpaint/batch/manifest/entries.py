@@ -33,8 +33,8 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import is_name
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, Painting, SceneFile
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, Painting, SceneFile
 
 #: Looks of one batch, at most.
 MAX_LOOKS = 10_000

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 from lightpaint.batch.manifest.variations import VARIATIONS
 from lightpaint.errors import LightpaintError
 from lightpaint.files import one_line
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.relit.export_forms import FORMS
 from lightpaint.scene.film import MAX_SPP, check_resolution
 from lightpaint.target.target_reader import Paint

@@ -14,7 +14,7 @@ from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import DEFAULT_HOLD
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 
 #: Variations that are solved.
 SOLVED_WORDS = ("fewer lights", "white only", "held harder")

@@ -14,7 +14,7 @@ from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LOOK_ERRORS, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.pipeline.sources import check_nothing_unused, content
+from lightpaint.pipeline.job.sources import check_nothing_unused, content
 from lightpaint.scene.quality_presets import on_film
 
 

@@ -27,10 +27,10 @@ from lightpaint.files import check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.problem_sums import reason_against_sums
-from lightpaint.pipeline.job import Job
-from lightpaint.pipeline.result_folder import is_as_written
-from lightpaint.pipeline.results import view_names
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.results.result_folder import is_as_written
+from lightpaint.pipeline.results.results import view_names
 from lightpaint.relit.relight import scene_of
 from lightpaint.scene.quality_presets import on_film, samples
 from lightpaint.scene.scene import Scene

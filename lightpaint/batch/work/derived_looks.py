@@ -10,10 +10,10 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.batch.manifest.variations import SHIFTED_WORDS, SOLVED_WORDS, shift, vary
 from lightpaint.lighting.answer.combination import combine
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.pipeline.answer_folder import answer_files, new_answer
-from lightpaint.pipeline.job import Job
-from lightpaint.pipeline.result_folder import ResultFolder
-from lightpaint.pipeline.results import write_predicted
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.results.answer_folder import answer_files, new_answer
+from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.results import write_predicted
 from lightpaint.scene.scene import Scene
 
 

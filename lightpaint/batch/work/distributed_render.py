@@ -11,7 +11,7 @@ from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import Passes
 from lightpaint.errors import SceneError
 from lightpaint.images.estimate import Estimate
-from lightpaint.pipeline.sources import SceneFile
+from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import estimate_of, passes_of, ranges_of

@@ -18,8 +18,8 @@ from lightpaint.batch.work.work_items import ItemResult, PaintingOfSums, SceneFi
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BasisError
 from lightpaint.lighting.problem_sums import Sums
-from lightpaint.pipeline.job import Job
-from lightpaint.pipeline.sources import Painting
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.sources import Painting
 from lightpaint.progress import Listener
 from lightpaint.scene.quality_presets import samples
 

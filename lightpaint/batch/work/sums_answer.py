@@ -13,8 +13,8 @@ from lightpaint.lighting.linear_solve import solve_linear
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.problem_sums import Sums, sum_rows, summed_problem
 from lightpaint.lighting.solve import solution_of
-from lightpaint.pipeline.answer_folder import new_answer
-from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.results.answer_folder import new_answer
 
 
 def sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:

@@ -11,9 +11,9 @@ from lightpaint.batch.manifest.keys import Final, Handover, Space
 from lightpaint.batch.manifest.variations import SHIFTED_WORDS
 from lightpaint.batch.work.work_items import PathMap
 from lightpaint.errors import BatchError
-from lightpaint.pipeline.job_record import encode_job
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline.job.job_record import encode_job
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"

@@ -30,14 +30,14 @@ from lightpaint.files import first_line, one_line, write_text
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline.job import Job
-from lightpaint.pipeline.job_record import decode_job
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.job_record import decode_job
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, content
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.relit_renders import relight_look, relit_folder
-from lightpaint.pipeline.result_folder import ResultFolder
-from lightpaint.pipeline.results import view_names
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, content
+from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.results import view_names
 from lightpaint.progress import Listener
 from lightpaint.relit.export_forms import Source, names_of_forms, writers_of
 from lightpaint.scene.scene import Scene

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 from lightpaint.basis.render.render_parts import Part
 from lightpaint.batch.manifest.keys import Final
 from lightpaint.lighting.fit import Emitters
-from lightpaint.pipeline.sources import Painting, SceneFile, vars_of
+from lightpaint.pipeline.job.sources import Painting, SceneFile, vars_of
 from lightpaint.scene.quality_presets import Quality
 
 #: Map from a path to that on another machine.

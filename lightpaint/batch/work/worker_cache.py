@@ -15,7 +15,7 @@ from lightpaint.batch.work.work_items import (
     SceneFilm,
     SumsOfRows,
 )
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target

@@ -16,8 +16,8 @@ from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason
 from lightpaint.lighting.answer.light_setting import LightSetting
-from lightpaint.pipeline.results import Look
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.results.results import Look
 from lightpaint.report.answer_pictures import spoken_view
 from lightpaint.report.diagnosis_sentences import bound_sentences, error_sentences, spoken_cause
 from lightpaint.report.influences import fit_sentence

@@ -5,9 +5,9 @@ from pathlib import Path
 from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.errors import BackendError, OutputError
+from lightpaint.pipeline.job.remarks import remarks_of_scene
+from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.light_sheets import check_sheet, render_sheet
-from lightpaint.pipeline.remarks import remarks_of_scene
-from lightpaint.pipeline.sources import SceneFile
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 

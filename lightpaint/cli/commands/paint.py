@@ -15,8 +15,8 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.server.address import Reach
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 
 if TYPE_CHECKING:
     from lightpaint.paint.server.server import Server

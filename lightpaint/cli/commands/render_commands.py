@@ -19,20 +19,20 @@ from lightpaint.demo import write_demo
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_name, check_writable
 from lightpaint.lighting.answer.lighting_file import read_lighting
-from lightpaint.pipeline.job import Job
-from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.relit_renders import relight_look, relit_folder
-from lightpaint.pipeline.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
-from lightpaint.pipeline.result_folder import ResultFolder
-from lightpaint.pipeline.results import result_folders, verify_result
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import (
+from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.remarks import remarks_of_film, remarks_of_memory, remarks_of_scene
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import (
     BasisFile,
     GroupsFile,
     Painting,
     SceneFile,
     check_nothing_unused,
 )
+from lightpaint.pipeline.job_bases import obtain
+from lightpaint.pipeline.relit_renders import relight_look, relit_folder
+from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.results import result_folders, verify_result
 from lightpaint.pipeline.templates import (
     look_of_basis,
     render_look,

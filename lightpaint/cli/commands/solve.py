@@ -8,9 +8,9 @@ from lightpaint.cli.output import documents, tables, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.errors import LOOK_ERRORS
-from lightpaint.pipeline.job import Job
+from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.pipeline import run
-from lightpaint.pipeline.results import Look
+from lightpaint.pipeline.results.results import Look
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.screen import some_of
 

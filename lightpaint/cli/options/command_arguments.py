@@ -23,8 +23,8 @@ from lightpaint.cli.tolerances import Tolerances
 from lightpaint.errors import BatchError
 from lightpaint.files import scene_name
 from lightpaint.lighting.constraints.constraints_file import read_constraints
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import GroupsFile, SceneFile
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import GroupsFile, SceneFile
 
 if TYPE_CHECKING:
     from lightpaint.batch.run_options import RunOptions

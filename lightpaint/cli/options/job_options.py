@@ -13,12 +13,12 @@ from lightpaint.errors import LOOK_ERRORS, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
 from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import Painting
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import Painting
 from lightpaint.screen import some_names
 
 if TYPE_CHECKING:
-    from lightpaint.pipeline.job import Job
+    from lightpaint.pipeline.job.job import Job
 
 #: Place of constraints from options, in errors.
 BY_OPTION = "on the command line"
@@ -46,7 +46,7 @@ def jobs_of(
     failure, by the name of the folder, if the others are to go on.
     """
     # Imported late: jobs import much that other commands do not need.
-    from lightpaint.pipeline.job import Job
+    from lightpaint.pipeline.job.job import Job
 
     basis = basis_of(options)
     if options.views and options.targets:

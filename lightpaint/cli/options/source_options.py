@@ -12,7 +12,7 @@ from typing import Any
 from lightpaint.basis.basis_file import is_basis_file
 from lightpaint.basis.lightgroups.folder_files import is_exr, is_light_groups, is_own_basis
 from lightpaint.errors import BasisError
-from lightpaint.pipeline.sources import BasisFile, GroupsFile, SceneFile, check_needed
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile, check_needed
 
 #: Options for loading a scene, by their Python names.
 LOADING = ("sensor", "parameters", "variant", "lights", "groups", "integrator")

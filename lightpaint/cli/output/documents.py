@@ -10,9 +10,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_of
 from lightpaint.cli.tolerances import Tolerances
-from lightpaint.pipeline.job import Job, PaintedView
-from lightpaint.pipeline.result_folder import RECORD
-from lightpaint.pipeline.results import Look
+from lightpaint.pipeline.job.job import Job, PaintedView
+from lightpaint.pipeline.results.result_folder import RECORD
+from lightpaint.pipeline.results.results import Look
 from lightpaint.relit.verification import Verification
 from lightpaint.report.report_json import finite, verification_numbers
 from lightpaint.scene.emission import MULTIPLE

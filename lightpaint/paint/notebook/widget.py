@@ -33,7 +33,7 @@ from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.paint.studio import Studio
-from lightpaint.pipeline.settings import SettingsByName
+from lightpaint.pipeline.job.settings import SettingsByName
 from lightpaint.target.painting_file import write_painting
 from lightpaint.target.target import Target
 

@@ -22,7 +22,7 @@ from lightpaint.paint.store.database import OTHER_FOLDER, START_AFRESH
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subjects
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target

@@ -11,7 +11,7 @@ from lightpaint.lighting.linear_problem import reduce_lights
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 
 
 class LiveAnswer:

@@ -33,7 +33,7 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.session_requests import TITLES, SessionRequests
 from lightpaint.paint.store.store import Store
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.target.target import Target
 
 

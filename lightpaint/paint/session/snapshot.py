@@ -22,7 +22,7 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.paint.session.answer_messages import preview_text, why_not_closer
 from lightpaint.paint.session.picture_table import Picture, display_thumbnail
 from lightpaint.paint.store.session_requests import SessionRequests
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.target.target import Target
 
 

@@ -8,7 +8,7 @@ from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.light_patterns import tables_by_light, tied_lights
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 
 #: Settings of the answer: those of its fit, and those of all lights together.
 FIT_KEYS, ALL_LIGHTS_KEYS = ("hold", "space", "colors", "literal"), ("prefer_current", "sparse")

@@ -24,9 +24,9 @@ from lightpaint.batch.work.work import run_item
 from lightpaint.batch.work.work_items import ItemResult, SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BasisError
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import SceneFile
 from lightpaint.progress import Interrupted, listener, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

@@ -18,7 +18,7 @@ from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
 from lightpaint.basis.render.render_budget import Budget, Keeper
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.errors import SceneError
-from lightpaint.pipeline.remarks import remarks_of_scene
+from lightpaint.pipeline.job.remarks import remarks_of_scene
 from lightpaint.progress import silent
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene

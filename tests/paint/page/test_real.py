@@ -29,7 +29,7 @@ from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subject
-from lightpaint.pipeline.sources import BasisFile
+from lightpaint.pipeline.job.sources import BasisFile
 
 H, W, N = 54, 96, 3
 

@@ -12,7 +12,7 @@ from typing import Literal
 from lightpaint.errors import LightpaintError, OutputError
 from lightpaint.file_reading import read_text
 from lightpaint.files import check_files, check_writable, one_line, write_text
-from lightpaint.pipeline.results import RESULTS
+from lightpaint.pipeline.results.results import RESULTS
 from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish, is_below, staged
 from lightpaint.version import __version__

@@ -4,7 +4,7 @@ from lightpaint.basis.render.basis_render import memory_needed, renders_in_bands
 from lightpaint.basis.render.integrators import remark_on_separate_renders
 from lightpaint.images.denoiser import MISSING_REMARK, oidn_is_installed
 from lightpaint.images.pixel_blocks import Size, left_over, whole_factor
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.quality_presets import PRESETS
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene

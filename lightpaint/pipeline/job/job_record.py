@@ -8,8 +8,8 @@ from typing import Any
 
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import BasisFile, File, GroupsFile, Painting, SceneFile
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import BasisFile, File, GroupsFile, Painting, SceneFile
 from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT = "lightpaint-job 1"

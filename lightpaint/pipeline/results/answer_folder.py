@@ -12,7 +12,7 @@ from pathlib import Path
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import write_lighting
-from lightpaint.pipeline.result_folder import ResultFolder
+from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.relit.export.exports import EXPORTS, write_exports
 from lightpaint.relit.relight import check_relightable, relight, settle
 from lightpaint.scene.scene import Scene

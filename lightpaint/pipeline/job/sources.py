@@ -16,7 +16,7 @@ from lightpaint.basis.lightgroups.light_groups import LightGroups, read_light_gr
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
-from lightpaint.pipeline.settings import Settings
+from lightpaint.pipeline.job.settings import Settings
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target

@@ -21,19 +21,16 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.unknowns.reduction import reduce_to
-from lightpaint.pipeline.answer_folder import answer_files
-from lightpaint.pipeline.job_record import decode_job, encode_job
-from lightpaint.pipeline.remarks import (
+from lightpaint.pipeline.job.job_record import decode_job, encode_job
+from lightpaint.pipeline.job.remarks import (
     remarks_of_film,
     remarks_of_memory,
     remarks_of_pictures,
     remarks_of_scene,
     remarks_of_target,
 )
-from lightpaint.pipeline.result_folder import ResultFolder
-from lightpaint.pipeline.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
-from lightpaint.pipeline.settings import Settings
-from lightpaint.pipeline.sources import (
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import (
     BasisFile,
     GroupsFile,
     Painting,
@@ -41,6 +38,9 @@ from lightpaint.pipeline.sources import (
     check_nothing_unused,
     content,
 )
+from lightpaint.pipeline.results.answer_folder import answer_files
+from lightpaint.pipeline.results.result_folder import ResultFolder
+from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
 from lightpaint.placement.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film

@@ -1,0 +1,1 @@
+"""A job: what a run is asked to do, checked once."""

@@ -1,0 +1,1 @@
+"""The results of a run: its folder, and the files of its answer."""
