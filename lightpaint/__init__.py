@@ -91,6 +91,7 @@ if TYPE_CHECKING:
     from lightpaint.relit.verification import Verification as Verification
     from lightpaint.relit.verification_render import verify as verify
     from lightpaint.report.verdict import verdict as verdict
+    from lightpaint.scene.lights.new_emitter import NewEmitter as NewEmitter
     from lightpaint.scene.pose import Pose as Pose
     from lightpaint.scene.runtime.variant import use_variant as use_variant
     from lightpaint.scene.scene import Scene as Scene
@@ -115,6 +116,7 @@ _HOMES = {
     "LightpaintError": "errors",
     "Look": "pipeline.results.results",
     "Move": "placement.place",
+    "NewEmitter": "scene.lights.new_emitter",
     "Objects": "images.object_map",
     "Painting": "pipeline.job.sources",
     "Placement": "placement.place",

@@ -14,7 +14,7 @@ from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.placement.free_space import as_position, far_apart
-from lightpaint.scene.pose import FARTHEST, Site, rotation_between
+from lightpaint.scene.pose import FARTHEST, Site, across, rotation_between
 
 #: Degrees that count like a metre of sliding, for one step of a search: of the axis, of the cone.
 AIM_UNIT, CONE_UNIT = 20.0, 10.0
@@ -116,8 +116,8 @@ class FreeLight:
             way = place if len(place) == 3 else place[0] * self._along
             site = replace(site, position=as_position(np.array(site.position) + way))
         if len(turn) and site.direction is not None:
-            across = _across(site.direction)
-            direction = np.array(site.direction) + math.radians(AIM_UNIT) * turn @ across
+            sideways = across(site.direction)
+            direction = np.array(site.direction) + math.radians(AIM_UNIT) * turn @ sideways
             site = replace(site, direction=as_position(direction / np.linalg.norm(direction)))
         if len(cone) and site.cutoff is not None:
             site = self._opened(site, site.cutoff + CONE_UNIT * float(cone[0]))
@@ -203,14 +203,6 @@ class FreeLight:
         return replace(site, cutoff=cutoff, beam=beam)
 
 
-def _across(direction: Position) -> Doubles:
-    """Return two unit vectors across a direction and each other, (2, 3)."""
-    axis = np.array(direction)
-    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    one /= np.linalg.norm(one)
-    return np.stack([one, np.cross(axis, one)])
-
-
 def _turned(start: Position, direction: Position, degrees: float) -> Position:
     """Return the direction nearest to `direction` within some degrees of `start`."""
     a, b = np.array(start), np.array(direction)
@@ -219,7 +211,7 @@ def _turned(start: Position, direction: Position, degrees: float) -> Position:
         return direction
     side = b - (a @ b) * a
     length = float(np.linalg.norm(side))
-    side = side / length if length > 1e-9 else _across(start)[0]
+    side = side / length if length > 1e-9 else across(start)[0]
     return as_position(math.cos(most) * a + math.sin(most) * side)
 
 

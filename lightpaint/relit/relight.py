@@ -169,12 +169,14 @@ class _Edits:
 
     integrators: the replacements of elements, by byte offset; at None, an addition.
     moved: children to set of the elements of moved lights, by byte offset: XML by name.
+    added: lines of the elements of new lights.
     """
 
     original: Path
     settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
     integrators: dict[int | None, str] = field(default_factory=dict)
     moved: dict[int, Mapping[str, str]] = field(default_factory=dict)
+    added: list[str] = field(default_factory=list)
 
 
 def relit_files(
@@ -189,6 +191,14 @@ def relit_files(
     settings = dict(settings_of(scene, emission))
     unchanged = [emitter for emitter in scene.emitters if emitter not in settings]
     sampled = _sampled_emitters(settings, unchanged)
+    added = {x.name: x for x in scene.added}
+    new_lines: list[str] = []
+    for emitter in scene.emitters:
+        if emitter.name in added:
+            rgb = settings.pop(emitter, emitter.emission)
+            new_lines += added[emitter.name].lines(rgb, is_sampled=emitter in sampled)
+    unchanged = [emitter for emitter in unchanged if emitter.name not in added]
+    edits[root.resolve()].added = new_lines
     for emitter, rgb in settings.items():
         file = scene.files[emitter.file]
         setting = (emitter, rgb, _sampling_weight(emitter, is_sampled=emitter in sampled))
@@ -287,6 +297,8 @@ def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, d
         lines = [tag("path", value=Path(origin).as_posix())]
         lines += [text for at, text in edit.integrators.items() if at is None]
         xml.insert_first(xml.root, lines)
+    if edit.added:
+        xml.insert_last(xml.root, edit.added)
     for at, text in edit.integrators.items():
         if at is not None:
             xml.replace(xml.element_at(at), text)

@@ -101,6 +101,23 @@ class XmlFile:
         body = "".join(f"{self._newline}{inner}{line}" for line in lines)
         self._edits.append((element.inner, element.inner, body.encode()))
 
+    def insert_last(self, element: Element, lines: list[str]) -> None:
+        """Put `lines` behind everything else in `element`, each on a line of its own."""
+        if element.is_empty_tag:
+            self.insert_first(element, lines)
+            return
+        close = self.text.rindex(b"</", element.inner, element.end)
+        indent = _indent_before(self.text, element.start)
+        inner = f"{indent}    "
+        if element.children:
+            last = element.children[-1].start
+            inner = _indent_before(self.text, last) or inner
+        place = len(self.text[:close].rstrip())
+        body = "".join(f"{self._newline}{inner}{line}" for line in lines)
+        if b"\n" not in self.text[place:close]:
+            body += f"{self._newline}{indent}"
+        self._edits.append((place, place, body.encode()))
+
     def edited(self) -> bytes:
         """Return the whole file with all edits made, in its own encoding."""
         text = self.text

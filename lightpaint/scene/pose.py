@@ -256,12 +256,19 @@ def rotation_between(old: Sequence[float], new: Sequence[float] | Doubles) -> Do
     cosine = float(a @ b)
     if cosine < -1 + 1e-12:
         # Half a turn about any axis across it.
-        across = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
-        across /= np.linalg.norm(across)
-        return np.asarray(2 * np.outer(across, across) - np.eye(3))
+        axis = across(a)[0]
+        return np.asarray(2 * np.outer(axis, axis) - np.eye(3))
     v = np.cross(a, b)
     cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
     return np.asarray(np.eye(3) + cross + cross @ cross / (1 + cosine))
+
+
+def across(direction: Sequence[float] | Doubles) -> Doubles:
+    """Return two unit vectors across a direction and each other, (2, 3)."""
+    axis = np.array(_unit(direction))
+    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    one /= np.linalg.norm(one)
+    return np.stack([one, np.cross(axis, one)])
 
 
 def _point(name: str, value: Any) -> Position:

@@ -24,6 +24,7 @@ from lightpaint.scene.lights.emitters import Emitter, point_emitter
 from lightpaint.scene.lights.light import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights.light_choice import REST
 from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside
+from lightpaint.scene.lights.new_emitter import NewEmitter, moved_emitter
 from lightpaint.scene.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.pose import Pose, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
@@ -59,6 +60,7 @@ class Scene(Shown):
         lights_file: The lights file that went into `lights`, if one did.
         requests: The constraints that it asks for.
         chosen: Names of the lights that `only` left; none where all are there.
+        added: Emitters of `with_new_emitters`, which are in no file.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -86,6 +88,7 @@ class Scene(Shown):
     requests: SceneRequests
     _parsed: ParsedScene
     chosen: tuple[str, ...] = ()
+    added: tuple[NewEmitter, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("lights", "emitters"):
@@ -247,18 +250,56 @@ class Scene(Shown):
             >>> scene.moved({"bulb": lp.Pose(position=(0.5, 1, 0))}).light("bulb").form
             'at (0.50, 1.00, 0.00)'
         """
-        motions = {}
+        motions, elements, added = {}, {}, {x.name: x for x in self.added}
         for name, pose in poses.items():
             emitter = self._emitter(name)
-            motions[emitter.node] = motion_of(emitter.name, emitter.plugin, emitter.site, pose)
-        parsed = self._parsed.with_motions(motions)
+            motion = motion_of(emitter.name, emitter.plugin, emitter.site, pose)
+            if emitter.name in added:
+                moved = moved_emitter(added[emitter.name], motion.site, motion.target)
+                added[emitter.name] = moved
+                elements[emitter.name] = "".join(moved.lines())
+            else:
+                motions[emitter.node] = motion
+        parsed = self._parsed.with_motions(motions).with_elements(elements)
+        return replace(self._inspected(parsed, ()), added=tuple(added.values()))
+
+    @MITSUBA.taken()
+    def with_new_emitters(self, emitters: Sequence[NewEmitter]) -> "Scene":
+        """Return this scene with emitters added, each a light of its own.
+
+        Nothing is written: `relight` writes their elements behind all others, with the new
+        emissions. A panel is a rectangle, which also blocks light; planes of points and spots are
+        all that a basis of it needs to add.
+
+        Raises:
+            SceneError: For names that are taken.
+
+        Examples:
+            >>> key = lp.NewEmitter("key", "point", lp.Pose(position=(0, 1, 1)))
+            >>> [x.name for x in lp.load_scene("room.xml").with_new_emitters([key]).lights]
+            ['panel', 'bulb', 'key']
+        """
+        taken = {*(x.name for x in self.emitters), *(x.name for x in self.lights)}
+        for emitter in emitters:
+            if emitter.name in taken:
+                raise SceneError(
+                    f"{self.path} has a light {emitter.name!r} already: give the new one another "
+                    "name"
+                )
+            taken.add(emitter.name)
+        parsed = self._parsed.with_elements({x.name: "".join(x.lines()) for x in emitters})
+        made = self._inspected(parsed, [x.name for x in emitters])
+        return replace(made, added=(*self.added, *emitters))
+
+    def _inspected(self, parsed: ParsedScene, more: Sequence[str]) -> "Scene":
+        """Return the scene of another parsed form. more: names of its emitters without a light."""
         with mitsuba_errors(self.path):
             facts = inspect_scene(parsed, self.sensor)
-        members = {light.name: light.member_names for light in self.lights}
-        lights = lights_of(
-            facts["emitters"], members, [light.name for light in self.lights if light.is_fixed]
-        )
+        members: dict[str, Sequence[str]] = {x.name: x.member_names for x in self.lights}
+        members |= {name: [name] for name in more}
+        fixed = [light.name for light in self.lights if light.is_fixed]
         found = {light.name for light in self.lights if light.is_found}
+        lights = lights_of(facts["emitters"], members, fixed)
         return replace(
             self,
             **facts | {"film": self.film},

@@ -194,6 +194,36 @@ class ParsedScene:
             set_emission(other.state, node, setting, on_shape=node in self.shape_of)
         return other
 
+    def with_elements(self, elements: Mapping[str, str]) -> "ParsedScene":
+        """Return this scene with emitters added, or others in the place of added ones.
+
+        elements: XML by the name that its emitter gets, a name that no emitter of the files has.
+        """
+        import mitsuba as mi
+
+        other = copy(self)
+        other.state = mi.parser.ParserState(self.state)
+        other.emitter_nodes, other.names = [*self.emitter_nodes], dict(self.names)
+        other.shape_of = dict(self.shape_of)
+        node_of = {name: node for node, name in self.names.items()}
+        for name, text in elements.items():
+            fragment = mi.parser.parse_string(self.config, f'<scene version="3.0.0">{text}</scene>')
+            mi.parser.transform_all(self.config, fragment)
+            kinds = [node.type for node in fragment.nodes]
+            inner = kinds.index(mi.ObjectType.Emitter)
+            if name in node_of:
+                first = node_of[name] - inner + 1
+            else:
+                first = len(other.state.nodes)
+                other.emitter_nodes.append(first + inner - 1)
+                other.names[first + inner - 1] = name
+                if inner > 1:
+                    other.shape_of[first + inner - 1] = first
+                root = other.state.nodes[0].props
+                root[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(first)
+            _put_nodes(other.state, first, fragment)
+        return other
+
     def lit_by_points(
         self, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
     ) -> "ParsedScene":
@@ -305,6 +335,22 @@ class ParsedScene:
             yield
         finally:
             mi.set_file_resolver(before)
+
+
+def _put_nodes(state: Any, first: int, fragment: Any) -> None:
+    """Put the nodes of a parsed fragment, but for its root, to `first` and on in `state`."""
+    import mitsuba as mi
+
+    reference = mi.Properties.Type.ResolvedReference
+    for k, node in enumerate(list(fragment.nodes)[1:]):
+        for key in list(node.props):
+            if node.props.type(key) == reference:
+                its = node.props[key].index() - 1 + first
+                node.props[key] = mi.Properties.ResolvedReference(its)
+        if first + k < len(state.nodes):
+            state.nodes[first + k] = node
+        else:
+            state.nodes.append(node)
 
 
 def relocated_path(path: Path, old: Path, new: Path) -> Path:
