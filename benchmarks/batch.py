@@ -25,14 +25,14 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis.basis import Basis, Origin
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.distribution.basis_parts import PartwiseRender
+from lightpaint.batch.distribution.engine import Engine, InProcess
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import run_batch
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.batch.work.basis_parts import PartwiseRender
-from lightpaint.batch.work.engine import Engine, InProcess
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache

@@ -22,7 +22,7 @@ import numpy as np
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis, Origin
-from lightpaint.basis.file_planes import RowPlanes
+from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.images.denoiser import Features
 from lightpaint.images.formats.png import png_bytes

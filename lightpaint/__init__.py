@@ -32,8 +32,8 @@ from lightpaint.version import __version__
 
 if TYPE_CHECKING:
     from lightpaint.basis.basis import Basis as Basis
-    from lightpaint.basis.basis_file import read_basis as read_basis
-    from lightpaint.basis.basis_file import write_basis as write_basis
+    from lightpaint.basis.file.basis_file import read_basis as read_basis
+    from lightpaint.basis.file.basis_file import write_basis as write_basis
     from lightpaint.basis.lightgroups.light_groups import LightGroups as LightGroups
     from lightpaint.basis.lightgroups.light_groups import read_light_groups as read_light_groups
     from lightpaint.basis.render.basis_render import render_basis as render_basis
@@ -92,7 +92,7 @@ if TYPE_CHECKING:
     from lightpaint.relit.verification_render import verify as verify
     from lightpaint.report.verdict import verdict as verdict
     from lightpaint.scene.lights.new_emitter import NewEmitter as NewEmitter
-    from lightpaint.scene.pose import Pose as Pose
+    from lightpaint.scene.properties.pose import Pose as Pose
     from lightpaint.scene.runtime.variant import use_variant as use_variant
     from lightpaint.scene.scene import Scene as Scene
     from lightpaint.scene.scene_reader import load_scene as load_scene
@@ -120,7 +120,7 @@ _HOMES = {
     "Objects": "images.object_map",
     "Painting": "pipeline.job.sources",
     "Placement": "placement.place",
-    "Pose": "scene.pose",
+    "Pose": "scene.properties.pose",
     "Problem": "lighting.problem",
     "Scene": "scene.scene",
     "SceneFile": "pipeline.job.sources",
@@ -142,7 +142,7 @@ _HOMES = {
     "load_scene": "scene.scene_reader",
     "paint_with_light": "pipeline.one_call",
     "place": "placement.place",
-    "read_basis": "basis.basis_file",
+    "read_basis": "basis.file.basis_file",
     "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.light_groups",
     "read_lighting": "lighting.answer.lighting_file",
@@ -159,7 +159,7 @@ _HOMES = {
     "verdict": "report.verdict",
     "verify": "relit.verification_render",
     "compare_appearance": "lighting.analysis.appearance.appearance",
-    "write_basis": "basis.basis_file",
+    "write_basis": "basis.file.basis_file",
     "write_demo": "demo",
     "write_exports": "relit.export.exports",
     "write_lighting": "lighting.answer.lighting_file",

@@ -11,7 +11,7 @@ from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.cli import main
 from lightpaint.colour.display.view_transform import ViewTransform

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.cache import MAX_BYTES
+from lightpaint.basis.cache.cache import MAX_BYTES
 from lightpaint.batch.cluster.cluster import LIMIT_FACTOR, MIN_LIMIT_S
 from lightpaint.batch.manifest.checks import SOLVE_STEPS
 from lightpaint.batch.manifest.entries import MAX_LOOKS

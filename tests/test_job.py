@@ -15,7 +15,7 @@ from renderer import LIGHTS, write_room
 
 from lightpaint import Constraints, Job, Painting, SceneFile, Settings, paint_with_light, run
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import (

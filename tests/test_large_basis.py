@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 import lightpaint as lp
-from lightpaint.basis import basis_file, denoised_planes, file_planes
+from lightpaint.basis.cache import denoised_planes
+from lightpaint.basis.file import basis_file, file_planes
 from lightpaint.images import bands, denoiser
 from lightpaint.images.formats.png import png_bytes
 from lightpaint.lighting.loss import loss

@@ -13,7 +13,7 @@ from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.errors import OutputError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.images.formats.png import png_bytes

@@ -11,7 +11,7 @@ from PIL import Image
 from renderer import write_room
 
 import lightpaint as lp
-from lightpaint.basis import cache
+from lightpaint.basis.cache import cache
 from lightpaint.errors import TargetError
 from lightpaint.images.denoiser import DENOISED_KEY
 from lightpaint.images.formats.exr import read_parts

@@ -17,7 +17,7 @@ from command import refused
 from renderer import write_room
 
 from lightpaint import file_reading
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 

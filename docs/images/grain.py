@@ -107,7 +107,7 @@ def cut(plane: np.ndarray, crop: Crop) -> np.ndarray:
 def crops_of_few_samples() -> dict[str, np.ndarray]:
     """Return denoised crops by title and samples, in the version that is imported."""
     try:
-        from lightpaint.basis.denoised_planes import denoise_to_halves
+        from lightpaint.basis.cache.denoised_planes import denoise_to_halves
     except ImportError:  # as earlier versions call it
         from lightpaint.basis.clean import clean_plane as denoise_to_halves
     made = {}

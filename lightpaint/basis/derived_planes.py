@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices
-from lightpaint.basis import file_planes
-from lightpaint.basis.file_planes import RowPlanes
+from lightpaint.basis.file import file_planes
+from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes
 from lightpaint.images.pixel_blocks import block_sums
 

@@ -7,6 +7,10 @@ from dataclasses import replace
 from functools import partial
 
 from lightpaint.batch.cluster.cluster import Cluster
+from lightpaint.batch.distribution.distributed_render import distributed_renderer
+from lightpaint.batch.distribution.distributed_sums import solve_by_sums
+from lightpaint.batch.distribution.engine import Engine, InProcess
+from lightpaint.batch.distribution.processes import Processes
 from lightpaint.batch.folder_lock import lock_folder
 from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.small_planes import write_task_planes
@@ -16,10 +20,6 @@ from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
 from lightpaint.batch.run_options import BatchOutcome, RunOptions
 from lightpaint.batch.task_bases import has_basis, obtain_bases, save_bases
-from lightpaint.batch.work.distributed_render import distributed_renderer
-from lightpaint.batch.work.distributed_sums import solve_by_sums
-from lightpaint.batch.work.engine import Engine, InProcess
-from lightpaint.batch.work.processes import Processes
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import (
     OUT_OF_MEMORY_TEXT,

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import write_basis
-from lightpaint.batch.work.basis_parts import PartwiseRender
-from lightpaint.batch.work.engine import Engine
+from lightpaint.basis.cache import cache
+from lightpaint.basis.file.basis_file import write_basis
+from lightpaint.batch.distribution.basis_parts import PartwiseRender
+from lightpaint.batch.distribution.engine import Engine
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import job_fields
 from lightpaint.batch.work.work_items import SceneFilm

@@ -9,7 +9,7 @@ from threading import Lock
 from typing import Any, Literal, Protocol
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_planes import DenoisedPlanes, as_halves
+from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, as_halves
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
 from lightpaint.lighting.answer.lighting import Lighting

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any
 
-from lightpaint.basis import scene_facts
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.scene_facts import SceneFacts
+from lightpaint.basis.cache import scene_facts
+from lightpaint.basis.cache.scene_facts import SceneFacts
 from lightpaint.errors import PaintError
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile, vars_of

@@ -7,13 +7,13 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_mixes import denoise_present_look
-from lightpaint.basis.denoised_planes import (
+from lightpaint.basis.cache.denoised_planes import (
     DenoisedPlanes,
     cache_denoised_planes,
     denoise_to_halves,
     read_denoised_planes,
 )
+from lightpaint.basis.denoised_mixes import denoise_present_look
 from lightpaint.paint.session.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.store.steps import name_in_view

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_planes import DenoisedPlanes
+from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting import Lighting

@@ -6,7 +6,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.subject import Subject
-from lightpaint.scene.film import MAX_SPP
+from lightpaint.scene.properties.film import MAX_SPP
 from lightpaint.scene.runtime.render_lock import MITSUBA
 
 

@@ -3,10 +3,10 @@
 import time
 from dataclasses import replace
 
-from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache_folder import folder
-from lightpaint.basis.denoised_planes import MAX_PIXELS, obtain_denoised_planes
+from lightpaint.basis.cache import cache
+from lightpaint.basis.cache.cache_folder import folder
+from lightpaint.basis.cache.denoised_planes import MAX_PIXELS, obtain_denoised_planes
 from lightpaint.basis.render.basis_render import render_basis, samples_for
 from lightpaint.basis.render.cached_render import Render, obtain_basis
 from lightpaint.pipeline.job.job import Job, PaintedView

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lightpaint.basis import cache
+from lightpaint.basis.cache import cache
 from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.errors import OutputError

@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from lightpaint.arrays import Floats
-from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis, meter_exposure
+from lightpaint.basis.cache import cache
 from lightpaint.basis.denoised_mixes import denoise_plane, denoise_present_look
 from lightpaint.basis.render.basis_render import is_of, render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass

@@ -14,7 +14,7 @@ from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.placement.free_space import as_position, far_apart
-from lightpaint.scene.pose import FARTHEST, Site, across, rotation_between
+from lightpaint.scene.properties.pose import FARTHEST, Site, across, rotation_between
 
 #: Degrees that count like a metre of sliding, for one step of a search: of the axis, of the cone.
 AIM_UNIT, CONE_UNIT = 20.0, 10.0

@@ -24,7 +24,7 @@ from lightpaint.arrays import Floats
 from lightpaint.errors import SceneError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.surface_filter import SurfaceFilter
-from lightpaint.scene.pose import DEFAULT_CUTOFF, Site
+from lightpaint.scene.properties.pose import DEFAULT_CUTOFF, Site
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed

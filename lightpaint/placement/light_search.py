@@ -25,8 +25,8 @@ from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, f
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.film import reduction_to
 from lightpaint.scene.lights.light import free_names
+from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 

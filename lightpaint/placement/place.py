@@ -21,9 +21,9 @@ from lightpaint.placement.light_search import on_small_film
 from lightpaint.placement.placement_fit import PlacementFit
 from lightpaint.placement.pose_search import Found, PoseSearch, SearchPaths
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.lights.light import Light
-from lightpaint.scene.pose import Pose, Site
+from lightpaint.scene.properties.emission import MULTIPLE
+from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 from lightpaint.scene.surfaces import render_features

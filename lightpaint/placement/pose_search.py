@@ -18,7 +18,7 @@ from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import FreeLight
 from lightpaint.placement.frozen_paths import FrozenPaths, falloff
 from lightpaint.placement.placement_fit import Fitted, PlacementFit
-from lightpaint.scene.pose import Site
+from lightpaint.scene.properties.pose import Site
 
 #: Places that each light is tried at, degrees between its directions, and directions whose images
 #: are made together.

@@ -9,8 +9,8 @@ from lightpaint.arrays import RGB, Floats
 from lightpaint.errors import SceneError
 from lightpaint.relit.xml_edit import Element, XmlFile
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.emission import AS_AUTHORED, Scaling
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.properties.emission import AS_AUTHORED, Scaling
 from lightpaint.scene.scene import Scene
 
 

@@ -21,8 +21,8 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.emission_xml import Changes, set_emission
 from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.screen import some_names

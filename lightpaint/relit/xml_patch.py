@@ -10,8 +10,8 @@ from lightpaint.errors import OutputError, SceneError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relight import relit_files, scene_of, settings_of
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.properties.emission import Scaling
 from lightpaint.scene.scene import Scene
 
 #: A folder that does not exist, and stands for any place of the relit scene.

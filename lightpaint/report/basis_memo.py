@@ -10,7 +10,7 @@ from threading import Lock, Thread
 from typing import Any, TypeVar
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_planes import DenoisedPlanes, obtain_denoised_planes
+from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, obtain_denoised_planes
 
 Result = TypeVar("Result")
 

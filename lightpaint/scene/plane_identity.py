@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.scene.emission import EmissionKind, Scaling
-from lightpaint.scene.film import Film
+from lightpaint.scene.properties.emission import EmissionKind, Scaling
+from lightpaint.scene.properties.film import Film
 from lightpaint.scene.scene_tree import ParsedScene
 
 #: Names that Mitsuba's parser makes up for what stands in another element.

@@ -8,7 +8,7 @@ rather than samples.
 from dataclasses import dataclass
 from typing import Literal
 
-from lightpaint.scene.film import Film, reduction_to
+from lightpaint.scene.properties.film import Film, reduction_to
 from lightpaint.scene.scene import Scene
 
 Quality = Literal["preview", "final"]

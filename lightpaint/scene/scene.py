@@ -17,16 +17,16 @@ import numpy as np
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
-from lightpaint.scene.emission import EmitterSetting
-from lightpaint.scene.film import Film, camera_named, reduced, reduction
-from lightpaint.scene.integrator import Integrator, IntegratorChoice
 from lightpaint.scene.lights.emitters import Emitter, point_emitter
 from lightpaint.scene.lights.light import Light, free_names, light_named, lights_of, settings_for
 from lightpaint.scene.lights.light_choice import REST
 from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside
 from lightpaint.scene.lights.new_emitter import NewEmitter, moved_emitter
-from lightpaint.scene.mitsuba_errors import mitsuba_errors, render_errors
-from lightpaint.scene.pose import Pose, motion_of
+from lightpaint.scene.properties.emission import EmitterSetting
+from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
+from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
+from lightpaint.scene.properties.pose import Pose, motion_of
+from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene_inspection import inspect_scene, shape_names
 from lightpaint.scene.scene_tree import ParsedScene

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from pathlib import PurePath
 from typing import Any
 
-from lightpaint.scene.emission import ENVIRONMENTS
-from lightpaint.scene.film import Film, camera_named
 from lightpaint.scene.lights.emitters import find_emitters
 from lightpaint.scene.plane_identity import SceneHasher
+from lightpaint.scene.properties.emission import ENVIRONMENTS
+from lightpaint.scene.properties.film import Film, camera_named
 from lightpaint.scene.scene_tree import ParsedScene
 
 #: A shape that is visible only where instances refer to it.

@@ -8,12 +8,12 @@ from lightpaint.file_reading import file_length
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.old_scenes import explain_old_scene
 from lightpaint.scene.checks.xml_limits import MAX_XML
-from lightpaint.scene.film import check_film, sensor_index
-from lightpaint.scene.integrator import IntegratorChoice
 from lightpaint.scene.lights.emitters import check_emitters
 from lightpaint.scene.lights.light_choice import choose_lights
 from lightpaint.scene.lights.lights_file import lights_file_for
-from lightpaint.scene.mitsuba_errors import mitsuba_errors
+from lightpaint.scene.properties.film import check_film, sensor_index
+from lightpaint.scene.properties.integrator import IntegratorChoice
+from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene

@@ -17,18 +17,18 @@ from lightpaint.errors import SceneError
 from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.required import check_required
 from lightpaint.scene.checks.xml_limits import check_nodes, check_xml
-from lightpaint.scene.emission import EmitterSetting, child_named, set_emission
-from lightpaint.scene.film import Film
-from lightpaint.scene.integrator import (
+from lightpaint.scene.normals import settle_normals
+from lightpaint.scene.properties.emission import EmitterSetting, child_named, set_emission
+from lightpaint.scene.properties.film import Film
+from lightpaint.scene.properties.integrator import (
     Integrator,
     IntegratorChoice,
     integrator_nodes,
     read_integrator,
     replace_integrator,
 )
-from lightpaint.scene.mitsuba_errors import mitsuba_errors
-from lightpaint.scene.normals import settle_normals
-from lightpaint.scene.pose import Motion, moved_parameters
+from lightpaint.scene.properties.pose import Motion, moved_parameters
+from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
 from lightpaint.scene.runtime.plugins import check_plugins
 
 

@@ -11,7 +11,7 @@ import OpenEXR
 import pytest
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import (
+from lightpaint.basis.file.basis_file import (
     FORMAT_KEY,
     ORIGIN_KEY,
     as_stored,
@@ -20,8 +20,8 @@ from lightpaint.basis.basis_file import (
     read_origin,
     write_basis,
 )
-from lightpaint.basis.checksums import CHECKSUMS_KEY
-from lightpaint.basis.file_parts import LIGHT_KEY, NAMES_KEY, OBJECTS_KEY
+from lightpaint.basis.file.checksums import CHECKSUMS_KEY
+from lightpaint.basis.file.file_parts import LIGHT_KEY, NAMES_KEY, OBJECTS_KEY
 from lightpaint.errors import BasisError, ImageError, SizeError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import ExrPart, read_parts, write_parts, write_rgb

@@ -15,11 +15,12 @@ import pytest
 from command import run
 from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 
-from lightpaint.basis import basis_file, cache, cache_folder
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import read_basis, write_basis
-from lightpaint.basis.cache_folder import SUFFIX, SUMS_SUFFIX, TAG
-from lightpaint.basis.file_planes import FilePlanes
+from lightpaint.basis.cache import cache, cache_folder
+from lightpaint.basis.cache.cache_folder import SUFFIX, SUMS_SUFFIX, TAG
+from lightpaint.basis.file import basis_file
+from lightpaint.basis.file.basis_file import read_basis, write_basis
+from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
 from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.errors import LightpaintError, OutputError, SceneError
@@ -475,7 +476,7 @@ def test_a_clock_that_jumps_costs_no_basis(
 ) -> None:
     bases_of(make_basis, "hall.xml", "room.xml")
     there = time.time() + jump_s
-    monkeypatch.setattr("lightpaint.basis.cache.time", SimpleNamespace(time=lambda: there))
+    monkeypatch.setattr("lightpaint.basis.cache.cache.time", SimpleNamespace(time=lambda: there))
     bases_of(make_basis, "hall.xml")
     assert len(cache.entries()) == 2
     for entry in cache.entries():

@@ -11,11 +11,17 @@ import numpy as np
 import pytest
 from damaged_files import Case, cut_and_read, damaged, outcomes, turned, wrong
 
-from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import ORIGIN_KEY, as_stored, read_basis, read_origin, write_basis
-from lightpaint.basis.checksums import CHECKSUMS_KEY
-from lightpaint.basis.file_parts import LIGHT_KEY
+from lightpaint.basis.cache import cache
+from lightpaint.basis.file.basis_file import (
+    ORIGIN_KEY,
+    as_stored,
+    read_basis,
+    read_origin,
+    write_basis,
+)
+from lightpaint.basis.file.checksums import CHECKSUMS_KEY
+from lightpaint.basis.file.file_parts import LIGHT_KEY
 from lightpaint.basis.lightgroups.folder_files import MAX_FILES, is_light_groups
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.errors import BasisError, ImageError

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from lightpaint.basis.basis import Basis, IndirectLight, Origin
-from lightpaint.basis.basis_file import as_stored, read_basis, write_basis
+from lightpaint.basis.cache.denoised_planes import RoughPlanes
 from lightpaint.basis.denoised_mixes import blend_by_noise, denoise_mix, denoise_plane
-from lightpaint.basis.denoised_planes import RoughPlanes
+from lightpaint.basis.file.basis_file import as_stored, read_basis, write_basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.basis.planes import as_planes
 from lightpaint.errors import BasisError

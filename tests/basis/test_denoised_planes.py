@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.basis import denoised_planes
-from lightpaint.basis.denoised_planes import (
+from lightpaint.basis.cache import denoised_planes
+from lightpaint.basis.cache.denoised_planes import (
     DenoisedPlanes,
     RoughPlanes,
     as_halves,

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis import basis_file
 from lightpaint.basis.basis import IndirectLight
-from lightpaint.basis.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
-from lightpaint.basis.file_parts import SCALE_KEY
-from lightpaint.basis.file_planes import RowPlanes
-from lightpaint.basis.half_floats import (
+from lightpaint.basis.file import basis_file
+from lightpaint.basis.file.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
+from lightpaint.basis.file.file_parts import SCALE_KEY
+from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.basis.file.half_floats import (
     FLOAT,
     HALF,
     HIDDEN_SHARE,

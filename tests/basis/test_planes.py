@@ -10,10 +10,10 @@ import pytest
 
 import lightpaint
 import lightpaint as lp
-from lightpaint.basis import basis_file, file_planes
 from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means, in_one_row
-from lightpaint.basis.file_planes import FilePlanes
-from lightpaint.basis.half_floats import EncodedPlanes
+from lightpaint.basis.file import basis_file, file_planes
+from lightpaint.basis.file.file_planes import FilePlanes
+from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import exr_rows

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lightpaint.basis import cache, cache_folder, scene_facts
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache import cache, cache_folder, scene_facts
+from lightpaint.basis.cache.scene_facts import SceneFacts, facts_key, recall_facts, remember_facts
 from lightpaint.basis.render.basis_render import basis_lights
-from lightpaint.basis.scene_facts import SceneFacts, facts_key, recall_facts, remember_facts
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 

@@ -17,14 +17,15 @@ import pytest
 from batches import LOOKS, NAMES, contents, killed, run_all, small_basis, write_batch
 from command import run, succeed
 
+from lightpaint.batch.distribution import engine
+from lightpaint.batch.distribution.processes import Processes
 from lightpaint.batch.gallery.gallery import contact_sheet, gallery_page
 from lightpaint.batch.gallery.summary import LightRow, SummaryRow
 from lightpaint.batch.manifest.folder_names import FILES, is_reserved
 from lightpaint.batch.plan.planner import plan
 from lightpaint.batch.run import _Run, run_batch
 from lightpaint.batch.run_options import RunOptions
-from lightpaint.batch.work import engine, work
-from lightpaint.batch.work.processes import Processes
+from lightpaint.batch.work import work
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import ItemResult
 from lightpaint.errors import BatchError, OutputError

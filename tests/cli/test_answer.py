@@ -12,7 +12,7 @@ import pytest
 from command import run, succeed
 from rich.cells import cell_len
 
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
 from lightpaint.cli import main
 from lightpaint.cli.commands.answer_text import _what_holds, change

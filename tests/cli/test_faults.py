@@ -9,7 +9,7 @@ from command import refused, run
 
 from lightpaint.cli import dispatcher
 from lightpaint.cli.crash_report import FAULT
-from lightpaint.scene.mitsuba_errors import render_errors
+from lightpaint.scene.runtime.mitsuba_errors import render_errors
 
 #: A camera that no particle hits: it loads, and Mitsuba throws in the middle of the render.
 SCENE = """<scene version="3.0.0">

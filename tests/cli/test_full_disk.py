@@ -11,7 +11,7 @@ import pytest
 from command import succeed
 from renderer import CORNELL, REPOSITORY, write_room
 
-from lightpaint.basis.cache_folder import TAG
+from lightpaint.basis.cache.cache_folder import TAG
 
 WARM = REPOSITORY / "targets" / "cornell" / "warm.exr"
 

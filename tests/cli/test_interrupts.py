@@ -13,7 +13,7 @@ from nightly import at_night
 from renderer import CORNELL, LIGHTS, PATH, assert_equal_bits, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import read_basis
+from lightpaint.basis.file.basis_file import read_basis
 from lightpaint.basis.render.basis_render import ONE_PASS, SEPARATE
 from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.scene.scene_reader import load_scene

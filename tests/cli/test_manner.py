@@ -11,7 +11,7 @@ import pytest
 from command import refused, run, succeed
 from renderer import LIGHTS, write_room
 
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.options.parser import command_parser
 from lightpaint.cli.tolerances import Tolerances
 from lightpaint.images.formats.exr import write_rgb
@@ -138,7 +138,7 @@ def test_every_command_has_a_document(tmp_path: Path) -> None:
 
 
 def test_the_cache_and_the_doctor(here: Path, make_basis: Any, monkeypatch: Any) -> None:
-    from lightpaint.basis import cache
+    from lightpaint.basis.cache import cache
 
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(here / "cache"))
     assert cache.keep(make_basis(2, names=["a", BAD]))

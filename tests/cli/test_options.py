@@ -11,7 +11,7 @@ from command import refused
 from light_groups import channels, interleaved, pictures, write
 from renderer import write_room
 
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.cli.options.job_options import jobs_of, settings_of
 from lightpaint.cli.options.parser import command_parser

@@ -9,7 +9,7 @@ from command import refused, run, succeed
 from light_groups import interleaved
 from PIL import Image
 
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.formats.exr import read_parts

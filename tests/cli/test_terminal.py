@@ -11,8 +11,8 @@ from command import refused, run, spawn, succeed
 from renderer import write_room
 from rich.markup import escape
 
-from lightpaint.basis import cache
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.cache import cache
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.output import lines, terminal
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting

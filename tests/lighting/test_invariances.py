@@ -12,8 +12,8 @@ from conftest import BasisFactory
 from threadpoolctl import threadpool_limits
 
 import lightpaint as lp
-from lightpaint.basis import basis_file, file_planes
-from lightpaint.basis.file_planes import FilePlanes
+from lightpaint.basis.file import basis_file, file_planes
+from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.threads import limit_jobs
 
 #: Each has another loss, or other equations beside it.

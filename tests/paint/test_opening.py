@@ -13,7 +13,7 @@ from command import spawn
 from renderer import assert_equal_bits, write_room
 
 import lightpaint as lp
-from lightpaint.basis import cache, scene_facts
+from lightpaint.basis.cache import cache, scene_facts
 from lightpaint.basis.render.basis_render import basis_lights
 from lightpaint.errors import ConstraintError, PaintError
 from lightpaint.images.denoiser import Features

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
-from lightpaint.basis.denoised_planes import (
+from lightpaint.basis.cache.denoised_planes import (
     DenoisedPlanes,
     cache_denoised_planes,
     read_denoised_planes,

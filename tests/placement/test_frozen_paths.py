@@ -12,7 +12,7 @@ import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.errors import SceneError
 from lightpaint.placement.frozen_paths import FrozenPaths, falloff
-from lightpaint.scene.pose import Site
+from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.scene.surfaces import render_features

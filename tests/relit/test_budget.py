@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.relit.sample_budget import FEWEST, verification_budget
-from lightpaint.scene.film import Film, reduced, reduction
+from lightpaint.scene.properties.film import Film, reduced, reduction
 
 
 @dataclass(frozen=True)

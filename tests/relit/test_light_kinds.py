@@ -15,8 +15,8 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solve import solve
 from lightpaint.relit.relight import relight
 from lightpaint.relit.verification_render import verify
-from lightpaint.scene.emission import MULTIPLE, Scaling
 from lightpaint.scene.lights.light import settings_for
+from lightpaint.scene.properties.emission import MULTIPLE, Scaling
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
 

@@ -11,7 +11,7 @@ import pytest
 from command import run
 from conftest import BasisFactory
 
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.analysis.appearance.appearance import Appearance

@@ -15,7 +15,7 @@ from lightpaint.images.pixel_blocks import block_mean, enlarged, whole_factor
 from lightpaint.pipeline.job.remarks import remarks_of_film, remarks_of_target
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import silent
-from lightpaint.scene.film import Film, even_reductions, reduced, reduction, reduction_to
+from lightpaint.scene.properties.film import Film, even_reductions, reduced, reduction, reduction_to
 from lightpaint.scene.quality_presets import PRESETS, on_film, samples
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene_reader import load_scene

@@ -11,12 +11,12 @@ from command import refused, run, succeed
 from renderer import LIGHTS, write_room
 
 import lightpaint as lp
-from lightpaint.basis.basis_file import read_origin
+from lightpaint.basis.file.basis_file import read_origin
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.relight import relit_files
-from lightpaint.scene.integrator import IntegratorChoice
+from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 

@@ -7,11 +7,11 @@ import pytest
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
-from lightpaint.scene.emission import MULTIPLE, EmissionKind, Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.lights.light_choice import REST, choose_lights
 from lightpaint.scene.lights.lights_file import read_lights_file
+from lightpaint.scene.properties.emission import MULTIPLE, EmissionKind, Scaling
 
 AREA = EmissionKind(Scaling.COLOUR, "radiance", "W/(m² sr)")
 POINT = EmissionKind(Scaling.COLOUR, "intensity", "W/sr")

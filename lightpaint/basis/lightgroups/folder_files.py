@@ -8,7 +8,7 @@ without a word.
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from lightpaint.basis.basis_file import FORMAT_KEY
+from lightpaint.basis.file.basis_file import FORMAT_KEY
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.estimate import HALF_DIFFERENCE
 from lightpaint.images.formats.exr import OWN, read_channels, read_headers

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.file_planes import RowPlanes
+from lightpaint.basis.file.file_planes import RowPlanes
 from lightpaint.basis.render.half_sums import mean_and_half_difference
 from lightpaint.basis.render.integrators import plane_count
 from lightpaint.errors import SceneError

@@ -24,7 +24,7 @@ from lightpaint.basis.render.separate_renders import (
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.keywords import keywords
 from lightpaint.progress import Interrupted, Progress, silent
-from lightpaint.scene.mitsuba_errors import render_errors
+from lightpaint.scene.runtime.mitsuba_errors import render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, view_seed

@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from lightpaint.arrays import Indices
-from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import as_stored, is_large
+from lightpaint.basis.cache import cache
+from lightpaint.basis.file.basis_file import as_stored, is_large
 from lightpaint.basis.render.basis_render import (
     ONE_PASS,
     basis_lights,

@@ -4,8 +4,8 @@ It traces the paths of `path`. Others estimate the same picture from other sampl
 the same basis, but for noise.
 """
 
-from lightpaint.scene.emission import ENVIRONMENTS
-from lightpaint.scene.integrator import Integrator
+from lightpaint.scene.properties.emission import ENVIRONMENTS
+from lightpaint.scene.properties.integrator import Integrator
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 

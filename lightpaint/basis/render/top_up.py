@@ -23,7 +23,7 @@ from lightpaint.basis.render.render_budget import PASS_DIVISOR
 from lightpaint.basis.render.render_parts import PART_MAX_BYTES
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted, Progress, silent
-from lightpaint.scene.mitsuba_errors import render_errors
+from lightpaint.scene.runtime.mitsuba_errors import render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import largest_pass, view_seed

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.cli.commands.lights import note_scene
 from lightpaint.cli.commands.solve import solve
 from lightpaint.cli.options.job_options import folders_of, is_folder

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache import cache
 from lightpaint.cli.doctor import Finding
 from lightpaint.cli.output.tables import photometry_of
 from lightpaint.cli.tolerances import Tolerances
@@ -15,8 +15,8 @@ from lightpaint.pipeline.results.result_folder import RECORD
 from lightpaint.pipeline.results.results import Look
 from lightpaint.relit.verification import Verification
 from lightpaint.report.report_json import finite, verification_numbers
-from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.lights.light import WHOLE_EMISSION, Light
+from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene
 
 

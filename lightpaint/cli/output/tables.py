@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from lightpaint.basis.cache import Entry
+from lightpaint.basis.cache.cache import Entry
 from lightpaint.cli.output import terminal
 from lightpaint.colour.photometry import Photometry, photometry
 from lightpaint.placement.suggestion import Suggestion
@@ -10,9 +10,9 @@ from lightpaint.relit.verification import Verification
 from lightpaint.report.page.suggestion_section import spoken_position, spoken_suggestions
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.verdict import agreement
-from lightpaint.scene.emission import MULTIPLE
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.lights.light import Light
+from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves, scale_of
+from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.paint.protocol import ViewInfo
 from lightpaint.paint.session import picture_table

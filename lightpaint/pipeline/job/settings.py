@@ -8,7 +8,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.algebra.optimum import Method
 from lightpaint.lighting.fit import Colors, Emitters, Fit, Space
-from lightpaint.scene.film import MAX_SPP, check_resolution
+from lightpaint.scene.properties.film import MAX_SPP, check_resolution
 from lightpaint.scene.quality_presets import Quality, samples
 from lightpaint.validation import SWITCH, Check, a, between, number, one_of, whole
 

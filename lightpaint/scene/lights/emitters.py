@@ -12,7 +12,8 @@ import numpy as np
 from lightpaint.arrays import RGB
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.errors import SceneError
-from lightpaint.scene.emission import (
+from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
+from lightpaint.scene.properties.emission import (
     AS_AUTHORED,
     ENVIRONMENTS,
     PLUGINS,
@@ -22,8 +23,7 @@ from lightpaint.scene.emission import (
     read_emission,
     why_not_adjusted,
 )
-from lightpaint.scene.plane_identity import EmitterDigest, SceneHasher
-from lightpaint.scene.pose import Site, site_of
+from lightpaint.scene.properties.pose import Site, site_of
 from lightpaint.scene.scene_tree import ParsedScene
 from lightpaint.validation import MAX_NAME
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 from lightpaint.arrays import RGB
 from lightpaint.errors import SceneError
-from lightpaint.scene.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.plane_identity import combined_identity
+from lightpaint.scene.properties.emission import AS_AUTHORED, MULTIPLE, EmitterSetting, Scaling
 from lightpaint.screen import some_names
 
 #: Parameter of a light whose emission is a multiple of the scene's own.

@@ -7,8 +7,8 @@ apart by `area_217`, and take three hundred planes of the basis.
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import count, pairwise
 
-from lightpaint.scene.emission import Scaling
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.properties.emission import Scaling
 
 #: Up to this number, similar emitters stay separate: they can be inspected one by one.
 MAX_SEPARATE = 24

@@ -8,7 +8,7 @@ import pytest
 from command import run, succeed
 from light_groups import channels, interleaved, pictures, write
 
-from lightpaint.basis.basis_file import write_basis
+from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lightgroups.light_groups import read_light_groups
 from lightpaint.errors import BasisError
 from lightpaint.images.estimate import Estimate, write_estimate

@@ -10,9 +10,10 @@ import pytest
 from renderer import assert_equal_bits
 
 import lightpaint.scene.scene_render
-from lightpaint.basis import basis_file, cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.half_floats import EncodedPlanes
+from lightpaint.basis.cache import cache
+from lightpaint.basis.file import basis_file
+from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.render import banded_film, guide_training
 from lightpaint.basis.render.banded_film import FileSums, SumPlanes
 from lightpaint.basis.render.basis_render import memory_needed, render_basis, renders_in_bands

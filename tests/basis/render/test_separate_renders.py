@@ -13,7 +13,7 @@ from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, same_basis, write_roo
 
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import read_basis, write_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render.basis_render import ONE_PASS, SEPARATE, render_basis
 from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.basis.render.separate_renders import BLACK, WHITE

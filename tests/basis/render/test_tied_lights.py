@@ -7,11 +7,11 @@ import pytest
 from renderer import LIGHTS, SAME_SAMPLES, mitsuba_render, one_pass, write_room
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import read_basis, write_basis
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render.basis_render import SEPARATE, is_of, render_basis
 from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
-from lightpaint.scene.emission import MULTIPLE
+from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 

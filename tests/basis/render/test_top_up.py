@@ -11,9 +11,9 @@ import pytest
 from renderer import SAME_SAMPLES, render_in_parts, same_basis, write_room
 
 import lightpaint.scene.scene_render
-from lightpaint.basis import cache
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.basis_file import read_basis, write_basis
+from lightpaint.basis.cache import cache
+from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render import guide_training, top_up
 from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
 from lightpaint.basis.render.cached_render import obtain_basis, top_up_basis

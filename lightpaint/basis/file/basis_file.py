@@ -13,8 +13,8 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, IndirectLight, Origin
-from lightpaint.basis.checksums import CHECKSUMS_KEY, Checksums, check, checksum
-from lightpaint.basis.file_parts import (
+from lightpaint.basis.file.checksums import CHECKSUMS_KEY, Checksums, check, checksum
+from lightpaint.basis.file.file_parts import (
     INDIRECT_CHANNELS,
     LIGHT_CHANNELS,
     LIGHT_KEY,
@@ -33,8 +33,8 @@ from lightpaint.basis.file_parts import (
     stack_channels,
     stored_channels,
 )
-from lightpaint.basis.file_planes import FilePlanes
-from lightpaint.basis.half_floats import EncodedPlanes
+from lightpaint.basis.file.file_planes import FilePlanes
+from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, ImageError

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles
-from lightpaint.basis.file_planes import RowPlanes
+from lightpaint.basis.file.file_planes import RowPlanes
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.batch.work.engine import Engine
+from lightpaint.batch.distribution.engine import Engine
 from lightpaint.batch.work.render_cost import SAMPLE_S
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work_items import Passes

@@ -15,7 +15,7 @@ from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.emission import ENVIRONMENTS
+from lightpaint.scene.properties.emission import ENVIRONMENTS
 
 #: Mitsuba's default cutoff angle of a spot, in degrees, and the share of it that its beam is wide.
 DEFAULT_CUTOFF, DEFAULT_BEAM_SHARE = 20.0, 0.75

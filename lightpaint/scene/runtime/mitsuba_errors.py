@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lightpaint.errors import SceneError
 from lightpaint.files import one_line, without_path
-from lightpaint.scene.integrator import (
+from lightpaint.scene.properties.integrator import (
     IntegratorChoice,
 )
 from lightpaint.scene.runtime.plugins import UnknownPluginError

@@ -7,8 +7,8 @@ from typing import Any
 
 from lightpaint.basis.render.basis_render import basis_lights
 from lightpaint.basis.render.render_parts import plan_parts
-from lightpaint.batch.work.basis_parts import obtain_guide_table
-from lightpaint.batch.work.engine import Engine
+from lightpaint.batch.distribution.basis_parts import obtain_guide_table
+from lightpaint.batch.distribution.engine import Engine
 from lightpaint.batch.work.render_cost import render_seconds
 from lightpaint.batch.work.spool import Spool
 from lightpaint.batch.work.sums_answer import publish_solved_lights

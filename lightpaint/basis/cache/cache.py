@@ -19,8 +19,7 @@ import numpy as np
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, Origin
-from lightpaint.basis.basis_file import FORMAT, read_basis, read_origin, write_basis
-from lightpaint.basis.cache_folder import (
+from lightpaint.basis.cache.cache_folder import (
     BASIS_NAME,
     LEFTOVER_NAME,
     SUFFIX,
@@ -31,6 +30,7 @@ from lightpaint.basis.cache_folder import (
     is_own,
     mark_folder,
 )
+from lightpaint.basis.file.basis_file import FORMAT, read_basis, read_origin, write_basis
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 from lightpaint.files import replacing
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis, free_name
-from lightpaint.basis.checksums import Checksums, checksum
-from lightpaint.basis.half_floats import PlaneEncoding, encodings_of
+from lightpaint.basis.file.checksums import Checksums, checksum
+from lightpaint.basis.file.half_floats import PlaneEncoding, encodings_of
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import BasisError
 from lightpaint.files import one_line

@@ -21,9 +21,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis import cache as bases
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache_folder import FACTS_SUFFIX, folder, is_own
+from lightpaint.basis.cache import cache as bases
+from lightpaint.basis.cache.cache_folder import FACTS_SUFFIX, folder, is_own
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_text

@@ -14,7 +14,7 @@ from lightpaint.basis.render.basis_render import (
 )
 from lightpaint.basis.render.guide_training import TRAINING_SAMPLES
 from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
-from lightpaint.batch.work.engine import Engine
+from lightpaint.batch.distribution.engine import Engine
 from lightpaint.batch.work.render_cost import render_seconds
 from lightpaint.batch.work.spool import Spool
 from lightpaint.batch.work.work_items import GuideTraining, PartOfBasis, SceneFilm

@@ -1,0 +1,1 @@
+"""The cache of earlier runs: bases, denoised planes, facts about scenes."""
