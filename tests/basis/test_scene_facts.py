@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import lightpaint
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache, cache_folder, scene_facts
 from lightpaint.basis.cache.scene_facts import SceneFacts, facts_key, recall_facts, remember_facts
@@ -61,6 +62,17 @@ def kept(scene: Scene, make_basis: Any) -> Basis:
     basis: Basis = replace(made, lights=basis_lights(scene), origin=origin)
     assert cache.keep(basis)
     return basis
+
+
+def test_another_version_of_any_module_that_reads_scenes_is_another_key() -> None:
+    package = Path(lightpaint.__file__).parent
+    modules = {path for room in ("scene", "basis") for path in (package / room).rglob("*.py")}
+    files = {
+        Path(path)
+        for at in scene_facts._code_folders()
+        for path, *_ in scene_facts._files_in_folder(at)
+    }
+    assert files == modules
 
 
 def test_it_is_what_the_scene_would_have_told(folder: Path, make_basis: Any) -> None:

@@ -42,8 +42,8 @@ COARSE_S = 2.0
 #: What in a process changes how Mitsuba reads a scene.
 ENVIRONMENT_PREFIXES = ("MI_", "MITSUBA")
 
-#: Code that reads scenes and makes identities of them; of others the libraries as well.
-OWN_FOLDERS = ("scene", "scene/checks", "scene/lights", "basis", "basis/render")
+#: Code that reads scenes and makes identities of them: our rooms, and libraries of others.
+OWN_ROOMS = ("scene", "basis")
 LIBRARIES = ("mitsuba", "drjit")
 
 
@@ -185,9 +185,17 @@ def _reads_more(path: Path) -> bool:
 def _code_version() -> str:
     """Return the version of the code that reads scenes, from its files."""
     versions = [__version__, sys.version, *(list(_files_of_package(name)) for name in LIBRARIES)]
-    package = Path(__file__).parents[1]
-    versions += [list(_files_in_folder(package / folder)) for folder in OWN_FOLDERS]
+    versions += [list(_files_in_folder(folder)) for folder in _code_folders()]
     return hashlib.sha256(repr(versions).encode()).hexdigest()
+
+
+def _code_folders() -> Iterator[Path]:
+    """Yield the folders of our own code that reads scenes, those inside others too."""
+    package = Path(__file__).parents[2]
+    for room in OWN_ROOMS:
+        for place, _, _ in sorted(os.walk(package / room)):
+            if Path(place).name != "__pycache__":
+                yield Path(place)
 
 
 def _files_of_package(package: str) -> Iterator[tuple[str, int, int]]:

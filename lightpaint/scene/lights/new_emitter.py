@@ -14,8 +14,8 @@ from lightpaint.arrays import RGB, Position, as_rgb
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.tokens import tag
-from lightpaint.scene.emission import PLUGINS
-from lightpaint.scene.pose import (
+from lightpaint.scene.properties.emission import PLUGINS
+from lightpaint.scene.properties.pose import (
     DEFAULT_BEAM_SHARE,
     DEFAULT_CUTOFF,
     FARTHEST,
