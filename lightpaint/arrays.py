@@ -27,6 +27,15 @@ RGB = tuple[float, float, float]
 #: A point, in units of the scene.
 Position = tuple[float, float, float]
 
+#: Numbers that the processor's cache has room for, with copies of them.
+_CACHED_NUMBERS = 2**14
+
+#: Bits of float32: all but the sign, infinity, and 2⁻¹⁴, the least half float of full precision.
+_MAGNITUDE, _INFINITY, _LEAST_NORMAL = map(np.uint32, (2**31 - 1, 255 << 23, 113 << 23))
+
+#: Bits of a half float that is not a number.
+_HALF_NAN = np.uint32(0x7E00)
+
 
 def largest(image: Floats) -> Floats:
     """Return the largest of the three channels, (…), of (…, 3): a fifth of the time of
@@ -58,6 +67,40 @@ def copy_as_singles(values: npt.NDArray[Any], into: npt.NDArray[np.float32]) -> 
         np.take(_singles(), np.ascontiguousarray(values).view(np.uint16), out=into, mode="clip")
     else:
         into[...] = values
+
+
+def round_to_halves(values: Floats) -> npt.NDArray[np.float16]:
+    """Return float32 numbers rounded to half floats, as `astype` does.
+
+    From the bits: NumPy takes up to forty times as long where these are subnormal, as most noise
+    is.
+    """
+    flat = np.ascontiguousarray(values, np.float32).reshape(-1)
+    made = np.empty(flat.shape, np.float16)
+    for start in range(0, flat.size, _CACHED_NUMBERS):
+        part = slice(start, start + _CACHED_NUMBERS)
+        size = flat[part].view(np.uint32) & _MAGNITUDE
+        bits = np.where(size > _INFINITY, _HALF_NAN, _half_bits(size))
+        made[part].view(np.uint16)[...] = bits | _half_signs(flat[part])
+    return made.reshape(values.shape)
+
+
+def _half_bits(size: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """Return the bits of half floats nearest to magnitudes, which are given as bits of float32."""
+    normal = np.maximum(size, _LEAST_NORMAL)
+    # 13 digits are dropped, a tie goes to the even number, and the exponent's bias falls by 112.
+    normal += np.uint32(0xFFF) + ((normal >> np.uint32(13)) & np.uint32(1))
+    normal >>= np.uint32(13)
+    normal -= np.uint32(112 << 10)
+    np.minimum(normal, np.uint32(31 << 10), out=normal)  # infinity
+    # Half floats below the least normal one are multiples of 2⁻²⁴, the last digit of 1/2 and more.
+    subnormal = np.minimum(size, _LEAST_NORMAL).view(np.float32) + np.float32(0.5)
+    # Where one of both counts, the other is 2⁻¹⁴.
+    return normal + subnormal.view(np.uint32) - np.uint32((126 << 23) + (1 << 10))
+
+
+def _half_signs(values: npt.NDArray[np.float32]) -> npt.NDArray[np.uint32]:
+    return (values.view(np.uint32) >> np.uint32(16)) & np.uint32(0x8000)
 
 
 @cache

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import lightpaint as lp
+from lightpaint.arrays import round_to_halves
 from lightpaint.basis.basis import IndirectLight
-from lightpaint.basis.file import basis_file
+from lightpaint.basis.file import basis_file, file_parts, half_floats
 from lightpaint.basis.file.basis_file import FORMAT_KEY, as_stored, read_basis, write_basis
 from lightpaint.basis.file.file_parts import SCALE_KEY
 from lightpaint.basis.file.file_planes import RowPlanes
@@ -21,7 +22,7 @@ from lightpaint.basis.file.half_floats import (
     TILE,
     EncodedPlanes,
     PlaneEncoding,
-    encodings_of,
+    encode_pair,
 )
 from lightpaint.basis.planes import MemoryPlanes, as_planes
 from lightpaint.errors import BasisError
@@ -40,7 +41,33 @@ def plane(noise: float, *, seed: int = 1, light: float = 1.0) -> tuple[np.ndarra
 
 
 def relative(image: np.ndarray, encoding: PlaneEncoding) -> float:
-    return float((np.abs(encoding.rounded(image) - image) / np.abs(image)).max())
+    return float((np.abs(encoding.decoded(encoding.encoded(image)) - image) / np.abs(image)).max())
+
+
+def encodings_of(image: np.ndarray, half: np.ndarray) -> tuple[PlaneEncoding, PlaneEncoding]:
+    its, of_noise = encode_pair(image, half)
+    return its.encoding, of_noise.encoding
+
+
+def test_rounding_has_the_bits_of_numpy() -> None:
+    """Of all bits but for which NaN it is, ties and the ends of ranges among them."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        ties = np.arange(2**16, dtype=np.uint16).view(np.float16).astype(np.float32)
+        ties = (ties[1:] + ties[:-1]) / 2
+    rng = np.random.default_rng(3)
+    for bits in (
+        rng.integers(0, 2**32, 2**20, dtype=np.uint32),
+        *(ties.view(np.uint32) + np.uint32(k) for k in range(3)),
+        np.arange(2**15, dtype=np.uint32) + np.uint32((113 << 23) - 2**14),
+    ):
+        numbers = bits.view(np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):
+            expected = numbers.astype(np.float16)
+        found, is_number = round_to_halves(numbers), ~np.isnan(numbers)
+        np.testing.assert_array_equal(
+            found[is_number].view(np.uint16), expected[is_number].view(np.uint16)
+        )
+        assert np.isnan(found[~is_number]).all()
 
 
 def test_noisy_planes_are_halves_and_clean_ones_are_not() -> None:
@@ -60,7 +87,7 @@ def test_rounding_is_hidden_in_the_noise_of_every_tile() -> None:
     image[TILE : 2 * TILE, :TILE] = 0.5  # nothing is rounded there
     its, _ = encodings_of(image, half)
     assert its.kind == HALF
-    missed = np.square(its.rounded(image) - image, dtype=np.float64)
+    missed = np.square(its.decoded(its.encoded(image)) - image, dtype=np.float64)
     noise = np.square(half, dtype=np.float64)
     for top in range(0, SIZE[0], TILE):
         for left in range(0, SIZE[1], TILE):
@@ -150,6 +177,34 @@ def test_memory_holds_many_planes_in_two_bytes_a_number(
             assert mine.array().tobytes() == other.array().tobytes()
         expected = lp.solve(singles, target)
         np.testing.assert_allclose(lp.solve(its, target).weights, expected.weights, rtol=1e-12)
+
+
+@pytest.mark.parametrize("limit", [0, 2**27])
+def test_what_is_kept_is_rounded_once(
+    tmp_path: Path, basis: lp.Basis, monkeypatch: pytest.MonkeyPatch, limit: int
+) -> None:
+    """And the file has the bytes of one of planes as they were rendered."""
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", limit)
+    write_basis(tmp_path / "a.exr", basis)
+    rounded = []
+    encode = half_floats.encode_pair
+    monkeypatch.setattr(
+        file_parts, "encode_pair", lambda *its: rounded.append(len(its)) or encode(*its)
+    )
+    stored = as_stored(basis, lambda its: write_basis(tmp_path / "b.exr", its))
+    assert len(rounded) == len(basis.lights)
+    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+    assert stored.images.tobytes() == read_basis(tmp_path / "b.exr").images.tobytes()
+
+
+def test_headers_of_long_names_have_room(tmp_path: Path, make_basis: Any) -> None:
+    names = ("Ü" * 900, '"' * 1000, "c")
+    planes = [plane(0.1, light=1e-30, seed=k) for k in range(3)]
+    images, halves = (np.stack(x) for x in zip(*planes, strict=True))
+    basis = make_basis(images=images, half_differences=halves, names=names)
+    write_basis(tmp_path / "a.basis.exr", basis)
+    assert read_basis(tmp_path / "a.basis.exr").names == names
+    assert len(read_parts(tmp_path / "a.basis.exr")) >= 4
 
 
 def test_a_file_is_half_as_long(tmp_path: Path, make_basis: Any) -> None:

@@ -11,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, IndirectLight, Origin
 from lightpaint.basis.file.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.basis.file.file_parts import (
     INDIRECT_CHANNELS,
+    LARGEST_SCALE,
     LIGHT_CHANNELS,
     LIGHT_KEY,
     PLANE_CHANNELS,
     checked_text,
-    encodings_of_planes,
+    encoded_planes_of,
     extra_of,
     features_of,
     guide_table_of,
@@ -28,13 +28,13 @@ from lightpaint.basis.file.file_parts import (
     light_texts,
     objects_of,
     other_parts,
-    planes_of,
+    plane_sets,
     scales_of,
     stack_channels,
     stored_channels,
 )
 from lightpaint.basis.file.file_planes import FilePlanes
-from lightpaint.basis.file.half_floats import EncodedPlanes
+from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding, encoded_plane
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
@@ -47,7 +47,7 @@ from lightpaint.images.formats.exr import (
     read_parts,
 )
 from lightpaint.images.formats.exr_rows import PartLayout, RowFile, RowsUnsupportedError
-from lightpaint.images.formats.exr_streams import PartHead, write_streamed
+from lightpaint.images.formats.exr_streams import PartHead, room_for, write_streamed
 from lightpaint.keywords import keywords
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 
@@ -83,48 +83,58 @@ def write_basis(path: str | Path, basis: Basis) -> None:
         >>> lp.read_basis("again.basis.exr").names
         ('panel', 'bulb')
     """
-    # Light by light, twice: headers come before pixels, and say how these are stored.
-    heads, stored, sums = [], [], {}
-    for k, light in enumerate(basis.lights):
-        planes = planes_of(basis, k)
-        stored.append(encodings_of_planes(planes))
-        texts = light_texts(light, stored[-1])
-        channels = light_channels(planes, stored[-1])
-        heads.append(PartHead.of(light.name, channels, texts))
-        sums[light.name] = checksum(checked_text(texts), channels)
-    others = list(other_parts(basis))
-    heads += [PartHead.of(x.name, x.channels, x.attributes, display=x.display) for x in others]
-    seen, guide_checksum = others[0].channels, ""
-    if basis.guide_table is not None:
-        guide_checksum = checksum("", others[1].channels)
     # Without what says no more than by default, as in files from before there was any.
     later = ("each_light", "integrator", "is_composed", "extra_spp")
     of_origin = json.dumps(fields_of(basis.origin, *later), ensure_ascii=False)
-    checksums = Checksums(sums, checksum(of_origin, {}), checksum("", seen), guide_checksum)
-    head = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
-    heads[0] = replace(heads[0], texts={**head, **heads[0].texts})
+    others, sums = list(other_parts(basis)), dict[str, str]()
 
-    def pixels() -> Iterator[Channels]:
-        for k, encodings in enumerate(stored):
-            yield light_channels(planes_of(basis, k), encodings)
-        yield from (part.channels for part in others)
+    def parts() -> Iterator[tuple[PartHead, Channels]]:
+        for k, light in enumerate(basis.lights):
+            planes = encoded_planes_of(basis, k)
+            texts = light_texts(light, [its.encoding for its in planes])
+            channels = light_channels(planes)
+            sums[light.name] = checksum(checked_text(texts), channels)
+            yield PartHead.of(light.name, channels, texts), channels
+        for its in others:
+            head = PartHead.of(its.name, its.channels, its.attributes, display=its.display)
+            yield head, its.channels
 
-    write_streamed(Path(path), heads, pixels())
+    def texts() -> dict[str, str]:
+        seen = checksum("", others[0].channels)
+        guide = "" if basis.guide_table is None else checksum("", others[1].channels)
+        checksums = Checksums(sums, checksum(of_origin, {}), seen, guide)
+        return {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
+
+    write_streamed(Path(path), parts(), room=_room(basis, others, of_origin), texts=texts)
 
 
-def as_stored(basis: Basis) -> Basis:
+def _room(basis: Basis, others: Sequence[ExrPart], of_origin: str) -> int:
+    """Return how many bytes stand before the pixels of a basis at most."""
+    scaled = [PlaneEncoding(scale=LARGEST_SCALE)] * len(PLANE_CHANNELS)
+    lights = [(light.name, light_texts(light, scaled), basis.size[0]) for light in basis.lights]
+    parts = [(its.name, its.attributes, its.size[0]) for its in others]
+    checksums = Checksums(dict.fromkeys(basis.names, "0" * 8), *("0" * 8,) * 3)
+    of_file = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
+    return sum(room_for(*its) for its in (*lights, *parts, ("", of_file, 0)))
+
+
+def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None) -> Basis:
     """Return `basis` with the planes that come back of what `write_basis` writes of it.
 
     So that who solves what was just rendered finds what who reads it from its file finds. Many
     planes are copied in half floats. Few are rounded in the memory of those that are given, which
     must be in memory.
+
+    keep: called with all planes encoded, which to write takes no rounding again.
     """
+    stored = _encoded(basis)
+    keep(stored)
     if is_encoded(len(basis.lights), basis.size):
-        return _encoded(basis)
-    for k in range(len(basis.lights)):
-        planes = planes_of(basis, k)
-        for plane, encoding in zip(planes, encodings_of_planes(planes), strict=True):
-            plane[...] = encoding.rounded(plane)
+        return stored
+    for planes, its in zip(plane_sets(basis), plane_sets(stored), strict=True):
+        if planes is not its:
+            for plane, rounded in zip(planes, its, strict=True):
+                plane[...] = rounded
     return replace(basis)  # which knows nothing of what was computed before
 
 
@@ -166,16 +176,8 @@ def is_encoded(lights: int, size: tuple[int, int]) -> bool:
 
 def _encoded(basis: Basis) -> Basis:
     """Return `basis` with planes that memory holds as their file does."""
-    stored: list[list[Sequence[Floats]]] = [[] for _ in PLANE_CHANNELS]
-    scales: list[list[float]] = [[] for _ in PLANE_CHANNELS]
-    for k in range(len(basis.lights)):
-        planes = planes_of(basis, k)
-        for number, encoding in enumerate(encodings_of_planes(planes)):
-            numbers = encoding.encoded(planes[number])
-            stored[number].append([numbers[..., c].copy() for c in range(3)])
-            scales[number].append(encoding.scale)
-    made = [EncodedPlanes(*its) for its in zip(stored, scales, strict=True) if its[0]]
-    images, noise, *indirect = made
+    of_lights = [encoded_planes_of(basis, k) for k in range(len(basis.lights))]
+    images, noise, *indirect = map(EncodedPlanes, zip(*of_lights, strict=True))
     parts = IndirectLight(*indirect) if indirect else None
     return replace(basis, planes=images, noise=noise, indirect=parts)
 
@@ -222,7 +224,9 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
         its = [(lit[k], scales[k][number]) for k in order]
         if is_encoded(len(lit), lit[0].size):
             stored = stored_channels(its, PLANE_CHANNELS[number])
-            return EncodedPlanes(stored, [scale for _, scale in its])
+            return EncodedPlanes(
+                [encoded_plane(*x) for x in zip(stored, (s for _, s in its), strict=True)]
+            )
         return as_planes(stack_channels(its, PLANE_CHANNELS[number]))
 
     stored = [partial(getattr, part, "channels") for part in lit]

@@ -10,8 +10,14 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis, free_name
 from lightpaint.basis.file.checksums import Checksums, checksum
-from lightpaint.basis.file.half_floats import PlaneEncoding, encodings_of
+from lightpaint.basis.file.half_floats import (
+    EncodedPlane,
+    EncodedPlanes,
+    PlaneEncoding,
+    encode_pair,
+)
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.planes import Planes
 from lightpaint.errors import BasisError
 from lightpaint.files import one_line
 from lightpaint.images.denoiser import Features
@@ -48,18 +54,22 @@ MAX_EXTRA = 2**24
 LEAST_SCALE, LARGEST_SCALE = 2.0**-126, 2.0**126
 
 
-def planes_of(basis: Basis, k: int) -> list[Floats]:
-    """Return the stored planes of light k, (h, w, 3) each, in the order of `PLANE_CHANNELS`."""
+def plane_sets(basis: Basis) -> list[Planes]:
+    """Return the sets of planes that are stored, in the order of `PLANE_CHANNELS`."""
     sets = [basis.planes, basis.noise]
     if basis.indirect is not None:
         sets += [basis.indirect.planes, basis.indirect.noise]
-    return [planes.plane(k) for planes in sets]
+    return sets
 
 
-def encodings_of_planes(planes: Sequence[Floats]) -> list[PlaneEncoding]:
-    """Return how each of `planes_of` is best stored."""
+def encoded_planes_of(basis: Basis, k: int) -> list[EncodedPlane]:
+    """Return the planes of light k as they are best stored, in the order of `PLANE_CHANNELS`."""
+    sets = plane_sets(basis)
+    if all(isinstance(planes, EncodedPlanes) for planes in sets):
+        return [planes.encoded(k) for planes in sets if isinstance(planes, EncodedPlanes)]
+    planes = [its.plane(k) for its in sets]
     pairs = zip(planes[::2], planes[1::2], strict=True)
-    return [encoding for pair in pairs for encoding in encodings_of(*pair)]
+    return [encoded for pair in pairs for encoded in encode_pair(*pair)]
 
 
 def light_texts(light: BasisLight, encodings: Sequence[PlaneEncoding]) -> dict[str, str]:
@@ -73,13 +83,13 @@ def light_texts(light: BasisLight, encodings: Sequence[PlaneEncoding]) -> dict[s
     return texts
 
 
-def light_channels(planes: Sequence[Floats], encodings: Sequence[PlaneEncoding]) -> Channels:
-    """Return the channels of a light as they are stored. planes: as `planes_of` returns them."""
-    made: dict[str, Any] = {}
-    for plane, encoding, names in zip(planes, encodings, PLANE_CHANNELS, strict=False):
-        stored = encoding.encoded(plane)
-        made |= {name: stored[..., k] for k, name in enumerate(names)}
-    return made
+def light_channels(planes: Sequence[EncodedPlane]) -> Channels:
+    """Return the channels of a light. planes: as `encoded_planes_of` returns them."""
+    return {
+        name: numbers
+        for plane, names in zip(planes, PLANE_CHANNELS, strict=False)
+        for name, numbers in zip(names, plane.numbers, strict=True)
+    }
 
 
 def checked_text(texts: Mapping[str, str]) -> str:

@@ -5,14 +5,14 @@ noise in every tile of it, and in float32 where it is so clean that rounding wou
 bright for half floats, or so dim that they lose digits, is multiplied by a power of two first.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles
+from lightpaint.arrays import Doubles, Floats, Indices, copy_as_singles, round_to_halves
 from lightpaint.basis.file.file_planes import RowPlanes
 
 HALF, FLOAT = np.dtype(np.float16), np.dtype(np.float32)
@@ -34,49 +34,60 @@ class PlaneEncoding:
 
     def encoded(self, plane: Floats) -> npt.NDArray[Any]:
         """Return the numbers that are stored of a plane, or of a part of one."""
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore"):
             scaled = plane if self.scale == 1 else plane * np.float32(1 / self.scale)
-            return scaled.astype(self.kind, copy=False)
+        return round_to_halves(scaled) if self.kind == HALF else scaled
 
     def decoded(self, stored: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
         """Return light, float32, of numbers that were stored."""
-        plane = stored.astype(np.float32, copy=False)
-        return plane if self.scale == 1 else plane * np.float32(self.scale)
+        plane = np.empty(stored.shape, np.float32)
+        copy_as_singles(stored, plane)
+        if self.scale != 1:
+            plane *= np.float32(self.scale)
+        return plane
 
-    def rounded(self, plane: Floats) -> npt.NDArray[np.float32]:
-        """Return a plane as it comes back."""
-        return self.decoded(self.encoded(plane))
+
+@dataclass(frozen=True)
+class EncodedPlane:
+    """A plane as it is stored. numbers: its three channels, (h, w) each."""
+
+    encoding: PlaneEncoding
+    numbers: Sequence[npt.NDArray[Any]] | npt.NDArray[Any]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        height, width = self.numbers[0].shape
+        return height, width
 
 
 class EncodedPlanes(RowPlanes):
     """Planes that memory holds as files do: in half floats where nobody sees the rounding.
 
-    stored: of each light its three channels, (h, w) each, half floats or float32, as
-    `PlaneEncoding.encoded` returns them. scales: what the numbers of each light are to be
-    multiplied by.
+    planes: of each light.
     """
 
-    def __init__(
-        self, stored: Sequence[Sequence[npt.NDArray[Any]]], scales: Sequence[float]
-    ) -> None:
-        self._stored = [[np.ascontiguousarray(its) for its in channels] for channels in stored]
-        self._scales = tuple(scales)
+    def __init__(self, planes: Sequence[EncodedPlane]) -> None:
+        self._encoded = tuple(planes)
 
     @property
     def count(self) -> int:
         """n."""
-        return len(self._stored)
+        return len(self._encoded)
 
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
-        height, width = self._stored[0][0].shape
-        return height, width
+        return self._encoded[0].size
 
     @property
     def nbytes(self) -> int:
         """Bytes of memory that the planes take."""
-        return sum(its.nbytes for channels in self._stored for its in channels)
+        return sum(channel.nbytes for its in self._encoded for channel in its.numbers)
+
+    def encoded(self, i: int) -> EncodedPlane:
+        """Return the plane of light i as it is stored."""
+        return self._encoded[i]
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
@@ -93,7 +104,7 @@ class EncodedPlanes(RowPlanes):
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
-        length = self._stored[0][0].reshape(-1)[where].size
+        length = self._encoded[0].numbers[0].reshape(-1)[where].size
         # Channel by channel, as they are stored and as sums go over them.
         made = np.empty((self.count, 3, length), np.float32)
         for i, channels in enumerate(made):
@@ -102,29 +113,42 @@ class EncodedPlanes(RowPlanes):
 
     def _decode(self, i: int, where: slice | Indices, into: Floats) -> None:
         """Write some pixels of light i into (3, p)."""
-        for stored, channel in zip(self._stored[i], into, strict=True):
+        its = self._encoded[i]
+        for stored, channel in zip(its.numbers, into, strict=True):
             copy_as_singles(stored.reshape(-1)[where], channel)
-        if self._scales[i] != 1:
-            into *= np.float32(self._scales[i])
+        if its.encoding.scale != 1:
+            into *= np.float32(its.encoding.scale)
 
 
-def encodings_of(image: Floats, noise: Floats) -> tuple[PlaneEncoding, PlaneEncoding]:
-    """Return how the image of a light and its half difference, (h, w, 3), are best stored."""
+def encoded_plane(channels: Sequence[npt.NDArray[Any]], scale: float) -> EncodedPlane:
+    """Return a plane of channels as they are stored, (h, w) each."""
+    numbers = [np.ascontiguousarray(channel) for channel in channels]
+    return EncodedPlane(PlaneEncoding(numbers[0].dtype, scale), numbers)
+
+
+def encode_pair(image: Floats, noise: Floats) -> tuple[EncodedPlane, EncodedPlane]:
+    """Return the image of a light and its half difference, (h, w, 3), as they are best stored."""
     hidden = HIDDEN_SHARE**2 * _power(noise)
-    found = []
-    for plane in (image, noise):
-        halves = (PlaneEncoding(HALF, scale) for scale in dict.fromkeys((1.0, _scale_of(plane))))
-        found.append(next((x for x in halves if _is_hidden(plane, x, hidden)), PlaneEncoding()))
-    return found[0], found[1]
+    return _encode(image, hidden), _encode(noise, hidden)
 
 
-def _is_hidden(plane: Floats, encoding: PlaneEncoding, hidden: Doubles) -> bool:
-    """Return whether rounding has no more power than `hidden` in any tile, channel by channel."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return all(
-            bool((power <= its).all())
-            for its, power in zip(hidden, _powers(plane, encoding), strict=True)
-        )
+def _encode(plane: Floats, hidden: Doubles) -> EncodedPlane:
+    """Return a plane in half floats if rounding has no more power than `hidden`, tile by tile and
+    channel by channel; else in float32.
+    """
+    height, width, _ = plane.shape
+    for scale in dict.fromkeys((1.0, _scale_of(plane))):
+        encoding, numbers = PlaneEncoding(HALF, scale), np.empty((3, height, width), HALF)
+        for k, top in enumerate(range(0, height, TILE)):
+            rows = np.ascontiguousarray(plane[top : top + TILE].transpose(2, 0, 1))
+            numbers[:, top : top + TILE] = stored = encoding.encoded(rows)
+            with np.errstate(over="ignore", invalid="ignore"):
+                missed = encoding.decoded(stored) - rows
+            if not (_row_power(missed) <= hidden[k]).all():
+                break
+        else:
+            return EncodedPlane(encoding, numbers)
+    return EncodedPlane(PlaneEncoding(), np.ascontiguousarray(plane.transpose(2, 0, 1)))
 
 
 def _scale_of(plane: Floats) -> float:
@@ -137,21 +161,13 @@ def _scale_of(plane: Floats) -> float:
 
 
 def _power(plane: Floats) -> Doubles:
-    """Return Σ x² of each tile and channel, (rows, columns, 3)."""
-    return np.array(list(_powers(plane, None)))
+    """Return Σ x² of each tile and channel, (rows, 3, columns)."""
+    tops = range(0, len(plane), TILE)
+    return np.array([_row_power(plane[top : top + TILE].transpose(2, 0, 1)) for top in tops])
 
 
-def _powers(plane: Floats, encoding: PlaneEncoding | None) -> Iterator[Doubles]:
-    """Yield Σ x² of a row of tiles after the other, (columns, 3), of what rounding changes.
-
-    encoding: None for the plane itself.
-    """
-    height, width, _ = plane.shape
-    columns = np.arange(0, width, TILE)
-    for top in range(0, height, TILE):
-        its = plane[top : top + TILE]
-        if encoding is not None:
-            its = encoding.rounded(its) - its
-        # Each row of pixels is summed first, which stays in the processor's cache.
-        squares = np.square(its, dtype=np.float64).sum(axis=0)
-        yield np.add.reduceat(squares, columns, axis=0)
+def _row_power(rows: Floats) -> Doubles:
+    """Return Σ x² of a row of tiles, (3, columns). rows: (3, up to TILE, w)."""
+    # Each row of pixels is summed first, which stays in the processor's cache.
+    squares = np.square(rows, dtype=np.float64).sum(axis=1)
+    return np.add.reduceat(squares, np.arange(0, rows.shape[2], TILE), axis=1)

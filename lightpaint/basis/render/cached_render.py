@@ -115,13 +115,15 @@ def obtain_basis(
     if basis is start:
         return basis
     basis = _marked(basis, is_composed=is_composed)
-    is_kept, basis = keep(basis), replace(basis, sums=None)
-    if is_kept and is_large(len(basis.lights), basis.size):
+    if not is_large(len(basis.lights), basis.size):
+        # As from its file, so that the next run finds the same.
+        return replace(as_stored(basis, keep), sums=None)
+    if keep(basis):
         of_file = cache.find(scene.identity, basis.origin.sensor, seed, basis.size)
         if of_file is not None and of_file.origin == basis.origin:
-            return replace(basis, planes=of_file.planes, noise=of_file.noise)
-    # As from its file, so that the next run finds the same.
-    return as_stored(basis)
+            basis = replace(basis, planes=of_file.planes, noise=of_file.noise)
+            return replace(basis, indirect=of_file.indirect, sums=None)
+    return replace(as_stored(basis), sums=None)
 
 
 def _completed(
@@ -176,9 +178,7 @@ def top_up_basis(
     """Return `basis` with further samples of some pixels, kept in its place. See `top_up`."""
     keep = cache.keep if use_cache else None
     made = top_up(scene, basis, counts, keep=keep, progress=progress, is_enough=is_enough)
-    if keep is not None:
-        keep(made)
-    return as_stored(made)
+    return as_stored(made) if keep is None else as_stored(made, keep)
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:

@@ -6,13 +6,12 @@ little: headers, tables of offsets, and lines that are uncompressed or compresse
 
 import struct
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.files import replacing
 from lightpaint.images.formats.exr import VERSION_KEY, Channels, is_worth_packing
@@ -21,6 +20,12 @@ from lightpaint.version import __version__
 
 #: Version number of a file, flag for names longer than 31 characters, and that length.
 VERSION, LONG_NAMES, LONGEST_NAME = 2, 0x400, 31
+
+#: Bytes of a header at most, with as many channels as a light has, but for its texts.
+PLAIN_HEAD_BYTES = 2048
+
+#: Bytes of name, type and length of a text.
+LONGEST_TEXT_HEAD = 64
 
 #: OpenEXR's numbers for no compression and for ZIP of 16 lines; and the level of ZIP.
 PLAIN, ZIPPED, LEVEL = 0, 3, 4
@@ -122,40 +127,57 @@ class PartHead:
 
 
 def write_streamed(
-    path: Path, heads: Sequence[PartHead], pixels: Iterable[Mapping[str, npt.NDArray[Any]]]
+    path: Path,
+    parts: Iterable[tuple[PartHead, Channels]],
+    *,
+    room: int,
+    texts: Callable[[], Mapping[str, str]] = dict,
 ) -> None:
     """Write a multi-part EXR, all of it or nothing.
 
-    pixels: the channels of each part, in the order of `heads`, of the types and size in its head.
-    All parts must have the same display window. The first records the version of lightpaint. Raises
-    OutputError for every refusal of the system.
+    Pixels are written as they come, behind the room for what stands before them in the file.
+
+    parts: the header of each and its channels, of the types and size in it; all have the same
+    display window. room: bytes that all headers have at most, as `room_for` says of each. texts:
+    returns attributes of the first header, in which the version of lightpaint is recorded too; it
+    is called after all parts. Raises OutputError for every refusal of the system.
     """
-    texts = {VERSION_KEY: __version__, **heads[0].texts}
-    heads = [replace(heads[0], texts=texts), *heads[1:]]
     with replacing(path) as temporary, temporary.open("wb") as file:
-        _write(file, heads, pixels)
+        file.seek(room)
+        heads, offsets = [], []
+        for number, (head, channels) in enumerate(parts):
+            heads.append(head)
+            for first, data in head.packed(channels):
+                offsets.append(file.tell())
+                file.write(HEAD.pack(number, first, len(data)))
+                file.write(data)
+        first_texts = {VERSION_KEY: __version__, **texts(), **heads[0].texts}
+        beginning = _beginning([replace(heads[0], texts=first_texts), *heads[1:]], offsets)
+        if len(beginning) > room:
+            raise ValueError(f"headers of {len(beginning)} bytes in a room of {room}")
+        file.seek(0)
+        file.write(beginning)
 
 
-def _write(
-    file: BinaryIO, heads: Sequence[PartHead], pixels: Iterable[Mapping[str, npt.NDArray[Any]]]
-) -> None:
+def room_for(name: str, texts: Mapping[str, str], height: int) -> int:
+    """Return how many bytes a part takes at most before the pixels of a file.
+
+    texts: its attributes, and those that the file has for it. height: rows of pixels.
+    """
+    return (
+        PLAIN_HEAD_BYTES
+        + sum(len(text.encode()) + 64 for text in (name, *texts.values()))
+        + 8 * height
+    )
+
+
+def _beginning(heads: Sequence[PartHead], offsets: Sequence[int]) -> bytes:
+    """Return all bytes of a file before its pixels. offsets: positions of all chunks."""
     names = [name for head in heads for name in (*head.channels, *head.texts)]
     flags = VERSION | MULTI_PART | (LONG_NAMES if max(map(len, names)) > LONGEST_NAME else 0)
-    file.write(struct.pack("<iI", MAGIC, flags))
-    for head in heads:
-        file.write(head.encoded())
-    file.write(b"\0")
-    table = file.tell()
-    # The positions of chunks are known only after writing them.
-    file.write(bytes(8 * sum(head.chunks for head in heads)))
-    offsets = []
-    for number, (head, channels) in enumerate(zip(heads, pixels, strict=True)):
-        for first, data in head.packed(channels):
-            offsets.append(file.tell())
-            file.write(HEAD.pack(number, first, len(data)))
-            file.write(data)
-    file.seek(table)
-    file.write(np.array(offsets, "<u8").tobytes())
+    encoded = [head.encoded() for head in heads]
+    table = np.array(offsets, "<u8").tobytes()
+    return b"".join([struct.pack("<iI", MAGIC, flags), *encoded, b"\0", table])
 
 
 def _attribute(name: str, kind: str, value: bytes) -> bytes:
