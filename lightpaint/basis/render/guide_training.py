@@ -43,7 +43,7 @@ def train(tracer: "Tracer", let_others_through: Callable[[], None]) -> Floats:
     for k, samples in enumerate(TRAINING_SAMPLES):
         let_others_through()
         # In a large picture some rows are enough, other ones in each pass.
-        step = min(max(1, height * width // samples), height)
+        step = min(-(-height * width // samples), height)
         rows = range(k * step // len(TRAINING_SAMPLES), height, step)
         spp = max(1, samples // (len(rows) * width))
         tracer.learn(rows, done, spp)

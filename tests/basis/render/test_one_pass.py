@@ -566,3 +566,31 @@ def test_what_is_no_number_is_left_out(small_room: Scene) -> None:
     planes.evaluate()
     np.testing.assert_array_equal(planes.sums().sum(axis=0)[0], [[1] * 3, [0] * 3, [0] * 3])
     tracer.close()
+
+
+def test_all_samples_are_traced_by_one_kernel(small_room: Scene) -> None:
+    """Compiling it takes longer than the first samples of a picture."""
+    use_variant()
+    import drjit as dr
+
+    from lightpaint.basis.render.tracer.one_pass import Tracer
+
+    rows = range(small_room.size[0])
+    pixels = np.arange(len(rows) * small_room.size[1])
+    tracer = Tracer(small_room, 0)
+    planes, listed = tracer.planes(rows), tracer.pixel_planes(7)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for k in range(3):
+            tracer.learn(rows[k:], k, 1)
+        tracer.end_training()
+        for k in range(4):  # wherever the arrays of a call happen to lie in memory
+            tracer.add(planes, k % 2, rows, k, 1)
+            some = pixels[k : k + 7]
+            tracer.top_up(listed, 0, some, np.zeros_like(some), np.ones_like(some))
+        history = dr.kernel_history((dr.KernelType.JIT,))
+    tracer.close()
+    # A path tracer is hundreds of times as long as what fills or copies an array.
+    long = [its["hash"] for its in history if len(its["ir"].getvalue()) > 2**16]
+    assert len(long) == 3 + 4 * 2
+    assert len(set(long)) == 1

@@ -174,16 +174,23 @@ class EmitterGuide:
         """
         entry = cell * self.count + emitter
         is_sampled, lit = is_sampled & self._learns, lit & self._learns
-        dr.scatter_add(self._new_counts, mi.UInt32(1), entry, is_sampled)
-        gray = dr.mean(contribution)
+        _count(self._new_counts, mi.UInt32(1), entry, is_sampled)
+        # Not dr.mean, which makes a constant of the kernel of how many paths it follows.
+        red, green, blue = contribution
+        gray = (red + green + blue) * (1 / 3)
         units = gray * dr.gather(mi.Float, self._units_of, emitter, lit)
         units = mi.UInt64(mi.UInt32(dr.clip(units, 0, MAX_UNITS)))
-        dr.scatter_add(self._new_light, units, entry, lit & dr.isfinite(gray))
+        _count(self._new_light, units, entry, lit & dr.isfinite(gray))
 
     def evaluate(self) -> None:
         """Run what was traced, and wait for it."""
         dr.eval(self._new_light, self._new_counts)
         dr.sync_thread()
+
+
+def _count(array, value, entry, active):
+    """Add to entries of an array, of whatever length: by itself Dr.Jit has other code for each."""
+    dr.scatter_reduce(dr.ReduceOp.Add, array, value, entry, active, mode=dr.ReduceMode.Direct)
 
 
 def _is_sane(table: Floats) -> bool:

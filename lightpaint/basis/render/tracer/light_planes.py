@@ -52,9 +52,12 @@ class LightPlanes:
         self._seen = dr.zeros(mi.Float, pixels)
 
     @classmethod
-    def nowhere(cls, light_of: Any) -> "LightPlanes":
-        """Return planes that keep nothing: for paths of which only what they learn counts."""
-        nothing = cls(light_of, 1, (1, 1))
+    def nowhere(cls, light_of: Any, lights: int, *, is_split: bool) -> "LightPlanes":
+        """Return planes that keep nothing: for paths of which only what they learn counts.
+
+        lights, is_split: as of the planes of other paths, which then run by the same kernel.
+        """
+        nothing = cls(light_of, lights, (1, 1), is_split=is_split)
         nothing._keeps = dr.opaque(mi.Bool, False)
         return nothing
 

@@ -20,6 +20,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import numpy.typing as npt
 
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.render.integrators import (
@@ -39,6 +40,9 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 #: emitters than that.
 FIRST_EMITTER_SAMPLES = 8
 LATER_EMITTER_SAMPLES = {32: 2, 128: 4, 2**32: 8}
+
+#: Bytes that the registers of any processor hold at most: arrays that Dr.Jit makes begin so.
+ALIGNMENT = 64
 
 #: Streams of numbers; those below are of the halves of all pixels.
 TRAINING_STREAM, FIRST_TOP_UP_STREAM = 2, 3
@@ -80,7 +84,8 @@ class Tracer:
 
         first: number of samples of a pixel that earlier passes took.
         """
-        nowhere = LightPlanes.nowhere(self.light_of)
+        lights, is_split = len(self.scene.lights), has_indirect_planes(self.scene)
+        nowhere = LightPlanes.nowhere(self.light_of, lights, is_split=is_split)
         with kernels():
             self._trace(TRAINING_STREAM, nowhere, *self._of_rows(rows, first, spp))
             self.guide.evaluate()
@@ -149,7 +154,7 @@ class Tracer:
         view = view_of(self.scene, self.loaded)
         place = dr.arange(mi.UInt32, pixels.size)
         # What differs between calls is no constant of the kernel, which is compiled once.
-        pixel, begin, end = (mi.UInt32(x.astype(np.uint32)) for x in (pixels, first, first + spp))
+        pixel, begin, end = (mi.UInt32(aligned(x)) for x in (pixels, first, first + spp))
         numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, self._streams[stream]))
         first_emitters, later = self._emitter_samples
         rules = rules_of(self.scene)._replace(
@@ -157,6 +162,19 @@ class Tracer:
             later_emitter_samples=dr.opaque(mi.UInt32, later),
         )
         trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
+
+
+def aligned(values: Indices) -> npt.NDArray[np.uint32]:
+    """Return a copy as uint32, in memory that begins at a multiple of `ALIGNMENT`.
+
+    Dr.Jit uses the memory of an array as it lies, and compiles one kernel for arrays that begin at
+    such a place and another for those that do not, for each array that a kernel reads.
+    """
+    room = np.empty(values.size + ALIGNMENT // 4, np.uint32)
+    begin = -room.ctypes.data % ALIGNMENT // 4
+    copy = room[begin : begin + values.size]
+    copy[:] = values
+    return copy
 
 
 def later_emitter_samples(emitters: int) -> int:
