@@ -23,8 +23,8 @@ import numpy as np
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.basis_render import basis_of_sums
 from lightpaint.basis.render.guide_training import train
+from lightpaint.basis.render.one_pass_basis import basis_of_sums
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target

@@ -46,7 +46,7 @@ from scipy.ndimage import gaussian_filter, label
 
 import lightpaint as lp
 from lightpaint.basis.basis import meter_exposure
-from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.colour.color import kelvin_to_rgb, luminance
 from lightpaint.colour.color_difference import delta_e
 from lightpaint.images.denoiser import denoised

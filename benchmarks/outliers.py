@@ -16,8 +16,9 @@ import argparse
 import numpy as np
 
 import lightpaint as lp
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.origin import Origin
 
 SIZE = (36, 64)
 

@@ -27,7 +27,7 @@ import gc, resource, sys, time
 from pathlib import Path
 import lightpaint as lp
 try:
-    from lightpaint.basis.render.cached_render import obtain_basis
+    from lightpaint.basis.cache.cached_render import obtain_basis
 except ImportError:
     from lightpaint.basis.render.obtain import obtain_basis
 

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_file import write_basis
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.origin import Origin
 from lightpaint.images.formats.exr import write_rgb
 
 #: Looks of every kind that needs no renderer.

@@ -18,8 +18,9 @@ from hypothesis import settings
 from renderer import write_room
 from threadpoolctl import threadpool_limits
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.origin import Origin
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

@@ -1,6 +1,5 @@
 """The basis: one image per light at unit emission."""
 
-from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -10,7 +9,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices, read_only
 from lightpaint.basis.lights import Lights
-from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
+from lightpaint.basis.origin import Origin
+from lightpaint.basis.planes import Planes, as_planes, power_and_totals
 from lightpaint.colour.color import luminance
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.dataframes import CHANNELS, by_channel, pandas, xarray
@@ -22,75 +22,6 @@ from lightpaint.images.surface_filter import SurfaceFilter
 from lightpaint.keywords import keywords
 from lightpaint.scene.lights.lights_file import SceneRequests
 from lightpaint.screen import Shown, some_names, some_of
-from lightpaint.version import __version__
-
-#: Most samples of a pixel, which is beyond any render.
-MAX_SAMPLES = 2**40
-
-
-#: How the method of light groups begins; the renderer follows.
-LIGHT_GROUPS = "light groups of "
-
-
-@dataclass(frozen=True)
-class Origin:
-    """The origin of a basis, which decides whether bases are comparable and samples can be added.
-
-    halves: samples per pixel of each of the two halves; passes: how many passes made them.
-    each_light: where lights have unequal numbers of samples, because an interrupt ended separate
-    renders or because they come from several runs, samples of half A and B and passes of A and B of
-    each; `halves` and `passes` are then what all have at least.
-    integrator: what was put in the place of the scene's own; "" where it rendered with that.
-    is_composed: whether planes come from several renders, of which some were of another state of
-    the scene, so that no other render comes to just the same.
-    extra_spp: samples per pixel beyond those, in the mean, where a painting needed them (see
-    `Basis.extra`).
-    """
-
-    scene: str
-    scene_identity: str
-    sensor: str
-    seed: int
-    method: str
-    halves: tuple[int, int]
-    passes: tuple[int, int]
-    lightpaint: str = __version__
-    each_light: tuple[tuple[int, int, int, int], ...] = ()
-    integrator: str = ""
-    is_composed: bool = False
-    extra_spp: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.extra_spp <= MAX_SAMPLES:
-            raise BasisError(f"{self.extra_spp} extra samples are not 0 or more")
-        if (
-            max(max(counts) for counts in (self.halves, self.passes, *self.each_light))
-            > MAX_SAMPLES
-        ):
-            raise BasisError(f"{self.halves} samples are more than any render has")
-
-    @property
-    def spp(self) -> int:
-        """Samples per pixel in all."""
-        return sum(self.halves)
-
-    @property
-    def mean_spp(self) -> float:
-        """Samples per pixel in the mean, extra ones included."""
-        return self.spp + self.extra_spp
-
-    @property
-    def samples_text(self) -> str:
-        """Return how many samples pixels have, as `16 samples per pixel`."""
-        text = f"{self.spp} samples per pixel"
-        if not self.extra_spp:
-            return text
-        return f"{text} and, in the mean, {self.extra_spp:.3g} more where a painting needed them"
-
-    @property
-    def is_light_groups(self) -> bool:
-        """True if another renderer made it, so that its picture has no template."""
-        return self.method.startswith(LIGHT_GROUPS)
 
 
 @dataclass(frozen=True)
@@ -344,17 +275,7 @@ class Basis(Shown):
     @cached_property
     def _power_and_totals(self) -> tuple[Doubles, Doubles]:
         """Power and totals of one walk, (n, 3) each."""
-        power, totals = np.zeros((2, len(self.lights), 3))
-        counted = (~self.emitters_seen.ravel()).astype(np.float64)
-        # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
-        # is as exact as the sum, and needs no copy of the basis.
-        for start in range(0, counted.size, BLOCK_PIXELS):
-            weights = counted[start : start + BLOCK_PIXELS]
-            block = self.planes.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
-            totals += np.ones(weights.size) @ block
-            block *= block
-            power += weights @ block
-        return power, totals
+        return power_and_totals(self.planes, ~self.emitters_seen)
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return the image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the
@@ -390,10 +311,3 @@ def meter_exposure(image: Floats, *bases: Basis) -> float:
         return choose_exposure(image)
     is_emitter = [basis.emitters_seen.ravel() for basis in bases]
     return choose_exposure(image, np.concatenate(is_emitter).reshape(image.shape[:2]))
-
-
-def free_name(name: str, used: Collection[str]) -> str:
-    """Return `name`, with underscores added while another light has it."""
-    while name in used:
-        name += "_"
-    return name

@@ -1,7 +1,7 @@
 """The lights of a basis without a pixel: what they are, what they emit, what their lights file asks
 for."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import overload
@@ -132,3 +132,10 @@ class Lights(Sequence[BasisLight]):
     def is_scalar(self) -> Bools:
         """(n,), which lights have one weight for all channels."""
         return read_only(np.array([light.is_scalar for light in self.each], dtype=bool))
+
+
+def free_name(name: str, used: Collection[str]) -> str:
+    """Return `name`, with underscores added while another light has it."""
+    while name in used:
+        name += "_"
+    return name

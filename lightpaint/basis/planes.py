@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles, Floats, Indices
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.threads import one_thread
 
 #: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
@@ -202,6 +202,24 @@ def joined_planes(
             plane[...] = image.reshape(-1, 3)
         made.append(MemoryPlanes(joint[:, start:end].reshape(n, *its.size, 3)))
     return MemoryPlanes(joint.reshape(n, rows, width, 3)), tuple(made)
+
+
+def power_and_totals(planes: Planes, counted: Bools) -> tuple[Doubles, Doubles]:
+    """Return ‖Φᵢ‖² over the counted pixels, and Σ Φᵢ over all of them, (n, 3) float64 each.
+
+    counted: (h, w). Both of one walk.
+    """
+    power, totals = np.zeros((2, planes.count, 3))
+    counted_f64 = counted.ravel().astype(np.float64)
+    # A sum over axes this short is slow in NumPy, a product is not; in float64 and by blocks it
+    # is as exact as the sum, and needs no copy of the basis.
+    for start in range(0, counted_f64.size, BLOCK_PIXELS):
+        weights = counted_f64[start : start + BLOCK_PIXELS]
+        block = planes.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
+        totals += np.ones(weights.size) @ block
+        block *= block
+        power += weights @ block
+    return power, totals
 
 
 def as_slice(pixels: Indices) -> slice | Indices:

@@ -131,7 +131,7 @@ class Subject:
         return replace(cached, lights=record.lights)
 
     def _obtain_at(self, spp: int, progress: Progress) -> Basis:
-        from lightpaint.basis.render.cached_render import obtain_basis
+        from lightpaint.basis.cache.cached_render import obtain_basis
 
         scene = self.loaded_scene
         basis = obtain_basis(

@@ -106,7 +106,7 @@ def _scene_on_film(
     """Return a scene on the film of its basis, or one that is loaded when it is needed."""
 
     def check(scene: Scene) -> None:
-        from lightpaint.basis.render.basis_render import basis_lights
+        from lightpaint.basis.render.render_origin import basis_lights
 
         _check_constraints(basis_lights(scene), constraints)
 

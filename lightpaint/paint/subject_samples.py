@@ -23,8 +23,8 @@ def add_round(
     of the round; asked between passes.
     """
     # Imported here: saved bases need no renderer.
-    from lightpaint.basis.render.basis_render import ONE_PASS
-    from lightpaint.basis.render.cached_render import top_up_basis
+    from lightpaint.basis.cache.cached_render import top_up_basis
+    from lightpaint.basis.render.render_origin import ONE_PASS
     from lightpaint.pipeline.needed_samples import Certainty, needed_counts
 
     settings, bases = snapshot.settings, list(snapshot.bases)

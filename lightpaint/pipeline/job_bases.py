@@ -6,9 +6,10 @@ from dataclasses import replace
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cache_folder import folder
+from lightpaint.basis.cache.cached_render import Render, obtain_basis
 from lightpaint.basis.cache.denoised_planes import MAX_PIXELS, obtain_denoised_planes
-from lightpaint.basis.render.basis_render import render_basis, samples_for
-from lightpaint.basis.render.cached_render import Render, obtain_basis
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_origin import samples_for
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.progress import Listener, Progress, labelled, listener

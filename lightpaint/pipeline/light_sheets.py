@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from lightpaint.basis.cache import cache
-from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.errors import OutputError
 from lightpaint.files import check_files, check_writable, write_bytes

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any, overload
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.cached_render import check_same_view
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.render.cached_render import check_same_view
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import SceneError, TargetError
 from lightpaint.keywords import keywords

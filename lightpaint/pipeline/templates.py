@@ -8,8 +8,9 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis, meter_exposure
 from lightpaint.basis.cache import cache
 from lightpaint.basis.denoised_mixes import denoise_plane, denoise_present_look
-from lightpaint.basis.render.basis_render import is_of, render_basis
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.render.render_origin import is_of
 from lightpaint.basis.render.separate_renders import emitters_seen
 from lightpaint.colour.display.exposure import choose_exposure
 from lightpaint.colour.display.view_transform import ViewTransform

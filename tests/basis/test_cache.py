@@ -18,11 +18,12 @@ from renderer import LIGHTS, assert_equal_bits, same_basis, write_room
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache, cache_folder
 from lightpaint.basis.cache.cache_folder import SUFFIX, SUMS_SUFFIX, TAG
+from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
-from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
-from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_origin import is_on_the_way
 from lightpaint.errors import LightpaintError, OutputError, SceneError
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain
@@ -184,7 +185,7 @@ def _killed(scene: Scene, spp: int, after: int) -> None:
     code = f"""
 import os, signal, sys
 import lightpaint as lp, lightpaint.scene.scene_render
-from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.cache.cached_render import obtain_basis
 sys.modules["lightpaint.basis.render.render_budget"].KEEP_EVERY_S = 0
 lightpaint.scene.scene_render.SAMPLES_PER_PASS = {4 * 4 * 24 * 20}
 def kill(label, done, total):

@@ -13,9 +13,9 @@ from nightly import at_night
 from renderer import CORNELL, LIGHTS, PATH, assert_equal_bits, write_room
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file.basis_file import read_basis
-from lightpaint.basis.render.basis_render import ONE_PASS, SEPARATE
-from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.render.render_origin import ONE_PASS, SEPARATE
 from lightpaint.scene.scene_reader import load_scene
 
 SEPARATELY = '<integrator type="volpathmis"><integer name="max_depth" value="5"/></integrator>'
@@ -252,7 +252,7 @@ def test_killed_at_any_moment_leaves_a_readable_basis(
     """However far the writing of a part has come."""
     code = f"""
 import lightpaint.scene.scene_render, lightpaint as lp, sys
-from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.cache.cached_render import obtain_basis
 sys.modules["lightpaint.basis.render.render_budget"].KEEP_EVERY_S = 0
 lightpaint.scene.scene_render.SAMPLES_PER_PASS = 2**17
 scene = lp.load_scene({str(CORNELL)!r})

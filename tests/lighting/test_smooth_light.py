@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightpaint.basis.basis import Basis, IndirectLight, Origin
+from lightpaint.basis.basis import Basis, IndirectLight
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.origin import Origin
 from lightpaint.basis.planes import as_planes
 from lightpaint.images.denoiser import Features
 from lightpaint.lighting.analysis.noise import smooth_light

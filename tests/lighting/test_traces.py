@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from light_groups import pictures
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.origin import Origin
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.round_off import remove_traces
 from lightpaint.lighting.solve import solve

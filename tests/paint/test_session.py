@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.basis.basis import Origin
 from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.origin import Origin
 from lightpaint.cli.commands.session_options import options_of
 from lightpaint.colour.color import LUMINANCE, kelvin_to_rgb
 from lightpaint.lighting.constraints.constraints import Constraints

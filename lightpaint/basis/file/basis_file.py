@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpaint.basis.basis import Basis, IndirectLight, Origin
+from lightpaint.basis.basis import Basis, IndirectLight
 from lightpaint.basis.file.checksums import CHECKSUMS_KEY, Checksums, check, checksum
 from lightpaint.basis.file.file_parts import (
     INDIRECT_CHANNELS,
@@ -36,6 +36,7 @@ from lightpaint.basis.file.file_parts import (
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes, PlaneEncoding, encoded_plane
 from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis.origin import Origin
 from lightpaint.basis.planes import Planes, as_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.file_reading import file_length

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Floats, Indices
-from lightpaint.basis.basis import Basis, free_name
+from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.checksums import Checksums, checksum
 from lightpaint.basis.file.half_floats import (
     EncodedPlane,
@@ -16,7 +16,7 @@ from lightpaint.basis.file.half_floats import (
     PlaneEncoding,
     encode_pair,
 )
-from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.lights import BasisLight, free_name
 from lightpaint.basis.planes import Planes
 from lightpaint.errors import BasisError
 from lightpaint.files import one_line

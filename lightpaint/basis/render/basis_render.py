@@ -1,24 +1,27 @@
 """Rendering the basis: all lights in one pass where that is possible, else one by one."""
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
-from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis, IndirectLight, Origin
-from lightpaint.basis.lights import BasisLight, Lights
-from lightpaint.basis.planes import Planes, as_planes
-from lightpaint.basis.render.banded_film import BAND_BYTES, BandedFilm, WholeFilm, is_banded
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import as_planes
+from lightpaint.basis.render.banded_film import BandedFilm, WholeFilm
 from lightpaint.basis.render.guide_training import train
-from lightpaint.basis.render.half_sums import HalfCounts, add_halves, mean_and_half_difference
-from lightpaint.basis.render.integrators import has_indirect_planes, plane_count, why_not_one_pass
-from lightpaint.basis.render.render_budget import Budget, Keeper, half_of, steps
+from lightpaint.basis.render.one_pass_basis import basis_of_planes, basis_of_sums
+from lightpaint.basis.render.render_budget import Budget, Keeper, steps
+from lightpaint.basis.render.render_memory import check_memory, renders_in_bands
+from lightpaint.basis.render.render_origin import (
+    ONE_PASS,
+    SEPARATE,
+    basis_lights,
+    is_of,
+    method_of,
+    origin_of,
+)
 from lightpaint.basis.render.separate_renders import (
     LightSums,
     emitters_seen,
-    plan_of_light,
     render_separately,
 )
 from lightpaint.errors import BasisError, SceneError
@@ -27,15 +30,8 @@ from lightpaint.progress import Interrupted, Progress, silent
 from lightpaint.scene.runtime.mitsuba_errors import render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import SAMPLES_PER_PASS, view_seed
+from lightpaint.scene.scene_render import view_seed
 from lightpaint.scene.surfaces import render_first_hits
-
-ONE_PASS = "one pass, several questions"
-SEPARATE = "separate renders"
-
-#: Passes of a one-pass basis, whose samples do not depend on them: whether it has all that were
-#: asked for, or an interrupt ended it.
-FINISHED, UNFINISHED = (1, 1), (0, 0)
 
 
 @keywords()
@@ -123,229 +119,6 @@ def with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
     return replace(basis, features=features, objects=objects)
 
 
-def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:
-    """Return whether `render_basis` keeps the sums of a film in a file, of which memory has a band.
-
-    start: what it goes on from. Without its exact sums that takes whole planes.
-    """
-    can_be_read = start is None or start.sums is not None
-    return can_be_read and method_of(scene) == ONE_PASS and is_banded(scene)
-
-
-def memory_needed(scene: Scene, *, in_bands: bool = False) -> int:
-    """Return the peak memory of rendering a basis, in bytes, for any number of samples.
-
-    in_bands: as `renders_in_bands` says.
-    """
-    height, width = scene.size
-    images = len(scene.lights) * height * width * 3 * 4
-    if in_bands:
-        # Half floats of images and half differences, and of indirect light; the rest is of a band.
-        return images * plane_count(scene) // len(scene.lights) + 6 * BAND_BYTES
-    # Sums of two halves, the images and half differences made of them, and a copy of both
-    # where they are written to a file; passes are small beside that.
-    sets = 12 if has_indirect_planes(scene) else 6
-    return sets * images + 512 * SAMPLES_PER_PASS
-
-
-def check_memory(scene: Scene, *, in_bands: bool = False) -> None:
-    """Raise SceneError if a basis of `scene` would not fit, instead of being killed for it."""
-    needed, free = memory_needed(scene, in_bands=in_bands), _free_memory()
-    if free is not None and needed > free:
-        height, width = scene.size
-        raise SceneError(
-            f"{len(scene.lights)} lights at {width}x{height} need {needed / 1e9:.1f} GB, and "
-            f"{free / 1e9:.1f} GB are free: use resolution=... or fewer lights"
-        )
-
-
-def _free_memory() -> int | None:
-    """Return the bytes available without swapping, if the system tells (Linux)."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as lines:
-            found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
-    except OSError:
-        return None
-    return int(found[0]) * 1024 if found else None
-
-
-def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
-    """Return True if `basis` was made of `scene` as it is, with its sensor, film and `seed`."""
-    of = basis.origin
-    mine = replace(
-        origin_of(scene, seed, of.method, of.halves, of.passes),
-        each_light=of.each_light,
-        is_composed=of.is_composed,
-        extra_spp=of.extra_spp,
-    )
-    return of == mine and basis.size == scene.size
-
-
-def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
-    """Return True if a render from nothing to `spp` samples comes by just those of `basis`.
-
-    With fewer samples it needs its exact sums: without, it was rounded. And those of separate
-    renders must not end elsewhere than passes do. spp: the scene's own number if None.
-    """
-    origin = basis.origin
-    if origin.is_composed or origin.extra_spp or origin.method != method_of(scene):
-        return False
-    wanted = samples_for(scene, spp)
-    if origin.spp < wanted and basis.sums is None:
-        return False
-    if origin.method == ONE_PASS:
-        return origin.spp <= wanted
-    plan = plan_of_light(scene, scene.spp if spp is None else spp)
-    sizes = [[size for half, size in plan if half == h] for h in range(2)]
-    return all(
-        count <= len(its) and sum(its[:count]) == done
-        for a, b, first, second in origin.each_light or ((*origin.halves, *origin.passes),)
-        for its, done, count in zip(sizes, (a, b), (first, second), strict=True)
-    )
-
-
-def samples_for(scene: Scene, spp: int | None) -> int:
-    """Return the samples per pixel that a basis gets if `spp` are requested.
-
-    One more where that makes the halves equal, and some where a pixel is a block of pixels that
-    ordinary renders take one sample of each in.
-    """
-    spp = scene.spp if spp is None else spp
-    if method_of(scene) == ONE_PASS:
-        return 2 * half_of(spp)
-    return sum(size for _, size in plan_of_light(scene, spp))
-
-
-def method_of(scene: Scene) -> str:
-    """Return how a basis of `scene` is rendered: `ONE_PASS` or `SEPARATE`."""
-    return ONE_PASS if why_not_one_pass(scene) is None else SEPARATE
-
-
-def origin_of(
-    scene: Scene, seed: int, method: str, halves: tuple[int, int], passes: tuple[int, int]
-) -> Origin:
-    """Return the origin of a basis of `scene`."""
-    return Origin(
-        scene=scene.path.name,
-        scene_identity=scene.identity,
-        sensor=scene.sensor_names[scene.sensor],
-        seed=seed,
-        method=method,
-        halves=halves,
-        passes=passes,
-        integrator="" if scene.instead is None else str(scene.instead),
-    )
-
-
-def basis_lights(scene: Scene) -> Lights:
-    """Return what a basis says of the lights of `scene`, and what its lights file asks of them."""
-    lights = tuple(
-        BasisLight(
-            x.name,
-            x.plugin,
-            x.parameter,
-            x.unit,
-            x.emission,
-            x.form,
-            x.is_scalar,
-            x.is_fixed,
-            x.member_names,
-            x.unit_flux,
-            identity,
-        )
-        for x, identity in zip(scene.lights, scene.light_identities, strict=True)
-    )
-    return Lights(lights, scene.requests)
-
-
-def basis_of_sums(
-    scene: Scene,
-    seed: int,
-    halves: Sequence[Floats],
-    seen: Bools,
-    half_spp: int,
-    guide_table: Floats | None,
-    *,
-    start: Basis | None,
-    is_finished: bool = True,
-) -> Basis:
-    """Return the one-pass basis of what was rendered, and of `start`.
-
-    halves: undivided sums of two halves of the samples, (n or 2n, h, w, 3), as `LightPlanes.sums`
-    returns them; they are overwritten. seen: (h, w). half_spp: samples per pixel of each half in
-    all. start: what these sums do not include. is_finished: whether there are as many as were asked
-    for; if not, the basis has a copy of its sums.
-    """
-    n, spp = len(scene.lights), half_counts(half_spp, start)
-    keeps_sums = not is_finished and start is None
-    kept = (halves[0].copy(), halves[1].copy()) if keeps_sums else None
-    totals, indirect = [half[:n] for half in halves], [half[n:] for half in halves]
-    for total, part in zip(totals, indirect, strict=True):
-        total[: len(part)] += part
-    is_split = len(indirect[0]) == n and (start is None or start.indirect is not None)
-    if start is not None:
-        begun = half_counts(start.origin.halves[0], start)
-        add_halves(totals, start.planes, start.noise, begun)
-        seen = seen | start.emitters_seen
-        if is_split and start.indirect is not None:
-            add_halves(indirect, start.indirect.planes, start.indirect.noise, begun)
-    pairs = [mean_and_half_difference(totals, spp)]
-    if is_split:
-        pairs.append(mean_and_half_difference(indirect, spp))
-    return _one_pass_basis(
-        [(as_planes(mean), as_planes(half)) for mean, half in pairs],
-        scene,
-        seed,
-        seen,
-        half_spp,
-        guide_table,
-        start=start,
-        is_finished=is_finished,
-        sums=kept,
-    )
-
-
-def _one_pass_basis(
-    pairs: Sequence[tuple[Planes, Planes]],
-    scene: Scene,
-    seed: int,
-    seen: Bools,
-    half_spp: int,
-    guide_table: Floats | None,
-    *,
-    start: Basis | None = None,
-    is_finished: bool,
-    sums: tuple[Floats, Floats] | None,
-) -> Basis:
-    """Return the one-pass basis of images and half differences: of all light, and of indirect
-    light where it is apart. For the others see `basis_of_sums`.
-    """
-    (images, noise), *indirect = pairs
-    origin = origin_of(
-        scene, seed, ONE_PASS, (half_spp, half_spp), FINISHED if is_finished else UNFINISHED
-    )
-    return Basis(
-        basis_lights(scene),
-        images,
-        noise,
-        seen,
-        origin if start is None else replace(origin, extra_spp=start.origin.extra_spp),
-        guide_table,
-        indirect=IndirectLight(*indirect[0]) if indirect else None,
-        extra=None if start is None else start.extra,
-        source=str(scene.path),
-        sums=sums,
-    )
-
-
-def half_counts(spp: int, basis: Basis | None) -> HalfCounts:
-    """Return the samples of both halves: `spp` of each, and the extra ones of a basis."""
-    if basis is None or basis.extra is None:
-        return spp, spp
-    its = (spp + basis.extra[..., None]).astype(np.float32)
-    return its, its
-
-
 @MITSUBA.taken()
 def _render_together(
     scene: Scene,
@@ -376,7 +149,7 @@ def _render_together(
         if isinstance(film, BandedFilm):
             sums = None if is_finished else (film.sums.array[0], film.sums.array[1])
             pairs = film.planes(done)
-            return _one_pass_basis(pairs, *of_render, is_finished=is_finished, sums=sums)
+            return basis_of_planes(pairs, *of_render, is_finished=is_finished, sums=sums)
         halves = film.sums(is_last=is_last)
         return basis_of_sums(
             scene, seed, halves, seen, done, tracer.guide_table, start=rest, is_finished=is_finished

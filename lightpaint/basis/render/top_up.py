@@ -15,11 +15,11 @@ import numpy as np
 from lightpaint.arrays import Floats, Indices
 from lightpaint.basis.basis import Basis, IndirectLight
 from lightpaint.basis.planes import Planes, as_planes
-from lightpaint.basis.render.basis_render import ONE_PASS, is_of
 from lightpaint.basis.render.guide_training import train
 from lightpaint.basis.render.half_sums import add_halves, mean_and_half_difference
 from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
 from lightpaint.basis.render.render_budget import PASS_DIVISOR
+from lightpaint.basis.render.render_origin import ONE_PASS, is_of
 from lightpaint.basis.render.render_parts import PART_MAX_BYTES
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted, Progress, silent

@@ -5,14 +5,10 @@ from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.render.basis_render import (
-    ONE_PASS,
-    check_memory,
-    method_of,
-    render_basis,
-    with_first_hits,
-)
+from lightpaint.basis.render.basis_render import render_basis, with_first_hits
 from lightpaint.basis.render.guide_training import TRAINING_SAMPLES
+from lightpaint.basis.render.render_memory import check_memory
+from lightpaint.basis.render.render_origin import ONE_PASS, method_of
 from lightpaint.basis.render.render_parts import Part, PartSums, plan_parts
 from lightpaint.batch.distribution.engine import Engine
 from lightpaint.batch.work.render_cost import render_seconds

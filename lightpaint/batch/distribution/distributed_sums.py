@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from lightpaint.basis.render.basis_render import basis_lights
+from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.basis.render.render_parts import plan_parts
 from lightpaint.batch.distribution.basis_parts import obtain_guide_table
 from lightpaint.batch.distribution.engine import Engine

@@ -7,7 +7,7 @@ from typing import Any
 
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lights import BasisLight
-from lightpaint.basis.render.basis_render import basis_lights
+from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.work.worker_cache import WorkerCache

@@ -7,8 +7,8 @@ from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.render.basis_render import memory_needed
 from lightpaint.basis.render.integrators import why_not_one_pass
+from lightpaint.basis.render.render_memory import memory_needed
 from lightpaint.batch.manifest.entries import LookEntry
 from lightpaint.batch.manifest.folder_names import check_gallery
 from lightpaint.batch.manifest.keys import Mistakes

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import Lights
-from lightpaint.basis.render.basis_render import basis_of_sums
+from lightpaint.basis.render.one_pass_basis import basis_of_sums
 from lightpaint.batch.work.work_items import SumsOfRows
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.lighting.answer.lighting import Lighting

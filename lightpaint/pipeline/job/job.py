@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.cached_render import check_same_view
 from lightpaint.basis.lightgroups.light_groups import LightGroups
-from lightpaint.basis.render.basis_render import basis_lights
-from lightpaint.basis.render.cached_render import check_same_view
+from lightpaint.basis.render.render_origin import basis_lights
 from lightpaint.errors import BasisError, ConstraintError, LightpaintError, TargetError
 from lightpaint.files import check_writable
 from lightpaint.images.pixel_blocks import whole_factor

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightpaint.basis.basis import Basis, Origin
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.origin import Origin
 from lightpaint.errors import ImageError, OutputError, SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.bands import in_turns

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from lightpaint.arrays import Floats
-from lightpaint.basis.basis import free_name
 from lightpaint.basis.lightgroups.light_groups import LightGroups
 from lightpaint.basis.lightgroups.render_layers import RenderLayer
+from lightpaint.basis.lights import free_name
 from lightpaint.colour.primaries import to_rec709
 from lightpaint.files import one_line
 from lightpaint.images.formats.exr import ExrPart, rgb_channels

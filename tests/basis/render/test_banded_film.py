@@ -12,12 +12,13 @@ from renderer import assert_equal_bits
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
+from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.half_floats import EncodedPlanes
 from lightpaint.basis.render import banded_film, guide_training
 from lightpaint.basis.render.banded_film import FileSums, SumPlanes
-from lightpaint.basis.render.basis_render import memory_needed, render_basis, renders_in_bands
-from lightpaint.basis.render.cached_render import obtain_basis
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_memory import memory_needed, renders_in_bands
 from lightpaint.errors import SceneError
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene

@@ -96,7 +96,7 @@ def test_what_went_on_from_a_basis_without_it_does_not(
 
 def test_planes_of_several_bases_bring_it_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A scene that gained a light: its own plane is rendered, the others come from the cache."""
-    from lightpaint.basis.render.cached_render import obtain_basis
+    from lightpaint.basis.cache.cached_render import obtain_basis
 
     monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
     scene = load_scene(write_room(tmp_path))

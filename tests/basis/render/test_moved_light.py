@@ -13,12 +13,12 @@ from renderer import LIGHTS, render_in_parts, same_basis, write_room
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
+from lightpaint.basis.cache import cached_render as obtain_module
+from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file import basis_file
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.file.file_planes import FilePlanes
-from lightpaint.basis.render import cached_render as obtain_module
 from lightpaint.basis.render.basis_render import render_basis
-from lightpaint.basis.render.cached_render import obtain_basis
 from lightpaint.basis.render.render_budget import Budget, steps
 from lightpaint.batch.distribution.basis_parts import PartwiseRender
 from lightpaint.batch.work.work import run_item

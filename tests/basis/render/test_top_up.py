@@ -13,10 +13,11 @@ from renderer import SAME_SAMPLES, render_in_parts, same_basis, write_room
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
+from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
 from lightpaint.basis.file.basis_file import read_basis, write_basis
 from lightpaint.basis.render import guide_training, top_up
-from lightpaint.basis.render.basis_render import is_on_the_way, render_basis
-from lightpaint.basis.render.cached_render import obtain_basis, top_up_basis
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_origin import is_on_the_way
 from lightpaint.errors import BasisError
 from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene

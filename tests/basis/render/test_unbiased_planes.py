@@ -11,7 +11,8 @@ from scipy import stats
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render import guide_training
-from lightpaint.basis.render.basis_render import ONE_PASS, render_basis
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_origin import ONE_PASS
 from lightpaint.basis.render.separate_renders import BLACK, WHITE
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb

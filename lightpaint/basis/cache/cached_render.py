@@ -8,21 +8,21 @@ from typing import Any
 from lightpaint.arrays import Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
-from lightpaint.basis.file.basis_file import as_stored, is_large
-from lightpaint.basis.render.basis_render import (
-    ONE_PASS,
-    basis_lights,
-    is_of,
-    is_on_the_way,
-    method_of,
-    render_basis,
-)
-from lightpaint.basis.render.plane_reuse import (
+from lightpaint.basis.cache.plane_reuse import (
     counts_of,
     gather_planes,
     least_sampled_lights,
     merge,
     restrict,
+)
+from lightpaint.basis.file.basis_file import as_stored, is_large
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.basis.render.render_origin import (
+    ONE_PASS,
+    basis_lights,
+    is_of,
+    is_on_the_way,
+    method_of,
 )
 from lightpaint.basis.render.top_up import top_up
 from lightpaint.errors import BasisError, SceneError

@@ -1,0 +1,107 @@
+"""The basis that the sums of a one-pass render make."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Floats
+from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.basis.render.half_sums import HalfCounts, add_halves, mean_and_half_difference
+from lightpaint.basis.render.render_origin import (
+    FINISHED,
+    ONE_PASS,
+    UNFINISHED,
+    basis_lights,
+    origin_of,
+)
+from lightpaint.scene.scene import Scene
+
+
+def basis_of_sums(
+    scene: Scene,
+    seed: int,
+    halves: Sequence[Floats],
+    seen: Bools,
+    half_spp: int,
+    guide_table: Floats | None,
+    *,
+    start: Basis | None,
+    is_finished: bool = True,
+) -> Basis:
+    """Return the one-pass basis of what was rendered, and of `start`.
+
+    halves: undivided sums of two halves of the samples, (n or 2n, h, w, 3), as `LightPlanes.sums`
+    returns them; they are overwritten. seen: (h, w). half_spp: samples per pixel of each half in
+    all. start: what these sums do not include. is_finished: whether there are as many as were asked
+    for; if not, the basis has a copy of its sums.
+    """
+    n, spp = len(scene.lights), half_counts(half_spp, start)
+    keeps_sums = not is_finished and start is None
+    kept = (halves[0].copy(), halves[1].copy()) if keeps_sums else None
+    totals, indirect = [half[:n] for half in halves], [half[n:] for half in halves]
+    for total, part in zip(totals, indirect, strict=True):
+        total[: len(part)] += part
+    is_split = len(indirect[0]) == n and (start is None or start.indirect is not None)
+    if start is not None:
+        begun = half_counts(start.origin.halves[0], start)
+        add_halves(totals, start.planes, start.noise, begun)
+        seen = seen | start.emitters_seen
+        if is_split and start.indirect is not None:
+            add_halves(indirect, start.indirect.planes, start.indirect.noise, begun)
+    pairs = [mean_and_half_difference(totals, spp)]
+    if is_split:
+        pairs.append(mean_and_half_difference(indirect, spp))
+    return basis_of_planes(
+        [(as_planes(mean), as_planes(half)) for mean, half in pairs],
+        scene,
+        seed,
+        seen,
+        half_spp,
+        guide_table,
+        start=start,
+        is_finished=is_finished,
+        sums=kept,
+    )
+
+
+def basis_of_planes(
+    pairs: Sequence[tuple[Planes, Planes]],
+    scene: Scene,
+    seed: int,
+    seen: Bools,
+    half_spp: int,
+    guide_table: Floats | None,
+    *,
+    start: Basis | None = None,
+    is_finished: bool,
+    sums: tuple[Floats, Floats] | None,
+) -> Basis:
+    """Return the one-pass basis of images and half differences: of all light, and of indirect
+    light where it is apart. For the others see `basis_of_sums`.
+    """
+    (images, noise), *indirect = pairs
+    origin = origin_of(
+        scene, seed, ONE_PASS, (half_spp, half_spp), FINISHED if is_finished else UNFINISHED
+    )
+    return Basis(
+        basis_lights(scene),
+        images,
+        noise,
+        seen,
+        origin if start is None else replace(origin, extra_spp=start.origin.extra_spp),
+        guide_table,
+        indirect=IndirectLight(*indirect[0]) if indirect else None,
+        extra=None if start is None else start.extra,
+        source=str(scene.path),
+        sums=sums,
+    )
+
+
+def half_counts(spp: int, basis: Basis | None) -> HalfCounts:
+    """Return the samples of both halves: `spp` of each, and the extra ones of a basis."""
+    if basis is None or basis.extra is None:
+        return spp, spp
+    its = (spp + basis.extra[..., None]).astype(np.float32)
+    return its, its

@@ -1,0 +1,55 @@
+"""The memory that a render of a basis needs, and whether it is there."""
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.banded_film import BAND_BYTES, is_banded
+from lightpaint.basis.render.integrators import has_indirect_planes, plane_count
+from lightpaint.basis.render.render_origin import ONE_PASS, method_of
+from lightpaint.errors import SceneError
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import SAMPLES_PER_PASS
+
+
+def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:
+    """Return whether `render_basis` keeps the sums of a film in a file, of which memory has a band.
+
+    start: what it goes on from. Without its exact sums that takes whole planes.
+    """
+    can_be_read = start is None or start.sums is not None
+    return can_be_read and method_of(scene) == ONE_PASS and is_banded(scene)
+
+
+def memory_needed(scene: Scene, *, in_bands: bool = False) -> int:
+    """Return the peak memory of rendering a basis, in bytes, for any number of samples.
+
+    in_bands: as `renders_in_bands` says.
+    """
+    height, width = scene.size
+    images = len(scene.lights) * height * width * 3 * 4
+    if in_bands:
+        # Half floats of images and half differences, and of indirect light; the rest is of a band.
+        return images * plane_count(scene) // len(scene.lights) + 6 * BAND_BYTES
+    # Sums of two halves, the images and half differences made of them, and a copy of both
+    # where they are written to a file; passes are small beside that.
+    sets = 12 if has_indirect_planes(scene) else 6
+    return sets * images + 512 * SAMPLES_PER_PASS
+
+
+def check_memory(scene: Scene, *, in_bands: bool = False) -> None:
+    """Raise SceneError if a basis of `scene` would not fit, instead of being killed for it."""
+    needed, free = memory_needed(scene, in_bands=in_bands), _free_memory()
+    if free is not None and needed > free:
+        height, width = scene.size
+        raise SceneError(
+            f"{len(scene.lights)} lights at {width}x{height} need {needed / 1e9:.1f} GB, and "
+            f"{free / 1e9:.1f} GB are free: use resolution=... or fewer lights"
+        )
+
+
+def _free_memory() -> int | None:
+    """Return the bytes available without swapping, if the system tells (Linux)."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:
+            found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    except OSError:
+        return None
+    return int(found[0]) * 1024 if found else None
