@@ -51,7 +51,7 @@ from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.launch import low_latency
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
 

@@ -29,7 +29,7 @@ from lightpaint.paint.protocol import Ask, Export, Message, Paint
 from lightpaint.paint.session_file import session_identity
 from lightpaint.paint.store.steps import ViewIdentity
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject_factory import make_subjects
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile

@@ -16,7 +16,7 @@ from lightpaint.paint.server.server import Server, check_installed
 from lightpaint.paint.session_file import SessionFile
 from lightpaint.paint.store.database import set_aside
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.signals import interruptible_between_pieces
 

@@ -11,7 +11,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.images.denoiser import denoised
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.paint.session_exports import answer_png, render_verification
+from lightpaint.paint.studio.session_exports import answer_png, render_verification
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile

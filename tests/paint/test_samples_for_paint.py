@@ -14,9 +14,9 @@ from lightpaint.basis.render import guide_training
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import LatestWork
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.background_sampling import add_round
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
-from lightpaint.paint.subject_samples import add_round
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.needed_samples import Certainty
 from lightpaint.scene.scene_reader import load_scene

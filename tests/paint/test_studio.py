@@ -23,14 +23,15 @@ from lightpaint.basis.cache.denoised_planes import (
 )
 from lightpaint.cli.commands.session_options import solve_command
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.paint import plane_denoiser, protocol, session_exports, studio, subject
+from lightpaint.paint import protocol, subject
 from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store import store
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio import plane_denoiser, session_exports, studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 
 SIZE = (18, 32)

@@ -24,13 +24,14 @@ from renderer import LIGHTS, REPOSITORY, write_room
 
 import lightpaint as lp
 from lightpaint.errors import ConstraintError, OutputError, PaintError
-from lightpaint.paint import background_threads, protocol, studio
+from lightpaint.paint import background_threads, protocol
 from lightpaint.paint.notebook import widget_arguments, widget_files
 from lightpaint.paint.store import store
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio import studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings, SettingsByName
 from lightpaint.viewer.bundle import BundleError, bundled, source

@@ -32,7 +32,7 @@ from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionStat
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.pipeline.job.settings import SettingsByName
 from lightpaint.target.painting_file import write_painting
 from lightpaint.target.target import Target

@@ -8,7 +8,7 @@ from lightpaint.paint.background_threads import error_text, error_tone
 from lightpaint.paint.frames import is_other_version, parse_request
 from lightpaint.paint.protocol import Closing, Failure, Hello, Message, TakeOver
 from lightpaint.paint.session_owner import SessionOwner
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.studio import Studio
 
 #: Message to a view that does not have the session, or has lost it.
 TAKEN = Closing(reason="taken", text="the painter is open at another place")

@@ -24,7 +24,7 @@ import lightpaint as lp
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 
 PAINTER = "document.getElementById('lightpaint').painter"

@@ -14,7 +14,7 @@ from foreign_server import Neighbour
 
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import MemoryStore
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 
 NO_KEY_TEXT = (

@@ -26,7 +26,7 @@ from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.steps import name_in_view
 from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio import Studio
+from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.paint.subject_factory import make_subject
 from lightpaint.pipeline.job.sources import BasisFile
@@ -692,7 +692,7 @@ def test_what_comes_at_rest_is_drawn_sharply_at_once(served: Served, opened: Any
         "const draw = screen.view.draw.bind(screen.view); window.drawn = [];"
         "screen.view.draw = (params) => { window.drawn.push(params.live); draw(params); }"
     )
-    served.studio._solve_loop.notify()
+    served.studio._exact_answers.notify()
     until(lambda: me.page.evaluate("() => window.drawn.length"), "nothing is drawn")
     me.still("brush")
     assert not any(me.page.evaluate("() => window.drawn"))

@@ -159,7 +159,7 @@ class BackgroundJobs:
         stop_count: how often exports had been stopped when this one was requested.
         """
         # Imported here: it loads all rooms, and painting needs only a few.
-        from lightpaint.paint.session_exports import NEEDS_PAINTING, export
+        from lightpaint.paint.studio.session_exports import NEEDS_PAINTING, export
 
         def check() -> None:
             if self._stop_count != stop_count:
@@ -214,7 +214,7 @@ class BackgroundJobs:
 
     def _render_and_compare(self, view: int, check: Callable[[], None]) -> None:
         """Render the answer in a view and compare. check: raises StoppedError after a stop."""
-        from lightpaint.paint.session_exports import render_verification
+        from lightpaint.paint.studio.session_exports import render_verification
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
             check()

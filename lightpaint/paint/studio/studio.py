@@ -16,23 +16,16 @@ from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes
 from lightpaint.errors import PaintError
-from lightpaint.lighting.analysis.analysis import analyse
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
-from lightpaint.paint.background_jobs import BackgroundJobs
 from lightpaint.paint.background_threads import (
     BackgroundThreads,
-    ExactSolveLoop,
-    LatestWork,
     StoppedError,
     UnsavedRetry,
     error_text,
     lower_priority,
 )
-from lightpaint.paint.plane_denoiser import PlaneDenoiser
 from lightpaint.paint.protocol import (
-    AnswerUpdate,
     Message,
     Notice,
     PictureData,
@@ -42,7 +35,6 @@ from lightpaint.paint.protocol import (
     SessionState,
     Tone,
 )
-from lightpaint.paint.session.answer_messages import judge
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
@@ -53,19 +45,13 @@ from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
+from lightpaint.paint.studio.background_jobs import BackgroundJobs
+from lightpaint.paint.studio.background_sampling import BackgroundSampling
+from lightpaint.paint.studio.exact_answers import ExactAnswers, OutdatedError, raise_outdated
+from lightpaint.paint.studio.plane_denoiser import PlaneDenoiser
 from lightpaint.paint.subject import Subject, obtain_bases, painting_transform
-from lightpaint.paint.subject_samples import add_round
 from lightpaint.progress import cancellable
 from lightpaint.scene.runtime.render_lock import MITSUBA
-
-
-class OutdatedError(Exception):
-    """Signal that ends work whose result is outdated: the user has painted on, or left."""
-
-
-def _raise_outdated() -> None:
-    """Raise OutdatedError, to end work whose result is outdated."""
-    raise OutdatedError
 
 
 class Studio:
@@ -93,17 +79,16 @@ class Studio:
         self.pictures = PictureTable()
         self._session: Session | None = None
         self._looks: LookLibrary | None = None
-        self._last_exact: AnswerUpdate | None = None  # the last exact answer, as it was sent
         self._progress: ProgressReport | None = None  # of the first picture
-        self._lock, self._is_open, self._failed = RLock(), True, ""
+        self._lock, self.is_open, self._failed = RLock(), True, ""
         self._publish_lock = RLock()  # taken before `_lock`, to send messages in order
         self._denoiser = PlaneDenoiser(
             self.publish_picture,
-            lambda: self._is_open,
+            lambda: self.is_open,
             use_cache=self.subjects[0].settings.use_cache,
         )
-        self._solve_loop = ExactSolveLoop(self._solve_exactly, self.publish)
-        self._sampling = LatestWork(self._add_samples, self.publish)
+        self._sampling = BackgroundSampling(self)
+        self._exact_answers = ExactAnswers(self, self._sampling.give)
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
         self._threads = BackgroundThreads(self.publish)
         self._jobs = BackgroundJobs(self, self._threads)
@@ -133,19 +118,19 @@ class Studio:
     def start(self) -> None:
         """Start to obtain the bases."""
         self._threads.start(self._obtain_bases, "obtain")
-        self._threads.start(self._solve_loop.run, "settle")
+        self._threads.start(self._exact_answers.run, "settle")
         self._threads.start(self._write_retry.run, "write")
 
     def close(self) -> None:
         """End the session; all work is kept, even a stroke whose end never arrived."""
-        self._is_open = False
-        self._solve_loop.stop()
+        self.is_open = False
+        self._exact_answers.stop()
         self._sampling.stop()
         self._write_retry.stop()
         with self._lock:
             if self._session is not None:
                 # Everything is kept before any solve, and no answer is needed any more.
-                with suppress(OutdatedError), cancellable(_raise_outdated):
+                with suppress(OutdatedError), cancellable(raise_outdated):
                     self._session.client_left(with_stroke=True)
                 self._session.store.close()
 
@@ -172,9 +157,7 @@ class Studio:
             }
             if session is None:
                 return SessionPending(**fields, text=self._failed, progress=self._progress)
-            findings, exact = session.findings, self._last_exact
-            if exact is not None and exact.version == session.version:
-                findings = exact.findings
+            findings = self._exact_answers.findings_of(session)
             fields |= {"answer": findings, "weights": session.weights}
             return SessionState(**fields, **self._state_fields(session), **session.edit_state)
 
@@ -186,7 +169,7 @@ class Studio:
         with self._lock:
             if self._session is not None and self._session.is_open:
                 self._session.client_left(with_stroke=not is_back)
-                self._solve_loop.notify()
+                self._exact_answers.notify()
             state = self.state()
             return replace(state, is_back=is_back)
 
@@ -214,7 +197,7 @@ class Studio:
                     messages = looks.load(message)
                 case _:
                     messages = session.handle(message, arrays)
-        self._solve_loop.notify()
+        self._exact_answers.notify()
         return messages
 
     def snapshot(self) -> SessionSnapshot:
@@ -241,7 +224,7 @@ class Studio:
         """
         with self._lock:
             messages = self.session.load(paintings, requests, label)
-        self._solve_loop.notify()
+        self._exact_answers.notify()
         return messages
 
     def resource(self, name: str) -> npt.NDArray[Any]:
@@ -253,10 +236,10 @@ class Studio:
 
     def publish(self, message: Message | None) -> None:
         """Send a message to the page, if there is one."""
-        if message is not None and self.on_message is not None and self._is_open:
+        if message is not None and self.on_message is not None and self.is_open:
             self.on_message(message)
 
-    def _publish_made(self, make: Callable[[], Message | None]) -> None:
+    def publish_made(self, make: Callable[[], Message | None]) -> None:
         """Make a message under the lock and send it, in the order in which messages were made."""
         with self._publish_lock:
             with self._lock:
@@ -274,11 +257,11 @@ class Studio:
             self.pictures.put(name, picture)
             return PictureUpdate(resources={name: self.pictures.generations[name]})
 
-        self._publish_made(renewed)
+        self.publish_made(renewed)
 
     def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
         """Report how far a task is. Raises StoppedError once the studio is closed."""
-        if not self._is_open:
+        if not self.is_open:
             raise StoppedError
         report = ProgressReport(what=label, done=done, total=total, unit=unit)
         if self._session is None:
@@ -297,12 +280,11 @@ class Studio:
         try:
             with MITSUBA.low_priority():
                 for bases in obtain_bases(self.subjects, self.report_progress):
-                    self._use_bases(bases)
+                    self.use_bases(bases)
                     self._denoiser.denoise(self.session.views)
             self.publish(ProgressReport(what="basis", done=1, total=1, unit=""))
             self._denoiser.write_cache()
-            if self._adds_samples:
-                self._sampling.run()
+            self._sampling.run()
         except StoppedError:
             pass
         except Exception as error:
@@ -311,16 +293,16 @@ class Studio:
             self.publish(Notice(text=self._failed, tone="warn"))
             if self._session is None:
                 self.failure = error
-                self._publish_made(self.state)
-            if is_reported and self._is_open:
+                self.publish_made(self.state)
+            if is_reported and self.is_open:
                 self.on_failure(error)  # type: ignore[misc]
 
-    def _use_bases(self, bases: Sequence[Basis]) -> None:
+    def use_bases(self, bases: Sequence[Basis]) -> None:
         """Continue the session with these bases."""
         presents = self._denoiser.load_cached(bases)
         clean_planes = self._denoiser.planes_for(bases)
         with self._lock:
-            if not self._is_open:
+            if not self.is_open:
                 raise StoppedError
             if self._session is None:
                 self._session, self._looks = self._make_session(bases, presents)
@@ -330,8 +312,8 @@ class Studio:
             for view, clean in zip(session.views, clean_planes, strict=True):
                 offer_view(self.pictures, view, session.transform, clean)
             offer_transforms(self.pictures, offered_transforms(session))
-        self._publish_made(self.state)
-        self._solve_loop.notify()
+        self.publish_made(self.state)
+        self._exact_answers.notify()
 
     def _make_session(
         self, bases: Sequence[Basis], presents: Sequence[Floats]
@@ -368,52 +350,8 @@ class Studio:
             "command": self._jobs.solve_command(sensors, session.requests),
         }
 
-    def _solve_exactly(self) -> None:
-        """Publish the exact answer, then its analysis."""
+    def session_at_rest(self) -> tuple[Session, SessionSnapshot] | None:
+        """Return session and snapshot; None before there is a basis and while a stroke is open."""
         with self._lock:
             session = self._session
-            if session is None or session.is_open:
-                return
-            snapshot = session.snapshot()
-
-        def check() -> None:
-            if snapshot.version != session.version or not self._is_open:
-                raise OutdatedError
-
-        # The next stroke cancels this solve, so that it gets the processors at once.
-        with suppress(OutdatedError), cancellable(check):
-            solution = snapshot.solution()
-            self._publish_answer(lambda: session.accept_solution(snapshot, solution))
-            if solution is None:
-                return
-            check()
-            analyses = analyse(solution)
-            judgement_ = judge(analyses, snapshot.painted_views)
-            self._publish_answer(lambda: session.accept_solution(snapshot, solution, judgement_))
-            if self._adds_samples:
-                self._sampling.give((snapshot, solution))
-
-    @property
-    def _adds_samples(self) -> bool:
-        """True if samples are added where the newest paint needs them."""
-        return self.has_scenes and self.subjects[0].settings.error is not None
-
-    def _add_samples(self, answer: tuple[SessionSnapshot, Solution]) -> None:
-        """Add a round of samples where the newest paint needs them, until the brush moves."""
-        snapshot, solution = answer
-
-        def is_outdated() -> bool:
-            return not self._is_open or self.session.version != snapshot.version
-
-        if not is_outdated():
-            bases = add_round(self.subjects, snapshot, solution, is_enough=is_outdated)
-            if bases is not None:
-                self._use_bases(bases)
-
-    def _publish_answer(self, make: Callable[[], AnswerUpdate | None]) -> None:
-        def remember() -> AnswerUpdate | None:
-            message = make()
-            self._last_exact = message or self._last_exact
-            return message
-
-        self._publish_made(remember)
+            return None if session is None or session.is_open else (session, session.snapshot())
