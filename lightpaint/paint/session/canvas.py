@@ -8,11 +8,13 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.live.live_view import LiveView
 from lightpaint.paint.session.open_stroke import OpenStroke
 from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
 from lightpaint.paint.store.steps import Patch, Step, replay
+from lightpaint.target.target import Target
 
 #: Largest importance, and largest light, that a page may paint.
 MAX_IMPORTANCE, MAX_LIGHT = 1e4, 1e9
@@ -84,6 +86,26 @@ class Canvas:
     def pixels(self, region: Region) -> Pixels:
         """Return a copy of the pixels of a region."""
         return self.painting.part(region).copy()
+
+    def target(self, name: str, transform: ViewTransform, *, is_sketch: bool) -> Target | None:
+        """Return a copy of the painting as a target; None where nothing is painted.
+
+        Solved elsewhere it has the same answer: a literal painting, which is no sketch, is light
+        over nothing.
+        """
+        if not self.is_painted:
+            return None
+        image, importance, at_least = self.pixels(self.full_region)
+        return Target(
+            name,
+            image,
+            importance,
+            everything=False,
+            at_least=at_least,
+            transform=transform,
+            through_view=is_sketch,
+            over_look=is_sketch,
+        )
 
     def put(self, region: Region, pixels: Pixels) -> None:
         """Put pixels onto the canvas; unpainted ones show the present look."""

@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Doubles, Floats
@@ -24,8 +23,9 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
-from lightpaint.paint.protocol import AnswerUpdate, CanvasPatch, Message
-from lightpaint.paint.session.answer_messages import Judgement, answer_findings, unpainted_text
+from lightpaint.paint.protocol import AnswerUpdate, Message
+from lightpaint.paint.session.answer_messages import Judgement, answer_findings
+from lightpaint.paint.session.edit_messages import canvas_patches, edit_state, unpainted_headline
 from lightpaint.paint.session.history import History, restore
 from lightpaint.paint.session.light_changes import constrain_light, constrain_lights, tie_lights
 from lightpaint.paint.session.live_answer import LiveAnswer
@@ -125,21 +125,9 @@ class Session:
 
         Solved elsewhere it has the same answer: a literal painting is light, over nothing.
         """
-        canvas = self.views[view]
-        if not canvas.is_painted:
-            return None
-        image, importance, at_least = canvas.pixels(canvas.full_region)
+        name = self.name if len(self.views) == 1 else f"{self.name} {self.views[view].name}"
         is_sketch = not self.live_answer.fit.literal
-        return Target(
-            self.name if len(self.views) == 1 else f"{self.name} {canvas.name}",
-            image,
-            importance,
-            everything=False,
-            at_least=at_least,
-            transform=self.transform,
-            through_view=is_sketch,
-            over_look=is_sketch,
-        )
+        return self.views[view].target(name, self.transform, is_sketch=is_sketch)
 
     def snapshot(self, requests: SessionRequests | None = None) -> SessionSnapshot:
         """Return the paintings and `requests`, by default those in effect."""
@@ -238,30 +226,14 @@ class Session:
     def findings(self) -> protocol.Findings:
         """Findings that need no analysis."""
         findings = answer_findings([view.basis for view in self.views], self.weights)
-        return findings if self.is_painted else replace(findings, headline=self.unpainted_headline)
-
-    @property
-    def unpainted_headline(self) -> str:
-        """Headline while nothing is painted."""
-        is_white = self.live_answer.fit.colors == "white"
-        # What was asked before the session began counts as well.
-        is_other = not np.allclose(self.weights, self.live_answer.basis.present_weights)
-        is_asked = bool(self.requests.lights) or (is_other and not is_white)
-        return unpainted_text(is_asked=is_asked, is_white=is_white)
+        if self.is_painted:
+            return findings
+        return replace(findings, headline=unpainted_headline(self.live_answer))
 
     @property
     def edit_state(self) -> dict[str, Any]:
         """Steps that can be undone, and requests in effect: the fields of `EditState`."""
-        fit = self.live_answer.fit
-        return {
-            "history": self._history.info(),
-            "asked": {
-                name: dict(constraints) for name, constraints in self.requests.lights.items()
-            },
-            "ties": self.requests.ties,
-            "settings": dict(self.requests.values),
-            "meant": protocol.ResolvedFit(fit.space, fit.hold, fit.colors),
-        }
+        return edit_state(self._history, self.live_answer)
 
     def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
         """Replace the bases by ones of more samples, with the same lights and sizes.
@@ -371,22 +343,11 @@ class Session:
         """Return the canvases' pixels there: a message for each view, or one for the first if
         nowhere.
         """
-        views = tuple(view for view, _ in regions)
-        messages: list[Message] = []
-        for view, region in regions or ((0, (0, 0, 0, 0)),):
-            image, importance, _ = self.views[view].pixels(region)
-            patch = CanvasPatch(
-                region=region,
-                view=view,
-                views=views,
-                version=self.version,
-                stroke=self._stroke,
-                exact=False,
-                mode=self.live_answer.mode,
-                image=image,
-                importance=importance,
-                weights=self.weights,
-                **self.edit_state,
-            )
-            messages.append(patch)
-        return messages
+        fields = {
+            "version": self.version,
+            "stroke": self._stroke,
+            "exact": False,
+            "mode": self.live_answer.mode,
+            "weights": self.weights,
+        }
+        return canvas_patches(self.views, regions, **fields, **self.edit_state)

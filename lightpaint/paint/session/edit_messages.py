@@ -1,0 +1,58 @@
+"""Fields of messages about edits: steps to undo, requests in effect, changed pixels."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lightpaint.paint.protocol import CanvasPatch, Message, ResolvedFit
+from lightpaint.paint.session.answer_messages import unpainted_text
+from lightpaint.paint.session.canvas import Canvases
+from lightpaint.paint.session.history import History
+from lightpaint.paint.session.live_answer import LiveAnswer
+from lightpaint.paint.store.canvas_pixels import Region
+
+
+def edit_state(history: History, live_answer: LiveAnswer) -> dict[str, Any]:
+    """Return steps that can be undone, and requests in effect: the fields of `EditState`."""
+    requests, fit = live_answer.requests, live_answer.fit
+    return {
+        "history": history.info(),
+        "asked": {name: dict(constraints) for name, constraints in requests.lights.items()},
+        "ties": requests.ties,
+        "settings": dict(requests.values),
+        "meant": ResolvedFit(fit.space, fit.hold, fit.colors),
+    }
+
+
+def unpainted_headline(live_answer: LiveAnswer) -> str:
+    """Return the headline while nothing is painted."""
+    is_white = live_answer.fit.colors == "white"
+    # What was asked before the session began counts as well.
+    is_other = not np.allclose(live_answer.weights, live_answer.basis.present_weights)
+    is_asked = bool(live_answer.requests.lights) or (is_other and not is_white)
+    return unpainted_text(is_asked=is_asked, is_white=is_white)
+
+
+def canvas_patches(
+    canvases: Canvases, regions: Sequence[tuple[int, Region]], **fields: Any
+) -> list[Message]:
+    """Return the canvases' pixels there: a message for each view, or one for the first if nowhere.
+
+    fields: the further fields of each.
+    """
+    views = tuple(view for view, _ in regions)
+    messages: list[Message] = []
+    for view, region in regions or ((0, (0, 0, 0, 0)),):
+        image, importance, _ = canvases[view].pixels(region)
+        messages.append(
+            CanvasPatch(
+                region=region,
+                view=view,
+                views=views,
+                image=image,
+                importance=importance,
+                **fields,
+            )
+        )
+    return messages
