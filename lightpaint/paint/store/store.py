@@ -9,32 +9,23 @@ would need all of that built.
 
 Pixels are stored packed (`compression.py`) and read when they are needed, so that an unlimited
 history takes no memory.
-
-A file that somebody deletes is written again with the next step: the system keeps an open file. A
-full disk ends nothing: what cannot be written stays in memory, in order, `unsaved` says so, and
-`flush` or the next step writes it.
 """
 
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from threading import RLock
 
-from lightpaint.errors import LightpaintError, OutputError, PaintError
-from lightpaint.files import first_line
+from lightpaint.errors import OutputError, PaintError
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.compression import pack_patches, unpack_patch
 from lightpaint.paint.store.database import (
     DamagedError,
     check_pages,
     damaged_error,
-    file_id,
     identify,
-    open_database,
-    rewrite,
-    transaction,
 )
 from lightpaint.paint.store.lazy_arrays import (
     LookArrays,
@@ -55,15 +46,13 @@ from lightpaint.paint.store.session_rows import (
     read_position,
     step_rows,
     to_json,
-    update_position,
 )
 from lightpaint.paint.store.steps import Identity, Step, StoredLook
+from lightpaint.paint.store.write_queue import WriteJob, WriteQueue
 from lightpaint.storage.json_records import strict_json
 
 #: Errors that a value raises which is not as it was written.
 DAMAGE_ERRORS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
-
-_WriteJob = Callable[[sqlite3.Connection], object]
 
 
 class Store:
@@ -75,7 +64,6 @@ class Store:
         steps: All, in order, including undone ones; `append` cuts these off. Their pixels are read
             from the file when they are needed. Read-only.
         position: How many of them are done.
-        unsaved: Why the last steps are in memory only, in one line; None if all is written.
         remarks: On the file: its parts that could not be read.
     """
 
@@ -83,12 +71,10 @@ class Store:
         self.path, self.identity = path, identity
         self.steps: list[Step] = []
         self.position = 0
-        self.unsaved: str | None = None
         self._lock = RLock()
         self._looks: dict[int, StoredLook] = {}
         self._ids: list[int] = []  # of the steps; they only grow
         self._last = 0  # id of the last step there ever was
-        self._pending: list[_WriteJob] = []  # what is still to be written, in order
         self._blobs: dict[int, tuple[bytes, bytes]] = {}  # pixels of steps that are not written
         self._arrays: dict[int, PackedArrays] = {}  # the same of looks
         self.remarks: list[str] = []
@@ -113,9 +99,7 @@ class Store:
 
     def _open_file(self) -> None:
         """Open the file, and read all of it but pixels. Raises DamagedError, and others."""
-        self._database = open_database(self.path, self.identity)
-        self._file = None if self.path is None else self.path.absolute()  # also from elsewhere
-        self._file_id = file_id(self._file)
+        self._queue = WriteQueue(self.path, self.identity)
         self.steps.clear()
         self._ids.clear()
         self._looks.clear()
@@ -128,6 +112,16 @@ class Store:
         except BaseException:
             self._database.close()
             raise
+
+    @property
+    def _database(self) -> sqlite3.Connection:
+        """The database, which another takes the place of when its file is written again."""
+        return self._queue.database
+
+    @property
+    def unsaved(self) -> str | None:
+        """Why the last steps are in memory only, in one line; None if all is written."""
+        return self._queue.unsaved
 
     def recover(self) -> str:
         """Continue with what can be read of the file, which turned out to be damaged.
@@ -152,7 +146,7 @@ class Store:
         """
         with self._lock:
             identify(self._database, self.path, identity)
-            self.identity = identity
+            self.identity = self._queue.identity = identity
 
     def append(self, step: Step) -> None:
         """Append `step` after those that are done; undone steps are cut off."""
@@ -212,27 +206,10 @@ class Store:
     def flush(self) -> str | None:
         """Write the steps that are in memory only. Returns why that is not possible, or None."""
         with self._lock:
-            if not self._pending and self._is_file_there():
-                return self.unsaved
-            try:
-                self._restore_file()
-                with transaction(self._database):
-                    for write in self._pending:
-                        write(self._database)
-                    update_position(self._database, self.position)
-            except LightpaintError as error:
-                self.unsaved = f"what was done last is in memory only: {error}"
-                return self.unsaved
-            except sqlite3.Error as error:
-                self.unsaved = (
-                    f"what was done last is in memory only, since {self.path} cannot be written "
-                    f"({first_line(error)}): it is written as soon as there is room"
-                )
-                return self.unsaved
-            self._pending, self.unsaved = [], None
-            self._blobs.clear()
-            self._arrays.clear()
-            return None
+            if self._queue.flush(self.position) is None:
+                self._blobs.clear()
+                self._arrays.clear()
+            return self.unsaved
 
     def close(self) -> None:
         """Write the remaining steps, and release the file for other processes.
@@ -240,13 +217,8 @@ class Store:
         Raises OutputError if something cannot be written; it is lost then.
         """
         with self._lock:
-            unsaved = self.flush()
-            self._pending, self.unsaved = [], None  # closed again, there is nothing left to say
-            self._file = self._file_id = None
-            try:
-                self._database.close()
-            except sqlite3.Error as error:  # what is beside the file goes into it next time
-                unsaved = unsaved or first_line(error)
+            self.flush()
+            unsaved = self._queue.close()
         if unsaved is not None:
             raise OutputError(f"the last steps are lost: {unsaved}")
 
@@ -256,20 +228,8 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _is_file_there(self) -> bool:
-        return file_id(self._file) == self._file_id
-
-    def _restore_file(self) -> None:
-        """Write the file again if it was deleted. Raises LightpaintError if that fails."""
-        if self._file is None or self._is_file_there():
-            return
-        if file_id(self._file) is not None:
-            raise PaintError(f"{self.path} is another file now: move that one away")
-        self._database = rewrite(self._database, self._file, self.identity)
-        self._file_id = file_id(self._file)
-
-    def _enqueue(self, write: _WriteJob) -> None:
-        self._pending.append(write)
+    def _enqueue(self, write: WriteJob) -> None:
+        self._queue.add(write)
         self.flush()
 
     def _read_all(self) -> None:

@@ -1,0 +1,88 @@
+"""Writes to a session file, which wait in memory while its disk refuses them.
+
+A file that somebody deletes is written again with the next step: the system keeps an open file. A
+full disk ends nothing: what cannot be written stays in memory, in order, `unsaved` says so, and
+`flush` or the next step writes it.
+"""
+
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.files import first_line
+from lightpaint.paint.store.database import file_id, open_database, rewrite, transaction
+from lightpaint.paint.store.session_rows import update_position
+from lightpaint.paint.store.steps import Identity
+
+WriteJob = Callable[[sqlite3.Connection], object]
+
+
+class WriteQueue:
+    """The database of one session, and what is still to be written to it, in order.
+
+    Attributes:
+        database: Open, with an exclusive lock on its file.
+        identity: Identity of the painted views; None where it is still to be known.
+        unsaved: Why the last steps are in memory only, in one line; None if all is written.
+    """
+
+    def __init__(self, path: Path | None, identity: Identity | None) -> None:
+        self.database = open_database(path, identity)
+        self.identity, self._path = identity, path
+        self.unsaved: str | None = None
+        self._file = None if path is None else path.absolute()  # also from elsewhere
+        self._file_id = file_id(self._file)
+        self._pending: list[WriteJob] = []
+
+    def add(self, write: WriteJob) -> None:
+        """Append what is to be written; `flush` writes it."""
+        self._pending.append(write)
+
+    def flush(self, position: int) -> str | None:
+        """Write what is pending, in one transaction. Returns why that is not possible, or None.
+
+        position: how many steps are done.
+        """
+        if not self._pending and self._is_file_there():
+            return self.unsaved
+        try:
+            self._restore_file()
+            with transaction(self.database):
+                for write in self._pending:
+                    write(self.database)
+                update_position(self.database, position)
+        except LightpaintError as error:
+            self.unsaved = f"what was done last is in memory only: {error}"
+            return self.unsaved
+        except sqlite3.Error as error:
+            self.unsaved = (
+                f"what was done last is in memory only, since {self._path} cannot be written "
+                f"({first_line(error)}): it is written as soon as there is room"
+            )
+            return self.unsaved
+        self._pending, self.unsaved = [], None
+        return None
+
+    def close(self) -> str | None:
+        """Release the file for other processes. Returns why pending writes are lost, or None."""
+        unsaved = self.unsaved
+        self._pending, self.unsaved = [], None  # closed again, there is nothing left to say
+        self._file = self._file_id = None
+        try:
+            self.database.close()
+        except sqlite3.Error as error:  # what is beside the file goes into it next time
+            unsaved = unsaved or first_line(error)
+        return unsaved
+
+    def _is_file_there(self) -> bool:
+        return file_id(self._file) == self._file_id
+
+    def _restore_file(self) -> None:
+        """Write the file again if it was deleted. Raises LightpaintError if that fails."""
+        if self._file is None or self._is_file_there():
+            return
+        if file_id(self._file) is not None:
+            raise PaintError(f"{self._path} is another file now: move that one away")
+        self.database = rewrite(self.database, self._file, self.identity)
+        self._file_id = file_id(self._file)
