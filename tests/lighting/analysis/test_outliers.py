@@ -4,9 +4,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
-from lightpaint.lighting.analysis.noise.peaks import PEAK_SHARE, T_RATIOS, TWO_PATHS, Peaks
+from lightpaint.lighting.analysis.noise.peaks import (
+    PEAK_SHARE,
+    T_RATIOS,
+    TWO_PATHS,
+    Peaks,
+    t_ratios,
+)
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
 from lightpaint.lighting.solve import solve
 from lightpaint.report.page.lights_table import lights_table
@@ -154,3 +162,14 @@ def test_peaks_by_hand():
     peaks = Peaks.empty(1)
     peaks.add(np.ones((1, int(1 / PEAK_SHARE) + 1)), np.full((1, int(1 / PEAK_SHARE) + 1), 0.1))
     assert peaks.hidden()[0] == 0
+
+
+def test_ratios_are_those_of_student() -> None:
+    freedom = np.concatenate([np.arange(1, 6), np.geomspace(5, 1e7, 50)])
+    exact = student.ppf(0.975, freedom) / norm.ppf(0.975)
+    np.testing.assert_allclose(t_ratios(freedom), exact, rtol=4e-3)
+    between = np.linspace(1, 5, 33)
+    near = student.ppf(0.975, between) / norm.ppf(0.975)
+    assert (t_ratios(between) > 0.99 * near).all()
+    assert (t_ratios(between) < 1.05 * near).all()
+    np.testing.assert_array_equal(t_ratios(np.array([0.3, np.nan])), [T_RATIOS[0], 1])

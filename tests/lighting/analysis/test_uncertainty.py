@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 from scipy.stats import truncnorm
 
 from lightpaint.basis.basis import Basis
@@ -13,13 +14,10 @@ from lightpaint.errors import BasisError, SizeError
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.analysis.noise.noise import pseudo_inverse
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.analysis.noise.peaks import NORMAL_95
 from lightpaint.lighting.analysis.noise.refinement import refine
-from lightpaint.lighting.analysis.noise.uncertainty import (
-    NORMAL_95,
-    _one_sided,
-    error_bars,
-    with_error_bars,
-)
+from lightpaint.lighting.analysis.noise.uncertainty import error_bars, with_error_bars
+from lightpaint.lighting.analysis.noise.weight_spread import _one_sided
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
 from lightpaint.target.target import Target
@@ -120,6 +118,26 @@ def test_one_light_by_hand(make_basis: Any):
         corrected.lighting.weights_for(basis)[0], w + found.bias[0], rtol=1e-4
     )
     np.testing.assert_allclose(error_bars(corrected).bias, 0, atol=1e-5)
+
+
+def test_intervals_are_those_of_student_where_few_pixels_have_noise(make_basis: Any):
+    """Three half differences are three degrees of freedom: 1.96 standard errors hold in 85 %."""
+    image, target = np.ones((1, *SIZE, 3)), _target(np.full((*SIZE, 3), 0.5))
+    image[0, :, 12:] = 2
+    clean = solve(make_basis(images=image), target).weights
+    held, held_before = [], []
+    for seed in range(200):
+        noise = np.zeros((2, *image.shape))
+        noise[..., 5:8, 3, :] = np.random.default_rng(seed).normal(0, 0.1, (2, 1, 3, 3))
+        half = (noise[0] - noise[1]) / 2
+        basis = make_basis(images=image + noise.mean(axis=0), half_differences=half)
+        found = error_bars(solve(basis, target))
+        low, high = found.interval
+        held.append((low <= clean) & (clean <= high))
+        held_before.append(np.abs(found.weights - clean) <= NORMAL_95 * found.standard_error)
+    # The channels of 200 seeds are 600 cases, of whose share 0.009 is a standard error.
+    assert np.mean(held_before) == pytest.approx(2 * student.cdf(1.96, 3) - 1, abs=4 * 0.015)
+    assert 0.95 - 3 * 0.009 <= np.mean(held) <= 0.985
 
 
 def test_without_noise_nothing_is_uncertain(make_basis: Any):

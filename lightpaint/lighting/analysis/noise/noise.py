@@ -12,7 +12,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.basis.planes import BLOCK_PIXELS, FEW_LIGHTS, Planes, as_slice
-from lightpaint.lighting.analysis.noise.peaks import Peaks
+from lightpaint.lighting.analysis.noise.peaks import Peaks, t_ratios
 from lightpaint.lighting.analysis.noise.residuals import Residuals
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
@@ -41,6 +41,8 @@ class Noise:
     gradient: (3, n, 3, n), covariance of the gradient. objective_error, objective_noise: as in
     `Uncertainty`.
     hidden: (3, n), variance of a light that few pixels may have and do not show (peaks.py).
+    freedom: (3, n), degrees of freedom of the variance of a light's gradient: how many pixels of
+    equal noise would tell it as well.
     """
 
     power: Doubles
@@ -49,6 +51,15 @@ class Noise:
     objective_error: Doubles
     objective_noise: Doubles
     hidden: Doubles
+    freedom: Doubles
+
+    @property
+    def widening(self) -> Doubles:
+        """(n, 3), ratios of an interval to that of a variance which is known.
+
+        1 where `hidden` has it already.
+        """
+        return np.where(self.hidden > 0, 1, t_ratios(self.freedom)).T
 
     @property
     def is_hidden(self) -> Bools:
@@ -88,30 +99,38 @@ def noise_sums(solution: Solution) -> Noise:
         mixed = residuals.noise(part)
         error += np.square(weight[part] * residuals.residual(part) * mixed).sum(axis=0)
         noise += (weight[part] * np.square(mixed)).sum(axis=0)
+    gradient, fourth = (sum(x.gradient for x in sums), sum(x.fourth for x in sums))
+    second = np.einsum("cici->ci", gradient)
     return Noise(
         power=np.asarray(sum(x.power for x in sums)),
         target_noise=np.asarray(sum(x.target_noise for x in sums)),
-        gradient=np.asarray(sum(x.gradient for x in sums)),
+        gradient=np.asarray(gradient),
         objective_error=2 * np.sqrt(error),
         objective_noise=noise,
         hidden=np.array([Peaks.merged([x.peaks[c] for x in sums]).hidden() for c in range(3)]),
+        freedom=np.square(second) / np.where(fourth > 0, fourth, np.nan),
     )
 
 
 @dataclass(frozen=True)
 class _Sums:
-    """Sums over some pixels, as in `Noise`. peaks: of each channel."""
+    """Sums over some pixels, as in `Noise`.
+
+    fourth: (3, n), fourth powers of the half differences of the gradient. peaks: of each channel.
+    """
 
     power: Doubles
     target_noise: Doubles
     gradient: Doubles
+    fourth: Doubles
     peaks: tuple[Peaks, ...]
 
     @classmethod
     def zeros(cls, n: int) -> "_Sums":
         """Return sums over no pixels."""
         peaks = tuple(Peaks.empty(n) for _ in range(3))
-        return cls(np.zeros((3, n, n)), np.zeros((3, n)), np.zeros((3, n, 3, n)), peaks)
+        gradient, fourth = np.zeros((3, n, 3, n)), np.zeros((3, n))
+        return cls(np.zeros((3, n, n)), np.zeros((3, n)), gradient, fourth, peaks)
 
 
 @dataclass(frozen=True)
@@ -165,6 +184,8 @@ class NoisyPixels:
             rows = [self._rows(sums, pixels, arrays, missed, c) for c in range(3)]
             for c in range(3):
                 sums.gradient[c, :, c] += rows[c] @ rows[c].T
+                squares = np.square(rows[c])
+                sums.fourth[c] += np.einsum("ip,ip->i", squares, squares)
             if is_coupled:
                 # One path carries all three channels, so their noise goes together.
                 for c, d in ((0, 1), (0, 2), (1, 2)):

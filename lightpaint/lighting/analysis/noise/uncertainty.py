@@ -5,41 +5,26 @@ their difference, pixel by pixel, has the covariance of the gradient's noise, an
 of M turns that into the covariance of the weights (docs/method.md, "How sure").
 """
 
-import math
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 
 import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, as_rgb
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.keywords import keywords
-from lightpaint.lighting.analysis.noise.directions import (
-    BlockFreedom,
-    block_freedoms,
-    solve_for,
-)
+from lightpaint.lighting.analysis.noise.directions import solve_for
 from lightpaint.lighting.analysis.noise.noise import (
-    NULL_EIGENVALUE,
-    Noise,
     denoised_matrix,
     gradient_bias,
     noise_sums,
-    pseudo_inverse,
 )
 from lightpaint.lighting.analysis.noise.outliers import noise_doubts, weakest_matrix
+from lightpaint.lighting.analysis.noise.peaks import NORMAL_95
+from lightpaint.lighting.analysis.noise.weight_spread import weight_spread
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
 from lightpaint.screen import short_repr
-
-#: Standard errors on either side of a 95 % interval, and the share of all cases outside.
-NORMAL_95, OUTSIDE_SHARE = 1.96, 0.05
-
-NORMAL = NormalDist()
-
-#: Standard deviations beyond a bound from which a normal tail is approximated by an exponential.
-FAR_DEVIATIONS = 30.0
 
 
 @keywords()
@@ -52,7 +37,7 @@ class Uncertainty:
     Attributes:
         weights: (n, 3), as solved.
         scatter: (n, 3), standard deviation of the weights between seeds. For a light that is off
-            or at a limit, the part on the side where it may go (see `_one_sided`).
+            or at a limit, the part on the side where it may go (see weight_spread.py).
         bias: (n, 3), the rise of the weights without the noise power in M.
         interval: The 95 % interval of each weight, lower and upper ends, (n, 3) each. At 0 or at a
             limit it has one side, which is never empty.
@@ -106,8 +91,7 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     are of the last linear problem.
 
     Kept or locked lights have an error of 0; that of lights which reach nothing is unknown. Noise
-    may
-    have pushed a weight to 0 or to a limit: it has an interval on one side (`_one_sided`).
+    may have pushed a weight to 0 or to a limit: it has an interval on one side (weight_spread.py).
 
     Args:
         solution: From `solve`, `refine` or `correct_noise`.
@@ -133,7 +117,8 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     # the noisy M leaves a part; the unbiased answer, which determines the interval, has the scatter
     # of its own M.
     scatters = solved if problem.refinement is None else unbiased
-    *sides, excess = _scatter(solution, noise, scatters, unbiased, weights + bias)
+    free, exits, excess = weight_spread(solution, noise, scatters, unbiased, weights + bias)
+    moved = np.zeros(weights.shape)
     doubts = noise_doubts(solution, noise.power)
     if doubts.any():
         weak = weakest_matrix(solution, noise.power, doubts, corrected)
@@ -142,12 +127,15 @@ def error_bars(solution: Solution) -> Uncertainty | None:
             right = np.einsum("cij,jc->ci", weak, before) + step
         weak_equations = NormalEquations(weak, right, equations.target_norm2)
         far = solve_for(solution, weak_equations)
-        *sides, _ = _scatter(solution, noise, weak_equations, weak_equations, far)
-        sides = [np.hypot(side, far - weights - bias) for side in sides]
+        free, exits, _ = weight_spread(solution, noise, weak_equations, weak_equations, far)
+        moved = far - weights - bias
+    sides, wide = (
+        [_root(x, exit_, moved) for exit_ in exits] for x in (free, free * noise.widening)
+    )
     by_channel = excess.reshape(3, -1).sum(axis=1)
     by_channel += np.einsum("ic,cij,jc->c", bias, equations.M, bias)
     is_determined = np.where(solution.reached, 1, np.nan)
-    interval = _interval(solution, bias * is_determined, sides)
+    interval = _interval(solution, bias * is_determined, wide)
     return Uncertainty(
         weights,
         np.maximum(*sides) * is_determined,
@@ -161,58 +149,16 @@ def error_bars(solution: Solution) -> Uncertainty | None:
     )
 
 
-def gradient_response(solution: Solution) -> Doubles:
-    """Return how noise of the gradient moves the weights, (3 n, 3 n): channel by channel.
-
-    It is the matrix whose product with the covariance of the gradient on both sides makes the
-    scatter of `error_bars`, but for bounds that hold.
-    """
-    noise = noise_sums(solution)
-    pulled = solution.problem.with_pull(solution.problem.solved)
-    gradient = pulled.gradient(solution.weights).T.ravel()
-    M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
-    made = np.zeros_like(M)
-    for room in block_freedoms(solution, pulled):
-        to = room.columns
-        _, free = _movable(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
-        along = to @ free
-        made += along @ pseudo_inverse(along.T @ M @ along) @ along.T
-    return made
-
-
-def _scatter(
-    solution: Solution,
-    noise: Noise,
-    scatters: NormalEquations,
-    unbiased: NormalEquations,
-    weights: Doubles,
-) -> tuple[Doubles, Doubles, Doubles]:
-    """Return standard deviations below and above the weights, (n, 3) each, and the excess, (3 n,).
-
-    scatters: the equations by which the noise of the gradient moves the weights. unbiased,
-    weights: the equations and weights, (n, 3), whose gradient tells how firmly bounds hold.
-    """
-    problem = solution.problem
-    gradient = problem.with_pull(unbiased).gradient(weights).T.ravel()
-    pulled, missed = problem.with_pull(scatters), problem.equations.full_matrix
-    M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
-    below, above, excess = (np.zeros(gradient.size) for _ in range(3))
-    for room in block_freedoms(solution, pulled):
-        columns, active = room.columns, room.active
-        steps, covariance = _propagate(
-            columns.T @ M @ columns, columns.T @ C @ columns, room, columns.T @ gradient
-        )
-        excess += np.einsum("pq,qp->p", missed, columns @ covariance @ columns.T)
-        variance = ((room.emitted @ active.constrained(covariance)) * room.emitted).sum(axis=1)
-        own_steps = room.emitted @ (active.own_exits * steps)
-        below += variance + np.square(np.minimum(own_steps, 0)).sum(axis=1)
-        above += variance + np.square(np.maximum(own_steps, 0)).sum(axis=1)
-    down, up = (np.sqrt(np.maximum(side, 0)).reshape(3, -1).T for side in (below, above))
-    return down, up, excess
+def _root(*parts: Doubles) -> Doubles:
+    """Return the root of the sum of squares of independent parts."""
+    return np.asarray(np.sqrt(sum(np.square(part) for part in parts)))
 
 
 def _interval(solution: Solution, bias: Doubles, sides: list[Doubles]) -> tuple[Doubles, Doubles]:
-    """Return lower and upper ends, (n, 3) each, within the constraints. sides: below and above."""
+    """Return lower and upper ends, (n, 3) each, within the constraints.
+
+    sides: standard deviations below and above, wider where few pixels tell them.
+    """
     weights = solution.weights
     low, high = solution.problem.local_reduction.weight_ranges
     below, above = (NORMAL_95 * np.hypot(side, bias) for side in sides)
@@ -251,66 +197,6 @@ def with_error_bars(solution: Solution, uncertainty: Uncertainty | None) -> Solu
     lighting = replace(solution.lighting, lights=lights)
     error = as_rgb(uncertainty.objective_error)
     return replace(solution, lighting=lighting).with_certificate_fields(objective_error=error)
-
-
-def _propagate(
-    M: Doubles, C: Doubles, room: BlockFreedom, gradient: Doubles
-) -> tuple[Doubles, Doubles]:
-    """Return how far the active bounds may be left, (h,), and the covariance of all unknowns, (k,
-    k).
-
-    M: (k, k); C: (k, k), covariance of the noise of the gradient, (k,). Cov(x) = M⁻¹ C M⁻¹ over
-    the directions of `_movable`.
-    """
-    ends, free = _movable(M, C, room, gradient)
-    inverse = free @ pseudo_inverse(free.T @ M @ free) @ free.T
-    return ends, inverse @ C @ inverse
-
-
-def _movable(
-    M: Doubles, C: Doubles, room: BlockFreedom, gradient: Doubles
-) -> tuple[Doubles, Doubles]:
-    """Return how far the active bounds may be left, (h,), and what noise may move, (k, m).
-
-    These are the free directions, and those of bounds that noise alone may have activated.
-    Arguments: as of `_propagate`.
-    """
-    free = room.free
-    # Directions that leave a bound while the free unknowns adapt.
-    ways = room.active.exits - free @ (
-        pseudo_inverse(free.T @ M @ free) @ (free.T @ M @ room.active.exits)
-    )
-    stiffness, alone = (((M @ w) * w).sum(axis=0) for w in (ways, room.active.exits))
-    # Other lights can replace those without stiffness.
-    counts = stiffness > NULL_EIGENVALUE * alone
-    safe = np.where(counts, stiffness, 1)
-    pushed = np.where(counts, np.maximum(ways.T @ gradient, 0), 0) / safe
-    noise = np.maximum(((C @ ways) * ways).sum(axis=0), 0)
-    spread = np.where(counts, np.sqrt(noise), 0) / safe
-    ends = [_one_sided(u, s) for u, s in zip(pushed.tolist(), spread.tolist(), strict=True)]
-    free = np.hstack([free, ways[:, pushed < NORMAL_95 * spread]])
-    return np.minimum(ends, room.active.distances) / NORMAL_95, free
-
-
-def _one_sided(pushed: float, spread: float) -> float:
-    """Return the end of the 95 % interval of a value at a bound, from there on.
-
-    Without the bound it would be beyond it by `pushed`, u, with the standard deviation s of
-    `spread`. Since it cannot be beyond, the end is U with
-
-        P(X > U) = 0.05 P(X > 0),   X ~ N(-u, s²),
-
-    which is 1.96 s at u = 0, about 3 s²/u far beyond, and never 0: whatever the true value is, it
-    is below U in 95 % of all cases or more.
-    """
-    if spread <= 0:
-        return 0.0
-    u = pushed / spread
-    if u > FAR_DEVIATIONS:
-        # The tail of a normal distribution is nearly exp(-u t - t²/2) there.
-        return spread * (math.hypot(u, math.sqrt(-2 * math.log(OUTSIDE_SHARE))) - u)
-    beyond = math.erfc(u / math.sqrt(2)) / 2
-    return spread * (-NORMAL.inv_cdf(OUTSIDE_SHARE * beyond) - u)
 
 
 def _with_errors(light: LightSetting, error: Doubles, interval: Doubles) -> LightSetting:
