@@ -28,7 +28,7 @@ from lightpaint.paint.protocol import Message
 from lightpaint.paint.session import picture_table
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.store import store
+from lightpaint.paint.store import write_queue
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio import plane_denoiser, session_exports, studio
 from lightpaint.paint.studio.studio import Studio
@@ -468,7 +468,7 @@ def test_a_full_disk_is_said_to_pages_and_to_the_terminal(
     at_terminal: list[str] = []
     heard.studio.on_unsaved = at_terminal.append
     with monkeypatch.context() as patch:
-        patch.setattr(store, "transaction", full)
+        patch.setattr(write_queue, "transaction", full)
         heard.paint(1, 0.8)
         text = heard.wait(said).fields["text"]
         assert "disk is full" in text

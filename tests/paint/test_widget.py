@@ -26,7 +26,7 @@ import lightpaint as lp
 from lightpaint.errors import ConstraintError, OutputError, PaintError
 from lightpaint.paint import background_threads, protocol
 from lightpaint.paint.notebook import widget_arguments, widget_files
-from lightpaint.paint.store import store
+from lightpaint.paint.store import write_queue
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import Store
@@ -66,7 +66,7 @@ class Noted(comm.base_comm.BaseComm):  # type: ignore[misc,name-defined]
 @pytest.fixture(autouse=True)
 def line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Widgets have such a line, where no kernel runs; nor any loop, as Playwright leaves one."""
-    monkeypatch.setattr("lightpaint.paint.notebook.widget._running_loop", lambda: None)
+    monkeypatch.setattr("lightpaint.paint.notebook.kernel_thread._running_loop", lambda: None)
     noted = type("Line", (Noted,), {"messages": [], "synced": {}})
     monkeypatch.setattr(comm, "create_comm", lambda *_, **how: noted(**how))
 
@@ -669,7 +669,7 @@ def test_callbacks_come_in_the_thread_of_the_kernel(
 
     async def cell() -> None:
         loop = asyncio.get_running_loop()
-        monkeypatch.setattr("lightpaint.paint.notebook.widget._running_loop", lambda: loop)
+        monkeypatch.setattr("lightpaint.paint.notebook.kernel_thread._running_loop", lambda: loop)
         painter = open_()
         page = Page(painter)
         page.say("hello", version=protocol.VERSION)
@@ -713,7 +713,7 @@ def test_a_full_disk_is_said_and_tried_again(
     page = Page(painter)
     page.say("hello", version=protocol.VERSION)
     with monkeypatch.context() as patch:
-        patch.setattr(store, "transaction", full)
+        patch.setattr(write_queue, "transaction", full)
         assert page.paint(basis.images[2])["kind"] == "answer"
         [why] = wait_for(lambda: said("warn"))
         assert "evening.db cannot be written (database or disk is full)" in why

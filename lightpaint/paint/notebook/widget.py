@@ -4,37 +4,36 @@ All messages pass through the kernel's thread: the studio's threads hand theirs 
 Without a loop, as in a script, they send them themselves.
 """
 
-import asyncio
 import atexit
-import contextvars
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from inspect import signature
 from pathlib import Path
 from threading import Event, RLock
 from typing import Any, Unpack
-from weakref import WeakValueDictionary
 
 from lightpaint.colour.display.view_transform import TransformChoice, ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.lighting.analysis.analysis import analyse, with_findings
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.lighting.answer.lighting_file import write_lighting
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import error_text
 from lightpaint.paint.notebook import widget_arguments
+from lightpaint.paint.notebook.kernel_thread import KernelThread
+from lightpaint.paint.notebook.painter_files import (
+    claim_file,
+    open_store,
+    save_answer,
+    store_path,
+)
 from lightpaint.paint.notebook.pending_values import PendingValues
 from lightpaint.paint.notebook.widget_files import widget_script, widget_style
 from lightpaint.paint.notebook.widget_views import WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
-from lightpaint.paint.session.session import Session
-from lightpaint.paint.store.steps import Identity
-from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.pipeline.job.settings import SettingsByName
-from lightpaint.target.painting_file import write_painting
 from lightpaint.target.target import Target
 
 try:
@@ -49,18 +48,6 @@ except ImportError as error:
 
 #: Traits that cells set and observe.
 LIVE_TRAITS = ("target", "targets", "lighting", "constraints")
-
-#: Functions that turn a trait's new value into arguments of the session's `load`.
-LOADERS: dict[str, Callable[[Session, Any], widget_arguments.LoadArguments]] = {
-    "target": widget_arguments.load_target,
-    "targets": widget_arguments.load_targets,
-    "lighting": widget_arguments.load_lighting,
-    "constraints": widget_arguments.load_constraints,
-}
-
-#: Painters of this process that keep their session in a file, by its path.
-PAINTERS_BY_FILE: WeakValueDictionary[Path, "Painter"] = WeakValueDictionary()
-
 
 #: Minimum height of the painter, in pixels of the screen.
 MIN_HEIGHT = 240
@@ -136,8 +123,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         self._is_closed = False
         self._pending = PendingValues(self._lock, self._apply_late, self._warn)
         self._solved: tuple[int, Solution | None] | None = None
-        self._loop = _running_loop()
-        self._context = contextvars.copy_context()
+        self._kernel = KernelThread()
         subjects = widget_arguments.widget_subjects(
             scene,
             folder=folder,
@@ -147,12 +133,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         )
         if target is not None:
             widget_arguments.check_target_sizes(target, subjects)
-        path = widget_arguments.store_path(store)
+        path = store_path(store)
         if path is not None:
-            if (earlier := PAINTERS_BY_FILE.get(path.resolve())) is not None:
-                earlier.close()  # the user has run its cell again
-            PAINTERS_BY_FILE[path.resolve()] = self
-        self._studio = Studio(subjects, partial(_open_store, path))
+            claim_file(path, self)
+        self._studio = Studio(subjects, partial(open_store, path))
         self._views = WidgetViews(self._studio, self._lock, self._send_to_pages)
         self._failed = ""
         widget_layout = (
@@ -217,19 +201,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         Raises PaintError where nothing is painted yet, for another kind of file, and for a view
         that does not exist.
         """
-        path, snapshot = Path(path), self._studio.snapshot()
-        if view not in range(len(snapshot.targets)):
-            raise PaintError(
-                f"view is {view!r}: expected one of {len(snapshot.targets)}, from 0 on"
-            )
-        if path.suffix == ".json":
-            write_lighting(path, self._lighting())
-        elif path.suffix != ".exr":
-            raise PaintError(f"{path}: expected .exr for the painting, .json for the lighting")
-        elif (target := snapshot.targets[view]) is None:
-            raise PaintError("nothing is painted yet: there is no painting to keep")
-        else:
-            write_painting(path, target)
+        save_answer(Path(path), self._studio.snapshot(), self._lighting, view=view)
 
     def close(self) -> None:
         """End the painter; a session with a file can be continued. Closing twice does nothing.
@@ -263,7 +235,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         if self._is_closed:
             raise PaintError(f"painter.{name} cannot be set: it is closed; make another lp.Painter")
         with self._lock:  # another thread may be notifying observers
-            arguments = LOADERS[name](self._studio.session, value)
+            arguments = widget_arguments.LOADERS[name](self._studio.session, value)
             if self._pending.is_notifying:
                 self._pending.add(name, value)
             else:
@@ -281,7 +253,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
     def _apply_late(self, name: str, value: Any) -> None:
         """Apply a value that was set earlier; show an error, since its cell has ended."""
         try:
-            self._apply(LOADERS[name](self._studio.session, value))
+            self._apply(widget_arguments.LOADERS[name](self._studio.session, value))
         except Exception as error:
             traceback.print_exc()
             self._warn(f"painter.{name} was not set: {error_text(error, at_length=False)}")
@@ -361,10 +333,7 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         if not self._ready.is_set() and isinstance(message, SessionState | Notice):
             self._failed = message.text if isinstance(message, Notice) else ""
             self._ready.set()
-        if self._loop is None:
-            act()
-        elif not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(act, context=self._context)
+        self._kernel.call(act)
 
     def _forward(self, message: Message) -> None:
         self._views.send(message)
@@ -386,19 +355,5 @@ ARGUMENT_NAMES = [
 ]
 
 
-def _open_store(path: Path | None, identity: Identity) -> Store:
-    if path is None:
-        return MemoryStore(identity)
-    with widget_arguments.notebook_advice():
-        return Store.open(path, identity)
-
-
 def _is_exact(message: Message) -> bool:
     return isinstance(message, AnswerUpdate) and message.exact
-
-
-def _running_loop() -> asyncio.AbstractEventLoop | None:
-    try:
-        return asyncio.get_running_loop()
-    except RuntimeError:
-        return None

@@ -1,6 +1,6 @@
 """Arguments and assignments of the notebook's painter, checked and translated for the session."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
 from difflib import get_close_matches
@@ -172,6 +172,15 @@ def load_constraints(session: Session, constraints: Any) -> LoadArguments:
     return {}, requests, "constraints from a cell"
 
 
+#: Functions that turn a trait's new value into arguments of `Studio.load`.
+LOADERS: dict[str, Callable[[Session, Any], LoadArguments]] = {
+    "target": load_target,
+    "targets": load_targets,
+    "lighting": load_lighting,
+    "constraints": load_constraints,
+}
+
+
 def same_paintings(new: Sequence[Target | None], old: Sequence[Target | None]) -> bool:
     """Return whether nothing has been painted between two tuples of targets."""
     return len(new) == len(old) and all(map(_is_same_target, new, old))
@@ -205,13 +214,6 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return a hint to append to an error about an unknown name; "" if no known name is near."""
     near = get_close_matches(name, names, 1)
     return f": did you mean {near[0]!r}?" if near else ""
-
-
-def store_path(store: Any) -> Path | None:
-    """Return the path of the session file, if one is given. Raises PaintError for anything else."""
-    if not isinstance(store, str | Path | None):
-        raise PaintError(f"store is {store!r}: expected the path of a file, like 'evening.db'")
-    return None if store is None else Path(store)
 
 
 def widget_subjects(

@@ -1,0 +1,27 @@
+"""The thread of a notebook's kernel, which the messages of other threads pass through."""
+
+import asyncio
+import contextvars
+from collections.abc import Callable
+
+
+class KernelThread:
+    """The event loop and context of the cell that made this; without a loop, any thread."""
+
+    def __init__(self) -> None:
+        self._loop = _running_loop()
+        self._context = contextvars.copy_context()
+
+    def call(self, act: Callable[[], None]) -> None:
+        """Call `act` soon in the loop, in its context; at once where there is none."""
+        if self._loop is None:
+            act()
+        elif not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(act, context=self._context)
+
+
+def _running_loop() -> asyncio.AbstractEventLoop | None:
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None
