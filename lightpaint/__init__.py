@@ -85,6 +85,7 @@ if TYPE_CHECKING:
     from lightpaint.placement.place import Move as Move
     from lightpaint.placement.place import Placement as Placement
     from lightpaint.placement.place import place as place
+    from lightpaint.placement.rigging.rigging import Rigging as Rigging
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
@@ -122,6 +123,7 @@ _HOMES = {
     "Placement": "placement.place",
     "Pose": "scene.properties.pose",
     "Problem": "lighting.problem",
+    "Rigging": "placement.rigging.rigging",
     "Scene": "scene.scene",
     "SceneFile": "pipeline.job.sources",
     "Appearance": "lighting.analysis.appearance.appearance",

@@ -112,6 +112,7 @@ ASKED = Constraints.of(
         },
         {"settings": Settings(seed=np.int64(3), cd_per_unit=np.float32(0.1))},  # type: ignore[arg-type]
         {"constraints": replace(ASKED, ties=())},
+        {"settings": Settings(move_lights=False)},
         {"basis": GroupsFile("groups.exr", "RGBA_{name}"), "targets": (Painting("g.exr"),)},
     ],
 )

@@ -23,11 +23,12 @@ def obtain(
     *,
     views: int = 1,
     render: Render = render_basis,
+    before: Basis | None = None,
 ) -> Basis:
     """Return the basis of `scene` on its film, from the cache or rendered.
 
     views: number of views that share the rendering time. render: function that renders missing
-    samples.
+    samples. before: a basis of the scene with lights elsewhere, whose other planes are taken.
     """
     listen = listener(progress)
     is_rendered = is_all_rendered = is_reused = False
@@ -42,6 +43,9 @@ def obtain(
         nonlocal is_reused
         is_reused = True
         left = of - count
+        if before is not None:
+            listen.note(f"{left} of {of} lights are rendered where they are now")
+            return
         listen.say(
             f"{count} of {of} lights come from an earlier run; "
             f"{left} {'is' if left == 1 else 'are'} rendered (use_cache=False renders all again)"
@@ -59,6 +63,7 @@ def obtain(
         progress=report,
         render=render,
         report_reuse=report_reuse,
+        before=before,
     )
     if is_all_rendered and not is_reused:
         basis = replace(basis, render_s=time.perf_counter() - began_s)

@@ -16,6 +16,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, Painting, SceneFile, check_needed
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
+from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
@@ -44,6 +45,7 @@ def paint_with_light(
     *,
     basis: str | Path | Basis | LightGroups | list[Basis] | None = None,
     constraints: Constraints | None = None,
+    rigging: Rigging | None = None,
     mask: str | Path | None = None,
     layer: str | None = None,
     find: bool = True,
@@ -65,6 +67,7 @@ def paint_with_light(
         basis: An existing basis, or another renderer's light groups; taken from the cache or
             rendered if not given. For several views a list, which is emptied to save memory.
         constraints: Constraints on the lights; they override those of the scene's lights file.
+        rigging: What may move, and lights to add; it overrides that of the scene's lights file.
         mask: Picture of the importance of pixels, if `target` is a path. The next two are also
             those of `read_target`.
         layer: Layer of an EXR.
@@ -106,7 +109,8 @@ def paint_with_light(
         # These scenes have the films of their bases already.
         basis, settings = None, settings | {"resolution": "1/1"}
     read = {"mask": mask and str(mask), "layer": layer, "find": find}
-    job = _job((scene, how), (target, read), Path(folder), basis, constraints, Settings(**settings))
+    requests = constraints or Constraints(), rigging or Rigging()
+    job = _job((scene, how), (target, read), Path(folder), basis, requests, Settings(**settings))
     looks = run(job, progress, bases=bases)
     return looks if job.by_sensor else looks[0]
 
@@ -116,13 +120,14 @@ def _job(
     target: tuple[Any, Mapping[str, Any]],
     folder: Path,
     basis: Any,
-    constraints: Constraints | None,
+    requests: tuple[Constraints, Rigging],
     settings: Settings,
 ) -> Job:
     """Return the job that the arguments of `paint_with_light` describe.
 
     scene, target: what to read, and the options for reading it.
     """
+    constraints, rigging = requests
     (scenes, scene_options), (targets, target_options) = scene, target
     scene_options = {
         name: value for name, value in scene_options.items() if value not in (None, {})
@@ -143,8 +148,8 @@ def _job(
         names = ", ".join(f"{name}=..." for name in unused)
         raise TargetError(f"{names} cannot change a target that is already read: give its path")
     basis = BasisFile(str(basis)) if _is_path(basis) else basis
-    all_constraints = Constraints() if constraints is None else constraints
-    return Job(tuple(scenes), tuple(targets), folder, basis, all_constraints, settings, by_sensor)
+    how: dict[str, Any] = {"by_sensor": by_sensor, "rigging": rigging}
+    return Job(tuple(scenes), tuple(targets), folder, basis, constraints, settings, **how)
 
 
 def _as_list(value: Any) -> list[Any]:

@@ -13,9 +13,11 @@ from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
 from lightpaint.pipeline.needed_samples import add_needed_samples, problem_of, without_noise
+from lightpaint.pipeline.placed_lights import place_lights
 from lightpaint.pipeline.results.answer_folder import AnswerFolder, new_answer, reload_relit
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.placement.light_search import suggest_lights
+from lightpaint.placement.place import Placement
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.detection_power import LightShares, with_light_tests
 from lightpaint.relit.render_rounds import refine_by_rendering
@@ -52,7 +54,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     job.results.check()
     for remark in job.remarks:
         listen.say(remark)
-    obtained = obtain_bases_of(job, bases, listen)
+    job, obtained, placement = place_lights(job, obtain_bases_of(job, bases, listen), listen)
     if job.settings.error is not None:
         obtained = add_needed_samples(job, obtained, listen)
     problem = problem_of(job, obtained)
@@ -66,7 +68,7 @@ def run(job: Job, progress: Progress = silent, *, bases: list[Basis] | None = No
     lighting, scene = with_findings(solution, analyses).lighting, job.views[0].scene
     with new_answer(job.results, lighting, scene=scene, groups=job.groups) as answer:
         looks = [
-            _finish_view(job, answer, view, analysis, view_listener(job, view, listen))
+            _finish_view(job, answer, view, analysis, placement, view_listener(job, view, listen))
             for view, analysis in zip(job.views, analyses, strict=True)
         ]
     return [_reloaded(look) for look in looks] if answer.has_moved_paths else looks
@@ -97,7 +99,12 @@ def _reloaded(look: Look) -> Look:
 
 
 def _finish_view(
-    job: Job, answer: AnswerFolder, view: PaintedView, analysis: Analysis, listen: Listener
+    job: Job,
+    answer: AnswerFolder,
+    view: PaintedView,
+    analysis: Analysis,
+    placement: Placement | None,
+    listen: Listener,
 ) -> Look:
     """Predict, verify and report a view; return its look."""
     settings, scene, solution = job.settings, view.scene, analysis.solution
@@ -140,6 +147,7 @@ def _finish_view(
         verification=verification,
         analysis=analysis,
         suggestions=suggestions,
+        placement=placement,
     )
     write_report(folder, look, command=settings.command, is_shown=settings.report)
     listen.note("report written")

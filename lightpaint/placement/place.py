@@ -160,7 +160,7 @@ def place(
         >>> {move.name for move in placement.moves} <= {"bulb"}
         True
     """
-    lights = [_free_light(scene, name, freedom) for name, freedom in freedoms.items()]
+    lights = [free_light(scene, name, freedom) for name, freedom in freedoms.items()]
     names = [light.name for light in basis.lights]
     free = [(light, names.index(light.name)) for light in lights if not light.freedom.is_still]
     small = on_small_film(scene, basis, PIXELS)
@@ -200,7 +200,7 @@ def place(
     )
 
 
-def _free_light(scene: Scene, name: str, freedom: Freedom) -> FreeLight:
+def free_light(scene: Scene, name: str, freedom: Freedom) -> FreeLight:
     """Return a light of `scene` with its freedom. Raises SceneError for one that has none."""
     light = scene.light(name)
     if reason := _why_not_searched(light):

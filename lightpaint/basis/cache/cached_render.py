@@ -52,6 +52,7 @@ def obtain_basis(
     progress: Progress = silent,
     render: Render = render_basis,
     report_reuse: ReuseReport = lambda count, of: None,
+    before: Basis | None = None,
 ) -> Basis:
     """Return the basis of `scene`: cached planes, and missing samples rendered.
 
@@ -69,13 +70,20 @@ def obtain_basis(
     basis with more samples has the bits of one render, as it has after an interrupt.
     render: who renders what is missing.
     report_reuse: told how many of the lights are taken, and of how many, where others are rendered.
+    before: a basis of the scene in another state, of the same seed and film, whose planes are taken
+    as well.
 
     Raises SceneError for exact_spp with a time, which asks for no number.
     """
     if exact_spp and time_s is not None:
         raise SceneError("exact_spp=True goes with a number of samples, not with time_s=...")
     if not use_cache:
-        return as_stored(render(scene, spp=spp, time_s=time_s, seed=seed, progress=progress))
+        start, how = None, dict[str, Any](time_s=time_s, seed=seed, progress=progress)
+        if before is not None:
+            how["keep"] = lambda basis: False
+            start = gather_planes(scene, None, spp=spp, seed=seed, before=before, use_cache=False)
+        goal = None if time_s is not None else scene.spp if spp is None else spp
+        return as_stored(_completed(scene, start, spp=goal, render=render, how=how))
     kept = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     if kept is not None and not is_of(scene, kept, seed):
         kept = None
@@ -87,9 +95,9 @@ def obtain_basis(
         if start is not None and not is_on_the_way(scene, start, spp):
             start = None
     elif time_s is None and (kept is None or kept.origin.spp < asked):
-        start = gather_planes(scene, start, spp=asked, seed=seed)
+        start = gather_planes(scene, start, spp=asked, seed=seed, before=before)
     elif kept is None:
-        start = gather_planes(scene, None, spp=None, seed=seed)
+        start = gather_planes(scene, None, spp=None, seed=seed, before=before)
 
     is_composed = start is not None and start.origin.is_composed
 
@@ -104,13 +112,7 @@ def obtain_basis(
         enough = [sum(its[:2]) >= (1 if time_s is not None else asked) for its in counts_of(start)]
         if 0 < sum(enough) < len(enough):
             report_reuse(sum(enough), len(enough))
-    how = {
-        "time_s": time_s,
-        "seed": seed,
-        "keep": keep,
-        "is_final": is_final,
-        "progress": progress,
-    }
+    how = dict[str, Any](time_s=time_s, seed=seed, keep=keep, is_final=is_final, progress=progress)
     basis = _completed(scene, start, spp=asked if time_s is None else None, render=render, how=how)
     if basis is start:
         return basis

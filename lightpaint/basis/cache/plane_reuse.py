@@ -65,19 +65,33 @@ def counts_of(basis: Basis) -> Sequence[Counts]:
     return origin.each_light or [(*origin.halves, *origin.passes)] * len(basis.lights)
 
 
-def gather_planes(scene: Scene, kept: Basis | None, *, spp: int | None, seed: int) -> Basis | None:
+def gather_planes(
+    scene: Scene,
+    kept: Basis | None,
+    *,
+    spp: int | None,
+    seed: int,
+    before: Basis | None = None,
+    use_cache: bool = True,
+) -> Basis | None:
     """Return a basis of `scene` of the planes that the cache has of it, whatever scene they are of.
 
     Lights of which it has none are black, without a sample. None where it has none at all.
 
     kept: the basis of the scene as it is, which is returned itself where no other adds to it. spp:
     samples per pixel beyond which more are no reason to look for others; None for as many as there
-    are.
+    are. before: a basis of the same seed and film, of the scene in another state, whose planes are
+    taken as well. use_cache: False to take of no other.
     """
     wanted = scene.light_identities
     found: list[KeptPlane | None] = [None] * len(wanted)
     if kept is not None:
         found = [KeptPlane(kept, i) for i in range(len(wanted))]
+    if before is not None:
+        found = [
+            _better_sampled(its, before, identity)
+            for its, identity in zip(found, wanted, strict=True)
+        ]
 
     def gain(entry: cache.Entry) -> int:
         assert entry.origin is not None
@@ -85,7 +99,8 @@ def gather_planes(scene: Scene, kept: Basis | None, *, spp: int | None, seed: in
         covered = (its for name, its in zip(wanted, found, strict=True) if name in entry.identities)
         return sum(max(0, has - (0 if its is None else sum(its.counts[:2]))) for its in covered)
 
-    candidates = [entry for entry in cache.entries() if _is_like(entry, scene, seed)]
+    entries = cache.entries() if use_cache else []
+    candidates = [entry for entry in entries if _is_like(entry, scene, seed)]
     while candidates:
         best = max(candidates, key=gain)
         if gain(best) == 0:

@@ -98,6 +98,36 @@ class Kelvin(argparse.Action):
         options.duv += [] if duv is None else [(name, duv)]
 
 
+def move(text: str) -> tuple[str, Any]:
+    """Parse where a light may go, `NAME=METRES` or `NAME=@RAIL`."""
+    name, value = named(text)
+    if isinstance(value, str) and value.startswith("@") and value[1:].strip():
+        return name, {"on": value[1:].strip()}
+    return name, _number_of(text, value, "NAME=1.0, in units of the scene, or NAME=@RAIL")
+
+
+def aim(text: str) -> tuple[str, Any]:
+    """Parse how far a light may turn, `NAME=DEGREES` or `NAME=any`."""
+    name, value = named(text)
+    return name, True if value == "any" else _number_of(text, value, "NAME=30 or NAME=any")
+
+
+def cone(text: str) -> tuple[str, list[float]]:
+    """Parse how wide a spot may open, `NAME=LEAST:MOST`."""
+    name, value = named(text)
+    least, colon, most = str(value).partition(":")
+    expected = "NAME=10:45, in degrees"
+    ends = [_number_of(text, end, expected) for end in ((least, most) if colon else (least,) * 2)]
+    return name, ends
+
+
+def _number_of(text: str, value: Any, expected: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise argparse.ArgumentTypeError(f"{text!r} is not {expected}") from None
+
+
 def primaries(text: str) -> tuple[str, list[str]]:
     """Parse colours to mix, `NAME=COLOR,...`."""
     name, _ = named(text)

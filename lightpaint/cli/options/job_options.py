@@ -15,6 +15,8 @@ from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.constraints_file import read_constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import Painting
+from lightpaint.placement.rigging.rigging import Rigging
+from lightpaint.scene.lights.lights_file import MOVES
 from lightpaint.screen import some_names
 
 if TYPE_CHECKING:
@@ -55,7 +57,7 @@ def jobs_of(
     if not paths:
         raise TargetError("no painting to solve for: give a TARGET, or --target SENSOR=TARGET")
     paintings = _paintings_of(options, paths)
-    constraints = constraints_of(options)
+    constraints, rigging = constraints_of(options), rigging_of(options)
     if basis is not None and options.lights_file:
         constraints = read_constraints(options.lights_file).and_then(constraints)
     if options.views:
@@ -65,7 +67,8 @@ def jobs_of(
         folder = Path(options.output or Path(paths[0]).stem)
         if options.output and options.variations:
             folder /= Path(paths[0]).stem
-        return [Job(scenes, tuple(paintings), folder, None, constraints, settings, by_sensor=True)]
+        how: dict[str, Any] = {"by_sensor": True, "rigging": rigging}
+        return [Job(scenes, tuple(paintings), folder, None, constraints, settings, **how)]
     # One scene, loaded once for all jobs.
     source = () if basis is not None else (scene_of(options),)
     output = options.output and Path(options.output)
@@ -76,7 +79,8 @@ def jobs_of(
     jobs = []
     for painting, folder in zip(paintings, folders, strict=True):
         try:
-            jobs.append(Job(source, (painting,), folder, basis, constraints, settings))
+            job = Job(source, (painting,), folder, basis, constraints, settings, rigging=rigging)
+            jobs.append(job)
         except LOOK_ERRORS as error:
             if failed is None or not options.keep_going or len(paintings) == 1:
                 raise
@@ -123,6 +127,15 @@ def constraints_of(options: Namespace) -> Constraints:
         sparse=options.sparse,
         where=BY_OPTION,
     )
+
+
+def rigging_of(options: Namespace) -> Rigging:
+    """Return what may move by the options."""
+    lights: dict[str, dict[str, Any]] = {}
+    for key in MOVES:
+        for name, value in getattr(options, key):
+            lights.setdefault(name, {})[key] = value
+    return Rigging.of(lights, where=BY_OPTION)
 
 
 def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:

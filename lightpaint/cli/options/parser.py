@@ -29,6 +29,7 @@ from lightpaint.cli.options.solve_options import (
     add_method,
     add_paintings,
     add_pattern,
+    add_rigging,
     add_several,
     add_tolerances,
     add_variations,
@@ -140,6 +141,7 @@ def _solve(parser: argparse.ArgumentParser) -> None:
     add_lights(parser)
     add_pattern(parser)
     add_constraints(parser)
+    add_rigging(parser)
     add_budget(parser)
     add_error(parser)
     add_cache(parser)

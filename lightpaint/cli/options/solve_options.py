@@ -303,3 +303,38 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
         metavar="K",
         help="use only the K lights that fit best, besides locked ones; switch the others off",
     )
+
+
+def add_rigging(parser: argparse.ArgumentParser) -> None:
+    """Add what may move, beside what the lights file lets move."""
+    group = parser.add_argument_group(
+        "places",
+        "NAME is a light or a pattern; all options may be repeated. Lights that may move go where "
+        "they bring the answer closest to the painting.",
+    )
+
+    def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
+        dest = option[2:]
+        group.add_argument(
+            option, dest=dest, type=kind, action="append", default=[], metavar=metavar, help=about
+        )
+
+    add(
+        "--move",
+        "NAME=DISTANCE|@RAIL",
+        arguments.move,
+        "let the light move so far from its place, or along a rail or surface of the lights file",
+    )
+    add("--aim", "NAME=DEGREES|any", arguments.aim, "let the light turn so far")
+    add(
+        "--cone",
+        "NAME=10:45",
+        arguments.cone,
+        "let the spot's cone end between these degrees from its axis",
+    )
+    group.add_argument(
+        "--no-move",
+        dest="move_lights",
+        action="store_false",
+        help="leave all lights where they are, whatever the lights file lets move",
+    )

@@ -51,6 +51,7 @@ OPTIONS = {
 #: Arguments with a value that have an option of their own.
 SPELLINGS = {
     "group_alike=False": "--no-group-alike",
+    "move_lights=False": "--no-move",
     "find=False": "--no-template",
     "noise_correction=False": "--no-correct-noise",
     "use_cache=False": "--no-cache",

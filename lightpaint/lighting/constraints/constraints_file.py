@@ -7,9 +7,9 @@ from typing import Any
 from lightpaint.errors import ConstraintError
 from lightpaint.files import one_line
 from lightpaint.keywords import keywords
-from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.constraints.constraints import LIGHT_KEYS, Constraints
 from lightpaint.lighting.constraints.values import check_keys, parse_strength
-from lightpaint.scene.lights.lights_file import SceneRequests, read_keys
+from lightpaint.scene.lights.lights_file import MOVES, SceneRequests, read_keys
 
 #: Characters of an error, which names the file, the light and the key before it quotes.
 MAX_MESSAGE_LENGTH = 1000
@@ -40,7 +40,7 @@ def constraints_of(requests: SceneRequests) -> Constraints:
     try:
         strength = _pull_strength(keys, requests.source)
         return Constraints.of(
-            keys.get("light"),
+            _without_moves(keys.get("light"), requests.source),
             tie=keys.get("tie", ()),
             prefer_current=strength,
             sparse=keys.get("sparse"),
@@ -49,6 +49,19 @@ def constraints_of(requests: SceneRequests) -> Constraints:
     except ConstraintError as error:
         # A value in the file may be of any length.
         raise ConstraintError(one_line(str(error), limit=MAX_MESSAGE_LENGTH)) from None
+
+
+def _without_moves(light: Any, source: str) -> Any:
+    """Return tables of lights without the keys of what may move, which are no constraints."""
+    if not isinstance(light, Mapping):
+        return light
+    tables = {}
+    for name, table in light.items():
+        check_keys(table, (*LIGHT_KEYS, *MOVES), f"{source}: light.{name}")
+        kept = {key: value for key, value in table.items() if key not in MOVES}
+        if kept or not table:
+            tables[name] = kept
+    return tables
 
 
 def _pull_strength(keys: Mapping[str, Any], source: str) -> Any:

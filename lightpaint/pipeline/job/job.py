@@ -6,7 +6,8 @@ of objects in memory can only run where it is.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis
@@ -42,6 +43,8 @@ from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
 from lightpaint.placement.light_search import check_suggestible
+from lightpaint.placement.rigging.rigged_lights import freedoms_of
+from lightpaint.placement.rigging.rigging import Rigging, rigging_of
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
@@ -79,8 +82,11 @@ class Job:
         constraints: Constraints on the lights; they override those of the scene's lights file.
         settings: Settings of the solve.
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
+        rigging: What may move, and lights to add; needs a scene. It overrides that of the scene's
+            lights file.
         views: Set on creation: the views, each with what it needs.
         all_constraints: Set on creation: all constraints, those of the lights file first.
+        all_rigging: Set on creation: all that may move, that of the lights file first.
         fit: Set on creation: the settings, with those decided that depend on the paintings.
         remarks: Set on creation: remarks for the user, in plain text.
         results: Set on creation: the folder, and the files that may be replaced there.
@@ -103,8 +109,10 @@ class Job:
     constraints: Constraints = field(default_factory=Constraints)
     settings: Settings = field(default_factory=Settings)
     by_sensor: bool = False
+    rigging: Rigging = field(default_factory=Rigging)
     views: tuple[PaintedView, ...] = field(init=False, repr=False)
     all_constraints: Constraints = field(init=False, repr=False)
+    all_rigging: Rigging = field(init=False, repr=False)
     fit: Settings = field(init=False, repr=False)
     remarks: tuple[str, ...] = field(init=False, repr=False)
     results: ResultFolder = field(init=False, repr=False)
@@ -136,6 +144,7 @@ class Job:
         reduce_to(all_constraints, basis_lights(scenes[0]) if basis is None else basis.lights)
         if self.settings.suggest:
             check_suggestible(scenes[0])
+        all_rigging = self._rigging_for(scenes)
         views = tuple(
             PaintedView(*self._with_equal_size(scene, target, basis), folder, basis)
             for scene, target, folder in zip(scenes or [None], targets, folders, strict=True)
@@ -146,6 +155,7 @@ class Job:
         fields = vars(self)
         fit = resolve_for_targets(self.settings, [view.target for view in views])
         fields.update(views=views, all_constraints=all_constraints, fit=fit, results=results)
+        fields.update(all_rigging=all_rigging)
         fields.update(remarks=tuple(self._remarks(targets, scenes)))
 
     @property
@@ -153,6 +163,13 @@ class Job:
         """The light groups that the job is solved from; None for another basis."""
         basis = content(self.basis)
         return basis if isinstance(basis, LightGroups) else None
+
+    def with_moved_lights(self, scenes: Sequence[Scene]) -> "Job":
+        """Return this job with lights elsewhere. scenes: those of the views, on the same films."""
+        moved = copy(self)
+        views = zip(self.views, scenes, strict=True)
+        vars(moved)["views"] = tuple(replace(x, scene=scene, basis=None) for x, scene in views)
+        return moved
 
     def to_json(self) -> str:
         """Return this job as text, to run it elsewhere; paths stay as they were given.
@@ -167,6 +184,7 @@ class Job:
             self.settings,
             folder=str(self.folder),
             by_sensor=self.by_sensor,
+            rigging=self.rigging,
         )
 
     @staticmethod
@@ -210,6 +228,19 @@ class Job:
                 f"{len(self.targets)} targets for {len(self.scenes)} views: give one for each; "
                 "several paintings of one view need a job each"
             )
+
+    def _rigging_for(self, scenes: Sequence[Scene]) -> Rigging:
+        """Return all that may move in the scene. Raises for what cannot, before rendering."""
+        if not scenes:
+            if self.rigging:
+                raise LightpaintError("lights can only move in their scene: give it, too")
+            return Rigging()
+        rigging = rigging_of(scenes[0].requests).and_then(self.rigging)
+        if not self.settings.move_lights:
+            return Rigging()
+        if rigging:
+            freedoms_of(rigging, scenes[0])
+        return rigging
 
     def _check_painting_is_no_light(self) -> None:
         """Raise BasisError if a folder of light groups includes the painting as a light."""

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, File, GroupsFile, Painting, SceneFile
+from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT = "lightpaint-job 1"
@@ -32,6 +33,7 @@ class JobRecord:
     settings: Settings
     folder: str
     by_sensor: bool
+    rigging: Rigging = field(default_factory=Rigging)
 
 
 def encode_job(
@@ -43,6 +45,7 @@ def encode_job(
     *,
     folder: str,
     by_sensor: bool,
+    rigging: Rigging | None = None,
 ) -> str:
     """Return a job's fields as text. Raises LightpaintError for objects in memory."""
     groups = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
@@ -53,7 +56,14 @@ def encode_job(
             )
     basis_record = {type(basis).__name__: asdict(basis)} if basis else None
     record = JobRecord(
-        tuple(scenes), tuple(targets), basis_record, constraints, settings, folder, by_sensor
+        tuple(scenes),
+        tuple(targets),
+        basis_record,
+        constraints,
+        settings,
+        folder,
+        by_sensor,
+        rigging or Rigging(),
     )
     # `item` makes NumPy's numbers Python's.
     data = {"format": FORMAT, **asdict(record)}

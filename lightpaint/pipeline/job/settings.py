@@ -58,6 +58,7 @@ class Settings(Fit):
         refine: Rounds of rendering the solved scene, with as many samples as the basis, and
             improving the answer; needs a scene.
         suggest: Most point lights to suggest; needs a scene, and a single view.
+        move_lights: Whether lights that may move do; False leaves all where they are.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
         verify: Whether to render the relit scene and compare it with the prediction, with at most
             as many samples as the basis, so that it takes no longer.
@@ -90,6 +91,7 @@ class Settings(Fit):
     noise_correction: bool | None = None
     refine: int = 0
     suggest: int = 0
+    move_lights: bool = True
     cd_per_unit: float | None = None
     verify: bool = True
     verify_spp: int | None = None
@@ -112,6 +114,7 @@ class Settings(Fit):
         "noise_correction": SWITCH,
         "refine": whole(0, MAX_REFINE),
         "suggest": whole(0, MAX_SUGGEST),
+        "move_lights": SWITCH,
         "cd_per_unit": number("cd/m²"),
         "verify": SWITCH,
         "verify_spp": whole(2, MAX_SPP),
@@ -195,6 +198,7 @@ class SettingsByName(TypedDict, total=False):
     noise_correction: bool | None
     refine: int
     suggest: int
+    move_lights: bool
     cd_per_unit: float | None
     verify: bool
     verify_spp: int | None

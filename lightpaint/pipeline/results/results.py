@@ -20,6 +20,7 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
+from lightpaint.placement.place import Placement
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
@@ -81,6 +82,7 @@ class Look:
         verification: Comparison of the prediction with a render; None without a scene.
         analysis: How certain the lights are, and why the answer is not closer.
         suggestions: Lights that would help most; None if not requested.
+        placement: The places that were found for lights; None if none may move.
 
     Examples:
         >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
@@ -96,6 +98,7 @@ class Look:
     verification: Verification | None
     analysis: Analysis
     suggestions: tuple[Suggestion, ...] | None = None
+    placement: Placement | None = None
 
     def __repr__(self) -> str:
         return f"Look(of {self.target.name}: {self.verdict})"

@@ -1,7 +1,8 @@
 """The lights file: which lights to adjust and which to tie, in a TOML beside the scene.
 
-For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. Its constraints are kept
-as they are; lighting/constraints/constraints_file.py reads them.
+For `hall.xml` that is `hall.lights.toml`; docs/formats.md has the details. Its constraints and what
+it lets move are kept as they are; lighting/constraints/constraints_file.py and placement/rigging/
+read them.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -20,7 +21,9 @@ SUFFIX = ".lights.toml"
 CONSTRAINTS = ("light", "tie", "prefer_current", "sparse")
 #: Older key for `prefer_current`, as in `prefer = { current = 0.01 }`.
 OLDER = ("prefer",)
-KNOWN_KEYS = ("lights", "groups", "group_alike", *CONSTRAINTS)
+#: Keys of what may move, and those of a light in `[light.NAME]`.
+RIGGING, MOVES = ("on", "new", "pair"), ("move", "aim", "cone")
+KNOWN_KEYS = ("lights", "groups", "group_alike", *CONSTRAINTS, *RIGGING)
 
 #: Longest lights file that is read, in bytes.
 MAX_BYTES = 2**20
@@ -28,7 +31,7 @@ MAX_BYTES = 2**20
 
 @dataclass(frozen=True)
 class SceneRequests:
-    """The constraints of a lights file, as they stand there.
+    """The constraints of a lights file and what it lets move, as they stand there.
 
     source: the file, for errors; "" if there is none, and so no constraints.
     """
@@ -38,21 +41,24 @@ class SceneRequests:
 
     @classmethod
     def of(cls, path: Path, data: Mapping[str, Any]) -> "SceneRequests":
-        """Return the constraints among all keys of the lights file at `path`."""
-        return cls({key: data[key] for key in (*CONSTRAINTS, *OLDER) if key in data}, str(path))
+        """Return the requests among all keys of the lights file at `path`."""
+        known = (*CONSTRAINTS, *OLDER, *RIGGING)
+        return cls({key: data[key] for key in known if key in data}, str(path))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names and patterns of lights with constraints."""
         lights, ties = self.keys.get("light"), self.keys.get("tie")
-        return (*(lights if isinstance(lights, dict) else ()), *_texts(ties))
+        named = lights if isinstance(lights, dict) else ()
+        return (*named, *_texts(ties), *_texts(self.keys.get("pair")))
 
 
 @dataclass(frozen=True)
 class LightsFile:
     """The content of a lights file. path: None if there is none.
 
-    lights, groups, group_alike: as in `choose_lights`. requests: the constraints on lights.
+    lights, groups, group_alike: as in `choose_lights`. requests: the constraints on lights and what
+    may move.
     """
 
     path: Path | None = None

@@ -1,0 +1,206 @@
+"""Checks of what a lights file says of places: one clear line names the key of a wrong value."""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from lightpaint.errors import ConstraintError
+from lightpaint.files import one_line
+from lightpaint.lighting.constraints.constraints import LightConstraint
+from lightpaint.lighting.constraints.values import check_keys
+from lightpaint.scene.lights.lights_file import MOVES
+from lightpaint.scene.properties.pose import FARTHEST
+from lightpaint.validation import MAX_LISTED, MAX_NAME
+
+#: The ways to permit places; keys of a rail or surface.
+PLACE_KEYS = ("within", "box", "along", "on")
+ON_KEYS = ("line", "shapes", "clear")
+
+#: Kinds of new lights.
+KINDS = ("point", "spot", "panel")
+
+#: Keys of a light to add that say where and how it hangs, and constraints that it may have.
+NEW_KEYS = ("kind", "like", "name", "count", "on", "box", "aim", "cone", "size", "apart", "in_view")
+NEW_CONSTRAINTS = ("limits", "color", "kelvin", "duv", "primaries")
+
+#: Most lights that one table adds: a larger number is a typing error.
+MAX_COUNT = 100
+
+#: A plane across an axis, as `mirror` has it.
+_PLANE = re.compile(r"\s*([xyz])\s*=\s*(\S+)\s*")
+
+
+def check_move(table: Mapping[str, Any], where: str) -> None:
+    """Raise ConstraintError unless these are good values of `move`, `aim` and `cone`."""
+    check_keys(table, MOVES, where)
+    if "move" in table:
+        _check_places(table["move"], f"{where}.move")
+    _check_turns(table, where)
+
+
+def check_on(table: Mapping[str, Any], where: str) -> None:
+    """Raise ConstraintError unless it is a rail, or a surface of shapes."""
+    check_keys(table, ON_KEYS, where)
+    if ("line" in table) == ("shapes" in table):
+        raise ConstraintError(
+            f"{where} has {'both line and' if 'line' in table else 'neither line nor'} shapes: "
+            "expected line, two points of a rail, or shapes, a list of names"
+        )
+    if "line" in table:
+        ends = table["line"]
+        if not _is_segment(ends) or list(ends[0]) == list(ends[1]):
+            raise _wrong(f"{where}.line", ends, "two different points, [[x, y, z], [x, y, z]]")
+        if "clear" in table:
+            raise ConstraintError(f"{where}.clear is for shapes: a rail hangs where its line is")
+        return
+    names_of(table["shapes"], f"{where}.shapes")
+    if "clear" in table and not (_is_number(table["clear"]) and 0 <= table["clear"] <= FARTHEST):
+        raise _wrong(f"{where}.clear", table["clear"], "the distance from the surface, like 0.1")
+
+
+def check_new(table: Mapping[str, Any], where: str) -> None:
+    """Raise ConstraintError unless it describes lights to add."""
+    check_keys(table, (*NEW_KEYS, *NEW_CONSTRAINTS), where)
+    if ("kind" in table) == ("like" in table):
+        raise ConstraintError(
+            f"{where} has {'both kind and' if 'kind' in table else 'neither kind nor'} like: "
+            f"expected kind, {', '.join(KINDS)}, or like, the name of a light"
+        )
+    kind = table.get("kind", "")
+    if "kind" in table and kind not in KINDS:
+        raise _wrong(f"{where}.kind", kind, f"one of {', '.join(KINDS)}")
+    for key in ("like", "name"):
+        if key in table and not _is_name(table[key]):
+            raise _wrong(f"{where}.{key}", table[key], "the name of a light")
+    count = table.get("count", 1)
+    if not (type(count) is int and 1 <= count <= MAX_COUNT):
+        raise _wrong(f"{where}.count", count, f"a whole number from 1 to {MAX_COUNT}")
+    if "on" in table and "box" in table:
+        raise ConstraintError(f"{where} has both on and box: leave one out")
+    if "on" in table:
+        names_of(table["on"], f"{where}.on")
+    if "box" in table and not _is_segment(table["box"]):
+        raise _wrong(f"{where}.box", table["box"], "two corners, [[x, y, z], [x, y, z]]")
+    if "apart" in table and not (_is_number(table["apart"]) and 0 <= table["apart"] <= FARTHEST):
+        raise _wrong(f"{where}.apart", table["apart"], "a distance >= 0, like 0.5")
+    if not isinstance(table.get("in_view", True), bool):
+        raise _wrong(f"{where}.in_view", table["in_view"], "true or false")
+    if "size" in table:
+        _check_size(table["size"], kind, f"{where}.size")
+    if kind in ("point", "panel") and "cone" in table:
+        raise ConstraintError(f"{where} has the key 'cone': a {kind} has none")
+    if kind == "point" and "aim" in table:
+        raise ConstraintError(f"{where} has the key 'aim': a point light points nowhere")
+    _check_turns(table, where)
+    LightConstraint.of(constraint_of(table), where=where)
+
+
+def constraint_of(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those keys of a light to add that are constraints."""
+    return {key: value for key, value in table.items() if key in NEW_CONSTRAINTS}
+
+
+def check_pair(table: Mapping[str, Any], where: str) -> None:
+    """Raise ConstraintError unless it names two lights and a plane between them."""
+    check_keys(table, ("lights", "mirror"), where)
+    lights: Any = table.get("lights")
+    if not (_is_list(lights, 2) and all(map(_is_name, lights)) and lights[0] != lights[1]):
+        raise _wrong(f"{where}.lights", lights, 'the names of two lights, ["left", "right"]')
+    mirror_of(table.get("mirror"), f"{where}.mirror")
+
+
+def mirror_of(value: Any, where: str) -> tuple[int, float]:
+    """Return the axis, 0 to 2, and the coordinate of a plane like `x = 0`."""
+    match = _PLANE.fullmatch(value) if isinstance(value, str) and len(value) < MAX_NAME else None
+    try:
+        at = float(match[2]) if match else math.nan
+    except ValueError:
+        at = math.nan
+    if match is None or not abs(at) <= FARTHEST:
+        raise _wrong(where, value, 'a plane like "x = 0"')
+    return "xyz".index(match[1]), at
+
+
+def names_of(value: Any, where: str) -> tuple[str, ...]:
+    """Return a name, or a list of names."""
+    listed = (value,) if isinstance(value, str) else value
+    if (
+        not isinstance(listed, Sequence)
+        or not 0 < len(listed) <= MAX_LISTED
+        or not all(map(_is_name, listed))
+    ):
+        raise _wrong(where, value, 'a name or a list of names, ["a", "b"]')
+    return tuple(listed)
+
+
+def _check_places(value: Any, where: str) -> None:
+    """Raise ConstraintError unless it says where a light may hang."""
+    if _is_number(value):
+        value = {"within": value}
+    if not isinstance(value, Mapping):
+        raise _wrong(where, value, "a distance, like 1.0, or a table, { within = 1.0 }")
+    check_keys(value, PLACE_KEYS, where)
+    given = [key for key in PLACE_KEYS if key in value]
+    if given not in (["within"], ["box"], ["on"], ["within", "along"]):
+        raise ConstraintError(
+            f"{where} has {' and '.join(given) or 'nothing'}: expected one of within, box, on, or "
+            "along and within"
+        )
+    if "within" in value and not (_is_number(value["within"]) and 0 < value["within"] <= FARTHEST):
+        raise _wrong(f"{where}.within", value["within"], "a distance > 0, like 1.0")
+    if "box" in value and not _is_segment(value["box"]):
+        raise _wrong(f"{where}.box", value["box"], "two corners, [[x, y, z], [x, y, z]]")
+    if "along" in value and not (_is_point(value["along"]) and any(value["along"])):
+        raise _wrong(f"{where}.along", value["along"], "a direction, like [0, 0, 1]")
+    if "on" in value:
+        names_of(value["on"], f"{where}.on")
+
+
+def _check_turns(table: Mapping[str, Any], where: str) -> None:
+    """Raise ConstraintError for values of `aim` and `cone` that mean nothing."""
+    aim = table.get("aim", True)
+    if not isinstance(aim, bool) and not (_is_number(aim) and 0 < aim <= 180):
+        raise _wrong(f"{where}.aim", aim, "degrees from 0 to 180, or true for any direction")
+    if "cone" in table:
+        cone = table["cone"]
+        is_pair = _is_list(cone, 2) and all(map(_is_number, cone))
+        if not (is_pair and 1 < cone[0] <= cone[1] < 90):
+            raise _wrong(f"{where}.cone", cone, "two angles, from 1 to 90 degrees, like [10, 45]")
+
+
+def _check_size(value: Any, kind: str, where: str) -> None:
+    if kind not in ("panel", ""):
+        raise ConstraintError(f"{where} is for panels: a {kind} has no size")
+    sides = [value, value] if _is_number(value) else value
+    if not (
+        _is_list(sides, 2)
+        and all(map(_is_number, sides))
+        and all(0 < side <= FARTHEST for side in sides)
+    ):
+        raise _wrong(where, value, "width and height, like [0.6, 0.6]")
+
+
+def _wrong(where: str, value: Any, expected: str) -> ConstraintError:
+    return ConstraintError(f"{where} is {one_line(repr(value))}: expected {expected}")
+
+
+def _is_segment(value: Any) -> bool:
+    return _is_list(value, 2) and all(map(_is_point, value))
+
+
+def _is_point(value: Any) -> bool:
+    return _is_list(value, 3) and all(_is_number(x) and abs(x) <= FARTHEST for x in value)
+
+
+def _is_list(value: Any, count: int) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str) and len(value) == count
+
+
+def _is_number(value: Any) -> bool:
+    # bool is an int to Python, and no number to people.
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_name(value: Any) -> bool:
+    return isinstance(value, str) and 0 < len(value) <= MAX_NAME

@@ -1,0 +1,124 @@
+"""Lights that may move are placed by a solve, verified, and written into the user's text."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from renderer import write_room
+
+import lightpaint as lp
+from lightpaint.errors import LightpaintError
+from lightpaint.files import write_bytes
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_reader import load_scene
+
+AIMED = lp.Pose(target=(-0.6, 0, -0.3))
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Scene:
+    return load_scene(write_room(tmp_path))
+
+
+def painted(room: Scene) -> lp.Target:
+    """The room with its spot aimed elsewhere."""
+    goal = lp.render_basis(room.moved({"beam": AIMED}), spp=256, seed=2).present_look
+    return lp.Target.of(goal)
+
+
+def test_a_spot_that_may_turn_is_turned_and_nothing_else_is_rendered_again(
+    room: Scene, tmp_path: Path
+) -> None:
+    passes: list[str] = []
+    look = lp.paint_with_light(
+        room,
+        painted(room),
+        tmp_path / "answer",
+        rigging=lp.Rigging.of({"beam": {"aim": True}}),
+        spp=256,
+        space="linear",
+        hold=0,
+        progress=lambda label, done, total, unit="": passes.append(label),
+    )
+    assert look.placement is not None
+    [move] = look.placement.moves
+    assert move.name == "beam"
+    assert look.verification is not None
+    assert look.verification.agrees
+    there = room.moved({"beam": AIMED}).light("beam").members[0].site
+    relit = load_scene(tmp_path / "answer" / "relit.xml")
+    assert np.dot(relit.light("beam").members[0].site.direction, there.direction) > np.cos(0.07)
+    # The planes of the others are those of the first basis, but for the rounding of its storage.
+    first = lp.render_basis(room, spp=256)
+    for k, name in enumerate(first.names):
+        same = np.allclose(look.basis.image(name), first.image(name), rtol=2e-3, atol=1e-5)
+        assert same == (name != "beam"), (k, name)
+
+
+def test_the_text_of_the_scene_changes_only_where_the_light_hangs(
+    room: Scene, tmp_path: Path
+) -> None:
+    options = {"spp": 64, "space": "linear", "hold": 0, "verify": False, "report": False}
+    rigging, target = lp.Rigging.of({"beam": {"aim": True}}), painted(room)
+    lp.paint_with_light(room, target, tmp_path / "a" / "moved", rigging=rigging, **options)
+    lp.paint_with_light(room, target, tmp_path / "a" / "fixed", **options)
+    moved, fixed = (
+        re.sub(r'value="[^"]*"', "", (tmp_path / "a" / name / "relit.xml").read_text())
+        for name in ("moved", "fixed")
+    )
+    without = [re.sub(r"\s*<lookat[^>]*>\s*", "", text) for text in (moved, fixed)]
+    assert without[0] == without[1]
+    assert re.findall("<lookat[^>]*>", moved) != re.findall("<lookat[^>]*>", fixed)
+
+
+def test_no_move_leaves_all_where_it_is(room: Scene, tmp_path: Path) -> None:
+    look = lp.paint_with_light(
+        room,
+        painted(room),
+        tmp_path / "answer",
+        rigging=lp.Rigging.of({"beam": {"aim": True}}),
+        spp=16,
+        move_lights=False,
+        verify=False,
+        report=False,
+    )
+    assert look.placement is None
+
+
+def test_places_need_a_scene(room: Scene, tmp_path: Path) -> None:
+    basis = lp.render_basis(room, spp=4)
+    with pytest.raises(LightpaintError, match="lights can only move in their scene"):
+        lp.paint_with_light(
+            None,
+            lp.Target.of(basis.present_look),
+            tmp_path / "answer",
+            basis=basis,
+            rigging=lp.Rigging.of({"beam": {"aim": 30}}),
+        )
+
+
+def test_the_lights_file_of_the_scene_lets_lights_move(tmp_path: Path) -> None:
+    path = write_room(tmp_path)
+    write_bytes(tmp_path / "room.lights.toml", b"[light.beam]\naim = 40\n")
+    scene = load_scene(path)
+    target = lp.Target.of(lp.render_basis(scene, spp=4).present_look)
+    job = lp.Job((scene,), (target,), tmp_path / "answer")
+    assert [name for name, _, _ in job.all_rigging.lights] == ["beam"]
+
+
+def test_a_job_is_sent_with_what_may_move(tmp_path: Path) -> None:
+    path = write_room(tmp_path)
+    scene = load_scene(path)
+    look = lp.render_basis(scene, spp=4).present_look
+    write_rgb(tmp_path / "p.exr", look)
+    rigging = lp.Rigging.of(
+        {"beam": {"aim": 30, "move": {"on": "rail"}}},
+        on={"rail": {"line": [[0, 1, 0], [1, 1, 0]]}},
+    )
+    sources = (lp.SceneFile(str(path)),), (lp.Painting(str(tmp_path / "p.exr")),)
+    job = lp.Job(*sources, tmp_path / "out", rigging=rigging)
+    again = lp.Job.from_json(job.to_json())
+    assert again == job
+    assert repr(again.rigging) == repr(rigging)
