@@ -12,8 +12,9 @@ from lightpaint.lighting.constraints.white_lights import whiten_open_lights
 from lightpaint.lighting.fit import Fit
 from lightpaint.lighting.loss.weight_penalty import weight_pull
 from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.lighting.unknowns.gamuts import Gamuts
-from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
+from lightpaint.lighting.unknowns.reduction import Reduction
 from lightpaint.screen import short_repr
 
 

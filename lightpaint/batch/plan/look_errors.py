@@ -13,7 +13,7 @@ from lightpaint.batch.manifest.keys import Mistakes
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LOOK_ERRORS, LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
-from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.pipeline.job.sources import check_nothing_unused, content
 from lightpaint.scene.quality_presets import on_film
 

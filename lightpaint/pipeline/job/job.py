@@ -21,7 +21,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
 from lightpaint.lighting.fit import resolve_for_targets
-from lightpaint.lighting.unknowns.reduction import reduce_to
+from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.pipeline.job.job_record import decode_job, encode_job
 from lightpaint.pipeline.job.remarks import (
     remarks_of_film,
