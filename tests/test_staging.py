@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from lightpaint.errors import OutputError
-from lightpaint.storage import mount_points, staging
+from lightpaint.storage import staging
 from lightpaint.storage.staging import JOURNAL, MARK, finish, staged
 
 EARLIER = {"a": "earlier", "deep/b": "earlier", "view/c": "earlier"}
@@ -303,5 +303,5 @@ def test_a_disk_without_locks(look: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 @pytest.mark.skipif(sys.platform != "linux", reason="mounts are asked of Linux")
 def test_mounts_are_known() -> None:
-    assert mount_points.is_mounted(Path("/proc"))
-    assert not mount_points.is_mounted(Path(__file__).parent)
+    assert staging.is_mounted(Path("/proc"))
+    assert not staging.is_mounted(Path(__file__).parent)

@@ -217,6 +217,10 @@ class Basis(Shown):
             origin=replace(self.origin, extra_spp=0.0),
         )
 
+    def without_cached_values(self) -> "Basis":
+        """Return this basis without what was computed of its planes, which have changed since."""
+        return replace(self)
+
     def with_requests(self, requests: SceneRequests) -> "Basis":
         """Return this basis with other requests for its lights."""
         return (

@@ -22,7 +22,6 @@ from lightpaint.file_reading import MAX_TEXT, read_text
 from lightpaint.files import flush, write_text
 from lightpaint.signals import interruptible_between_pieces
 from lightpaint.storage.json_records import read_record, strict_json
-from lightpaint.storage.mount_points import is_mounted
 
 #: Part of the names of hidden folders: `.evening.lightpaint-1a2b3c4d` beside `evening`.
 MARK = ".lightpaint-"
@@ -214,3 +213,15 @@ def _is_abandoned(folder: Path) -> bool:
         return time.time() - folder.stat().st_mtime > LEFTOVER_S
     finally:
         os.close(descriptor)
+
+
+def is_mounted(folder: Path) -> bool:
+    """Return True if something is mounted at `folder`, a real path, or it is the root of a disk."""
+    if os.path.ismount(folder):
+        return True
+    with suppress(OSError):
+        # Only this file shows a bind mount from the same disk. It writes blanks as \040.
+        for line in Path("/proc/self/mountinfo").read_text("utf-8", "surrogateescape").splitlines():
+            if line.split()[4].replace("\\040", " ") == str(folder):
+                return True
+    return False

@@ -136,7 +136,7 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
         if planes is not its:
             for plane, rounded in zip(planes, its, strict=True):
                 plane[...] = rounded
-    return replace(basis)  # which knows nothing of what was computed before
+    return basis.without_cached_values()
 
 
 @keywords()

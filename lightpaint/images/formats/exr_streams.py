@@ -24,9 +24,6 @@ VERSION, LONG_NAMES, LONGEST_NAME = 2, 0x400, 31
 #: Bytes of a header at most, with as many channels as a light has, but for its texts.
 PLAIN_HEAD_BYTES = 2048
 
-#: Bytes of name, type and length of a text.
-LONGEST_TEXT_HEAD = 64
-
 #: OpenEXR's numbers for no compression and for ZIP of 16 lines; and the level of ZIP.
 PLAIN, ZIPPED, LEVEL = 0, 3, 4
 
