@@ -15,7 +15,7 @@ from lightpaint.basis.cache.plane_reuse import (
     merge,
     restrict,
 )
-from lightpaint.basis.file.basis_file import as_stored, is_large
+from lightpaint.basis.file.basis_file import as_stored, is_large, leave_indirect
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import (
     ONE_PASS,
@@ -119,7 +119,9 @@ def obtain_basis(
     basis = _marked(basis, is_composed=is_composed)
     if not is_large(len(basis.lights), basis.size):
         # As from its file, so that the next run finds the same.
-        return replace(as_stored(basis, keep), sums=None)
+        basis = replace(as_stored(basis, keep), sums=None)
+        file = cache.file_of(basis)
+        return basis if file is None else leave_indirect(basis, file)
     if keep(basis):
         of_file = cache.find(scene.identity, basis.origin.sensor, seed, basis.size)
         if of_file is not None and of_file.origin == basis.origin:

@@ -161,7 +161,7 @@ def read_basis(path: str | Path) -> Basis:
             return replace(large, source=str(path))
         parts = read_parts(path)
         head = _head(p.attributes for p in parts)
-        return replace(_basis_of_parts(parts, head), source=str(path))
+        return replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
     except BasisError as error:
         raise BasisError(f"{path} {error}") from error
     except _HEADER_ERRORS as error:
@@ -173,6 +173,32 @@ def read_basis(path: str | Path) -> Basis:
 def is_encoded(lights: int, size: tuple[int, int]) -> bool:
     """Return whether memory holds planes of so many lights as their file does."""
     return 12 * lights * size[0] * size[1] > SINGLES_MAX_BYTES
+
+
+def leave_indirect(basis: Basis, path: Path) -> Basis:
+    """Return `basis` with indirect planes whose rows are read on demand, if it has many lights.
+
+    Only pictures need them, and memory holds no more of a light then than if it had none. path: of
+    a file that holds just this basis; if it does not, or is of another kind, nothing changes.
+    """
+    if basis.indirect is None or not is_encoded(len(basis.lights), basis.size):
+        return basis
+    try:
+        file = RowFile(path)
+        lit = {
+            strict_json(p.texts[LIGHT_KEY])["name"]: p for p in file.parts if LIGHT_KEY in p.texts
+        }
+        parts = [lit[name] for name in basis.names]
+        origin = read_record(Origin, strict_json(_head(p.texts for p in file.parts)[ORIGIN_KEY]))
+    except (RowsUnsupportedError, OSError, BasisError, *_HEADER_ERRORS):
+        return basis
+    if origin != basis.origin or any({p.size, p.display} != {basis.size} for p in parts):
+        return basis
+    scales = [scales_of(p.texts) for p in parts]
+    images, noise = (
+        FilePlanes(file, parts, PLANE_CHANNELS[k], [its[k] for its in scales]) for k in (2, 3)
+    )
+    return replace(basis, indirect=IndirectLight(images, noise))
 
 
 def _encoded(basis: Basis) -> Basis:

@@ -9,7 +9,7 @@ import mmap
 import os
 import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -140,17 +140,8 @@ class BandedFilm(FilmSums):
 
         They are made of the sums as these are when they are asked for. spp: samples of a half.
         """
-        n = len(self._tracer.scene.lights)
-        direct, indirect = slice(0, n), slice(n, 2 * n)
-        is_split = self.sums.array.shape[1] > n
-        parts = [(direct, indirect), (indirect,)] if is_split else [(direct,)]
-        return [
-            (
-                SumPlanes(self.sums, part, spp, is_noise=False),
-                SumPlanes(self.sums, part, spp, is_noise=True),
-            )
-            for part in parts
-        ]
+        sets = SumSets(self.sums, len(self._tracer.scene.lights), spp)
+        return [(SumPlanes(sets, k), SumPlanes(sets, k + 1)) for k in range(0, sets.count, 2)]
 
 
 class FileSums:
@@ -184,15 +175,9 @@ class FileSums:
         self.array[half, :, rows.start : rows.stop] = sums
         self._release()
 
-    def halves(self, parts: Sequence[slice], lights: slice, rows: slice) -> list[Floats]:
-        """Return the sums of both halves of some lights and rows, with all `parts` added up."""
-        made = []
-        for half in self.array:
-            total, *others = (half[part][lights, rows] for part in parts)
-            total = np.array(total)
-            for other in others:
-                total += other
-            made.append(total)
+    def halves(self, planes: slice, rows: slice) -> list[Floats]:
+        """Return a copy of the sums of both halves of some planes and rows."""
+        made = [np.array(half[planes, rows]) for half in self.array]
         self._release()
         return made
 
@@ -202,35 +187,66 @@ class FileSums:
             self.array._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
 
 
-class SumPlanes(RowPlanes):
-    """Planes made of the sums in a file when they are asked for.
+class SumSets:
+    """The sets of planes that sums in a file amount to: images and half differences of all light
+    and, where it is apart, of indirect light.
 
-    parts: which planes of the sums are added up. spp: samples per pixel of each half. is_noise:
-    whether they are half differences, or means.
+    Whoever asks for a plane of one asks for that of the others next, so that those of the last
+    light are kept. lights: how many. spp: samples per pixel of each half.
     """
 
-    def __init__(self, sums: FileSums, parts: Sequence[slice], spp: int, *, is_noise: bool) -> None:
-        self._sums, self._parts, self._spp, self._is_noise = sums, tuple(parts), spp, is_noise
+    def __init__(self, sums: FileSums, lights: int, spp: int) -> None:
+        self._sums, self.lights, self._spp = sums, lights, spp
+        _, planes, height, width, _ = sums.array.shape
+        self.size = height, width
+        #: Number of sets.
+        self.count = 4 if planes > lights else 2
+        self._last: tuple[int, list[Floats]] = (-1, [])
+
+    def of_light(self, i: int) -> list[Floats]:
+        """Return the planes of light i in all sets, (h, w, 3) each."""
+        last, planes = self._last
+        if last != i:
+            del planes
+            self._last = (-1, [])  # whose memory is free for the next
+            planes = [its[0] for its in self.rows(slice(i, i + 1), slice(None))]
+            self._last = (i, planes)
+        return planes
+
+    def rows(self, lights: slice, rows: slice) -> list[Floats]:
+        """Return some rows of some lights in all sets, (lights, rows, w, 3) each."""
+        total = self._sums.halves(lights, rows)
+        if self.count == 2:
+            return [*mean_and_half_difference(total, (self._spp, self._spp))]
+        its_indirect = slice(self.lights + lights.start, self.lights + lights.stop)
+        indirect = self._sums.halves(its_indirect, rows)
+        for its, part in zip(total, indirect, strict=True):
+            its += part
+        pairs = [mean_and_half_difference(its, (self._spp, self._spp)) for its in (total, indirect)]
+        return [plane for pair in pairs for plane in pair]
+
+
+class SumPlanes(RowPlanes):
+    """Planes made of the sums in a file when they are asked for. number: which of the sets."""
+
+    def __init__(self, sets: SumSets, number: int) -> None:
+        self._sets, self._number = sets, number
 
     @property
     def count(self) -> int:
         """n."""
-        return int(self._parts[0].stop - self._parts[0].start)
+        return self._sets.lights
 
     @property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
-        height, width = self._sums.array.shape[2:4]
-        return height, width
+        return self._sets.size
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        return np.asarray(self._planes(slice(i, i + 1), slice(None))[0])
+        return self._sets.of_light(i)[self._number]
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return some rows of all planes, (n, bottom - top, w, 3)."""
-        return self._planes(slice(None), slice(max(top, 0), max(bottom, 0)))
-
-    def _planes(self, lights: slice, rows: slice) -> Floats:
-        halves = self._sums.halves(self._parts, lights, rows)
-        return mean_and_half_difference(halves, (self._spp, self._spp))[int(self._is_noise)]
+        rows = slice(max(top, 0), max(bottom, 0))
+        return self._sets.rows(slice(0, self.count), rows)[self._number]

@@ -14,7 +14,9 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cached_render import obtain_basis
 from lightpaint.basis.file import basis_file
+from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes
+from lightpaint.basis.planes import MemoryPlanes
 from lightpaint.basis.render import banded_film, guide_training
 from lightpaint.basis.render.banded_film import FileSums, SumPlanes
 from lightpaint.basis.render.basis_render import render_basis
@@ -105,6 +107,51 @@ def test_an_interrupted_band_goes_on_to_the_same_bits(
     found = obtain_basis(small_room, spp=20, seed=3)
     assert isinstance(found.planes, EncodedPlanes)
     assert_equal_bits(found, basis_file.as_stored(whole))
+
+
+def test_sums_are_read_once_to_write_all_planes(
+    small_room: Scene, in_bands: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    found = render_basis(small_room, spp=4, seed=3)
+    read: list[int] = []
+    plain = FileSums.halves
+
+    def counted(sums: FileSums, planes: slice, rows: slice) -> Any:
+        read.extend(range(*planes.indices(2 * len(small_room.lights))))
+        return plain(sums, planes, rows)
+
+    monkeypatch.setattr(FileSums, "halves", counted)
+    basis_file.write_basis(tmp_path / "a.basis.exr", found)
+    assert sorted(read) == [*range(2 * len(small_room.lights))]
+
+
+def test_indirect_planes_of_many_lights_stay_in_their_file(
+    small_room: Scene, whole: Basis, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Rendered, found again, and of a file: with the bits that memory would have."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    expected = basis_file.as_stored(render_basis(small_room, spp=20, seed=3))
+    assert isinstance(expected.indirect.planes, MemoryPlanes)  # type: ignore[union-attr]
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    path = tmp_path / "a.basis.exr"
+    basis_file.write_basis(path, whole)
+    rendered, kept = (obtain_basis(small_room, spp=20, seed=3) for _ in range(2))
+    for found in (rendered, kept, basis_file.read_basis(path)):
+        assert isinstance(found.planes, EncodedPlanes)
+        assert found.indirect is not None
+        assert isinstance(found.indirect.planes, FilePlanes)
+        assert isinstance(found.indirect.noise, FilePlanes)
+        assert_equal_bits(found, expected)
+
+
+def test_indirect_planes_of_another_file_are_not_taken(
+    small_room: Scene, whole: Basis, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(basis_file, "SINGLES_MAX_BYTES", 0)
+    path = tmp_path / "a.basis.exr"
+    basis_file.write_basis(path, render_basis(small_room, spp=4, seed=3))
+    assert basis_file.leave_indirect(whole, path) is whole
+    assert basis_file.leave_indirect(whole, tmp_path / "none.exr") is whole
 
 
 def test_memory_is_that_of_half_floats_and_some_bands(
