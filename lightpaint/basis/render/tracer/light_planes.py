@@ -61,10 +61,10 @@ class LightPlanes:
         nothing._keeps = dr.opaque(mi.Bool, False)
         return nothing
 
-    def add(self, pixel, emitter, value, is_indirect, active):
+    def add(self, pixel, emitter, value, bounces, active):
         """Add RGB values to the plane of the light that `emitter` belongs to.
 
-        is_indirect: whether more than one surface has scattered them.
+        bounces: how many surfaces have scattered them; of more than one the light is indirect.
         What is no number, as one path in a hundred million carries, is left out: a pixel of it
         would make all sums over the picture none.
         """
@@ -72,7 +72,7 @@ class LightPlanes:
         instance = dr.reinterpret_array(mi.UInt32, emitter)
         light = dr.gather(mi.UInt32, self._light_of, instance, active)
         if self._first_indirect:
-            light[is_indirect] += self._first_indirect
+            light[bounces > 1] += self._first_indirect
         place = dr.fma(light, self._pixels, pixel) * 3
         for channel in range(3):
             self._add_one(self._sums, value[channel], place + channel, active)
