@@ -14,7 +14,12 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
 from lightpaint.pipeline.needed_samples import add_needed_samples, problem_of, without_noise
 from lightpaint.pipeline.placed_lights import place_lights
-from lightpaint.pipeline.results.answer_folder import AnswerFolder, new_answer, reload_relit
+from lightpaint.pipeline.results.answer_folder import (
+    AnswerFolder,
+    new_answer,
+    reload_relit,
+    with_places,
+)
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.placement.light_search import suggest_lights
 from lightpaint.placement.place import Placement
@@ -88,6 +93,7 @@ def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
         scenes, solution, rounds=settings.refine, seed=settings.seed, progress=listen
     )
     lighting = replace(solution.lighting, cd_per_unit=settings.cd_per_unit)
+    lighting = with_places(lighting, job.views[0].scene)
     return replace(solution, lighting=lighting)
 
 

@@ -22,7 +22,9 @@ from lightpaint.relit.emission_xml import Changes, set_emission
 from lightpaint.relit.xml_edit import XmlFile
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.new_emitter import new_emitter_at
 from lightpaint.scene.properties.emission import Scaling
+from lightpaint.scene.properties.pose import pose_of
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.screen import some_names
@@ -131,11 +133,12 @@ def check_relightable(scene: Scene, path: Path) -> list[Path]:
 
 
 def scene_of(scene: Scene, lighting: Lighting) -> Scene:
-    """Return `scene` with its emitters tied as `lighting` ties them.
+    """Return `scene` with its emitters tied and placed as `lighting` ties and places them.
 
     Raises LightingError unless it names exactly the emitters of `scene`, and gives each light
     in the unit that the scene has it in.
     """
+    scene = placed_scene(scene, lighting)
     emitter_names = {name for members in lighting.members.values() for name in members}
     scene_names = {emitter.name for emitter in scene.emitters}
     if emitter_names != scene_names:
@@ -153,6 +156,23 @@ def scene_of(scene: Scene, lighting: Lighting) -> Scene:
                 f"as it is now it would be {unit}: solve again"
             )
     return tied
+
+
+def placed_scene(scene: Scene, lighting: Lighting) -> Scene:
+    """Return `scene` with the lights that `lighting` has moved or added, unless it has them."""
+    names = {emitter.name for emitter in scene.emitters}
+    new = [x for x in lighting.places if x.new and x.name not in names]
+    if new:
+        scene = scene.with_new_emitters([new_emitter_at(place) for place in new])
+    sites = {emitter.name: emitter.site for emitter in scene.emitters}
+    poses = {
+        place.name: pose_of(place.site)
+        for place in lighting.places
+        if (place.moved_from is not None or place.new)
+        and place.name in sites
+        and not place.site.is_near(sites[place.name])
+    }
+    return scene.moved(poses) if poses else scene
 
 
 def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:

@@ -7,7 +7,7 @@ time, and no reference to one of its emitters may outlive it.
 import gc
 import hashlib
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,7 +25,8 @@ from lightpaint.scene.lights.new_emitter import NewEmitter, moved_emitter
 from lightpaint.scene.properties.emission import EmitterSetting
 from lightpaint.scene.properties.film import Film, camera_named, reduced, reduction
 from lightpaint.scene.properties.integrator import Integrator, IntegratorChoice
-from lightpaint.scene.properties.pose import Pose, motion_of
+from lightpaint.scene.properties.pose import Pose, motion_of, upward_axis
+from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors, render_errors
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene_inspection import inspect_scene, shape_names
@@ -61,6 +62,7 @@ class Scene(Shown):
         requests: The constraints that it asks for.
         chosen: Names of the lights that `only` left; none where all are there.
         added: Emitters of `with_new_emitters`, which are in no file.
+        old_sites: Where emitters that `moved` has moved are in the file, by name.
 
     Examples:
         >>> scene = lp.load_scene("room.xml")
@@ -89,6 +91,7 @@ class Scene(Shown):
     _parsed: ParsedScene
     chosen: tuple[str, ...] = ()
     added: tuple[NewEmitter, ...] = ()
+    old_sites: Mapping[str, Site] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("lights", "emitters"):
@@ -251,6 +254,7 @@ class Scene(Shown):
             'at (0.50, 1.00, 0.00)'
         """
         motions, elements, added = {}, {}, {x.name: x for x in self.added}
+        old_sites = dict(self.old_sites)
         for name, pose in poses.items():
             emitter = self._emitter(name)
             motion = motion_of(emitter.name, emitter.plugin, emitter.site, pose)
@@ -260,8 +264,24 @@ class Scene(Shown):
                 elements[emitter.name] = "".join(moved.lines())
             else:
                 motions[emitter.node] = motion
+                old_sites.setdefault(emitter.name, emitter.site)
         parsed = self._parsed.with_motions(motions).with_elements(elements)
-        return replace(self._inspected(parsed, ()), added=tuple(added.values()))
+        made = self._inspected(parsed, ())
+        return replace(made, added=tuple(added.values()), old_sites=old_sites)
+
+    @property
+    def emitter_places(self) -> tuple[EmitterPlace, ...]:
+        """Places of the emitters that have a place or a direction."""
+        added = {x.name: x for x in self.added}
+        places = []
+        for emitter in self.emitters:
+            if emitter.site == Site():
+                continue
+            place = EmitterPlace.of(emitter.name, emitter.site, self.old_sites.get(emitter.name))
+            if (new := added.get(emitter.name)) is not None:
+                place = replace(place, new=new.kind, size=new.size)
+            places.append(place)
+        return tuple(places)
 
     @MITSUBA.taken()
     def with_new_emitters(self, emitters: Sequence[NewEmitter]) -> "Scene":
@@ -318,6 +338,12 @@ class Scene(Shown):
                 f"{some_names(light.member_names)}"
             )
         return light.members[0]
+
+    @property
+    def up(self) -> Position:
+        """The axis of the scene that is nearest to what its camera has upwards."""
+        node = self._parsed.state.nodes[self._parsed.sensor_nodes[self.sensor]]
+        return upward_axis(node.props)
 
     @property
     def moved_elements(self) -> tuple[tuple[Path, int, Mapping[str, str]], ...]:

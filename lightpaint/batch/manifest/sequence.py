@@ -13,6 +13,7 @@ from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.colour.hue_names import WHITE_DUV
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.screen import some_names
 
 #: A light that is off begins or ends so many stops below the brighter end, in `log`.
 OFF_STOPS = 10.0
@@ -46,9 +47,19 @@ def frame_position(frame: int, frames: int, keys: int) -> tuple[int, float]:
 def interpolate(ends: Sequence[Lighting], share: float, *, space: Space) -> Lighting:
     """Return the lighting at `share`, 0 to 1, of the way from one to the other.
 
-    Raises LightingError if the two have different lights.
+    Raises LightingError if the two have different lights, or have them at different places.
     """
     first, second = ends
+    apart = [
+        one.name
+        for one, other in zip(first.places, second.places, strict=False)
+        if not one.site.is_near(other.site)
+    ]
+    if apart:
+        raise LightingError(
+            f"the lightings of a sequence have {some_names(apart)} at different places, and "
+            "no lamp travels between two looks: let these share places"
+        )
     if first.members != second.members or first.fixed != second.fixed:
         raise LightingError(
             "the lightings of a sequence are of different lights, or of lights in other groups"

@@ -200,8 +200,8 @@ class _Planner:
             lighting = read_lighting(entry.lighting)
             reads += (Path(entry.lighting),)
             if scene is not None:
-                scene_of(scene, lighting)
-                if (lit := set(lighting)) != (named := {light.name for light in scene.lights}):
+                lights = scene_of(scene, lighting).lights
+                if (lit := set(lighting)) != (named := {light.name for light in lights}):
                     raise BatchError(
                         f"{entry.lighting} has the lights {some_names(sorted(lit))}, and the scene "
                         f"{some_names(sorted(named))}: load it with the same lights and groups"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import RGB, Bools, Doubles, as_rgb
+from lightpaint.arrays import RGB, Bools, Doubles, Position, as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.lights import BasisLight, Lights
 from lightpaint.colour.photometry import Photometry, photometry
@@ -17,6 +17,7 @@ from lightpaint.errors import LightingError, UnknownLightError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
+from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.screen import Shown, some_names, some_of
 from lightpaint.validation import BRIGHTEST
 
@@ -32,6 +33,9 @@ class Lighting(Shown, Mapping[str, LightSetting]):
         scene_identity: The identity of its scene.
         certificate: The certificate of the solve, if there was one.
         cd_per_unit: cd/m² for a radiance of 1, if given.
+        places: Where emitters of its scene are, those that were moved and new ones with all that
+            `relight` needs; none without a scene.
+        up: The direction in the scene that is up, for pan and tilt.
 
     Examples:
         >>> lighting = lp.read_lighting("lighting.json")
@@ -48,6 +52,8 @@ class Lighting(Shown, Mapping[str, LightSetting]):
     scene_identity: str = ""
     certificate: Certificate | None = None
     cd_per_unit: float | None = None
+    places: tuple[EmitterPlace, ...] = ()
+    up: Position = (0.0, 1.0, 0.0)
 
     def __repr__(self) -> str:
         rgb = [" ".join(f"{v:.4g}" for v in light.emission) for light in self.lights]

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from lightpaint.keywords import keywords
 from lightpaint.lighting.answer.certificate import Certificate
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.storage.json_records import fields_of, read_record, strict_json
 from lightpaint.version import __version__
 
@@ -22,7 +23,7 @@ FORMAT = "lightpaint-lighting 1"
 MAX_BYTES = 2**23
 
 #: Fields of a lighting that its file has under their own names.
-PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit")
+PLAIN_FIELDS = ("target", "scene_identity", "cd_per_unit", "up")
 
 #: Fields of a certificate for options of the fit, written where they differ from the paper.
 FIT_FIELDS = ("display", "rounds", "hold", "colors", "noise_removed", "software", "basis_spp")
@@ -69,6 +70,9 @@ def lighting_fields(lighting: Lighting) -> dict[str, Any]:
             for light in lighting.lights
         },
     }
+    if lighting.places:
+        data["up"] = lighting.up
+        data["places"] = {place.name: _place_fields(place) for place in lighting.places}
     if (q := lighting.certificate) is not None:
         data["solve"] = fields_of(
             q, "curve", "bounds", "objective_error", *FIT_FIELDS, *APPEARANCE_FIELDS
@@ -111,7 +115,11 @@ def read_lighting(path: str | Path) -> Lighting:
             certificate = read_record(
                 Certificate, solve_record, required=["unreached"], others=True
             )
-        return replace(lighting, lights=lights, certificate=certificate)
+        places = tuple(
+            read_record(EmitterPlace, {**place, "name": name}, others=True)
+            for name, place in data.get("places", {}).items()
+        )
+        return replace(lighting, lights=lights, certificate=certificate, places=places)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise LightingError(f"{path} is no complete lighting: {one_line(repr(error))}") from None
     except LightingError as error:
@@ -122,6 +130,15 @@ def _read_setting(name: str, data: Mapping[str, Any]) -> LightSetting:
     if data.get("members") == []:
         raise ValueError("members is a list of names, not empty")
     return read_record(LightSetting, {**data, "name": name}, others=True)
+
+
+def _place_fields(place: EmitterPlace) -> dict[str, Any]:
+    """Return the fields of a place that are given."""
+    record = asdict(place)
+    old = record["moved_from"]
+    if old is not None:
+        record["moved_from"] = {key: value for key, value in old.items() if value is not None}
+    return {key: value for key, value in record.items() if value and key != "name"}
 
 
 def _optional_fields(light: LightSetting) -> dict[str, Any]:

@@ -6,7 +6,7 @@ relight and the painter. They add their own pictures and reports.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lightpaint.basis.lightgroups.light_groups import LightGroups
@@ -57,13 +57,22 @@ def write_answer(
     """Write an answer to files for people and programs; return the relit scene.
 
     scene: the scene to relight. groups: light groups of another renderer, which get files for other
-    programs. has_lighting: True if lighting.json exists already, or is not needed.
+    programs. has_lighting: True if lighting.json exists already, or is not needed. A lighting that
+    says nothing of places gets those of the scene.
     """
+    lighting = with_places(lighting, scene)
     if not has_lighting:
         write_lighting(folder / LIGHTING, lighting)
     if groups is not None:
         write_exports(folder, groups, lighting)
     return None if scene is None else relight(scene, lighting, folder / RELIT)
+
+
+def with_places(lighting: Lighting, scene: Scene | None) -> Lighting:
+    """Return a lighting that says where lights are, those of `scene` if it does not."""
+    if scene is None or lighting.places:
+        return lighting
+    return replace(lighting, places=scene.emitter_places, up=scene.up)
 
 
 def answer_files(

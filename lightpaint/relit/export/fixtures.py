@@ -9,11 +9,14 @@ full.
 import csv
 import io
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
-from lightpaint.arrays import RGB
+import numpy as np
+
+from lightpaint.arrays import RGB, Position
 from lightpaint.lighting.answer.light_setting import LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.export.exports import plain_cell
@@ -36,12 +39,35 @@ class Dmx:
 
 
 @dataclass(frozen=True)
+class FixturePlace:
+    """The place of a fixture, in units of the scene.
+
+    x, y, z: where it hangs; None at infinity. target_x, target_y, target_z: a point it points at.
+    pan: degrees around what is up, clockwise from above, from the scene's far side: −z if y is up,
+    y if z is up. tilt: degrees from straight down. cutoff, beam: degrees from the axis of a spot.
+    change: `moved`, `new` or "".
+    """
+
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    target_x: float | None = None
+    target_y: float | None = None
+    target_z: float | None = None
+    pan: float | None = None
+    tilt: float | None = None
+    cutoff: float | None = None
+    beam: float | None = None
+    change: str = ""
+
+
+@dataclass(frozen=True)
 class Fixture:
     """A light with its setting.
 
     red, green, blue: linear emission in `unit`. y: its luminance. lumen, luminous: None
     unless the lighting has a scale. kelvin, duv, hex: None without such a colour. dmx: None for
-    kept lights. emitters: its emitters in the scene.
+    kept lights. emitters: its emitters in the scene. place: of the only one, if it is known.
     """
 
     name: str
@@ -58,6 +84,7 @@ class Fixture:
     luminous_unit: str
     lumen: float | None
     dmx: Dmx | None
+    place: FixturePlace | None = None
 
 
 def fixtures_of(lighting: Lighting) -> list[Fixture]:
@@ -85,7 +112,35 @@ def _fixture(lighting: Lighting, light: LightSetting, full: Mapping[str, float])
         measured.luminous_unit,
         measured.flux_lm,
         dmx,
+        _place_of(lighting, light),
     )
+
+
+def _place_of(lighting: Lighting, light: LightSetting) -> FixturePlace | None:
+    by_name = {place.name: place for place in lighting.places}
+    if len(light.members) > 1 or (place := by_name.get(light.members[0])) is None:
+        return None
+    x, y, z = place.position or (None, None, None)
+    at_x, at_y, at_z = place.site.target or (None, None, None)
+    pan, tilt = pan_and_tilt(place.direction, lighting.up) if place.direction else (None, None)
+    change = "new" if place.new else "moved" if place.moved_from is not None else ""
+    cone = place.cutoff, place.beam
+    return FixturePlace(x, y, z, at_x, at_y, at_z, pan, tilt, *cone, change)
+
+
+def pan_and_tilt(direction: Position, up: Position) -> tuple[float, float]:
+    """Return pan and tilt in degrees, as in `FixturePlace`; straight down has a pan of 0."""
+    axis, way = np.array(up), np.array(direction)
+    ahead = np.array([0.0, 0.0, -1.0]) if abs(axis[1]) > 0.5 else np.array([0.0, 1.0, 0.0])
+    if abs(axis[0]) > 0.5:
+        ahead = np.array([0.0, 0.0, 1.0])
+    right = np.cross(ahead, axis)
+    tilt = math.degrees(math.acos(float(np.clip(-way @ axis, -1, 1))))
+    sideways, along = float(way @ right), float(way @ ahead)
+    if math.hypot(sideways, along) < 1e-6:
+        return 0.0, tilt
+    # Adding 0 takes the sign from what rounds to it.
+    return round(math.degrees(math.atan2(sideways, along)), 6) + 0.0, tilt
 
 
 def dmx_of(emission: RGB, full: float) -> Dmx:
@@ -100,6 +155,7 @@ def dmx_of(emission: RGB, full: float) -> Dmx:
 COLUMNS = (
     *("fixture", "emitters", "unit", "red", "green", "blue", "luminance", "hex", "kelvin", "duv"),
     *("luminous", "luminous_unit", "lumen", "dmx_dimmer", "dmx_red", "dmx_green", "dmx_blue"),
+    *(field.name for field in fields(FixturePlace)),
 )
 
 
@@ -111,8 +167,10 @@ def fixtures_csv(lighting: Lighting) -> str:
     for fixture in fixtures_of(lighting):
         record = asdict(fixture)
         sent = record.pop("dmx") or dict.fromkeys(("dimmer", "red", "green", "blue"))
+        place = record.pop("place") or asdict(FixturePlace())
         record["emitters"] = " ".join(fixture.emitters)
-        table.writerow([_cell(value) for value in (*record.values(), *sent.values())])
+        cells = (*record.values(), *sent.values(), *place.values())
+        table.writerow([_cell(value) for value in cells])
     return text.getvalue()
 
 

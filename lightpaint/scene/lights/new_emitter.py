@@ -6,7 +6,7 @@ are the same scene.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +22,11 @@ from lightpaint.scene.properties.pose import (
     Pose,
     Site,
     across,
+    pose_of,
 )
+from lightpaint.scene.properties.site import EmitterPlace
+from lightpaint.scene.properties.site import NewKind as NewKind
 from lightpaint.validation import MAX_NAME, is_amount
-
-NewKind = Literal["point", "spot", "panel"]
 
 #: Mitsuba's plugin of each kind.
 PLUGIN_OF: dict[NewKind, str] = {"point": "point", "spot": "spot", "panel": "area"}
@@ -152,6 +153,12 @@ class NewEmitter:
     ) -> list[str]:
         start = tag(element, type=plugin or self.plugin, id=self.name).replace("/>", ">")
         return [start, *(f"    {line}" for line in inside), f"</{element}>"]
+
+
+def new_emitter_at(place: EmitterPlace) -> NewEmitter:
+    """Return the new emitter of an answer, at unit emission. Raises SceneError for what is none."""
+    assert place.new
+    return NewEmitter(place.name, place.new, pose_of(place.site), place.size)
 
 
 def moved_emitter(emitter: NewEmitter, site: Site, target: Position | None) -> NewEmitter:

@@ -16,6 +16,7 @@ from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import ENVIRONMENTS
+from lightpaint.scene.properties.site import Site as Site
 
 #: Mitsuba's default cutoff angle of a spot, in degrees, and the share of it that its beam is wide.
 DEFAULT_CUTOFF, DEFAULT_BEAM_SHARE = 20.0, 0.75
@@ -69,18 +70,9 @@ class Pose:
         return f"Pose({', '.join(listed)})"
 
 
-@dataclass(frozen=True)
-class Site:
-    """The place of an emitter in a loaded scene.
-
-    position: None for what is infinitely far away. direction: unit vector that it points along;
-    None for what has none. cutoff, beam: degrees from its axis; None for all but spots.
-    """
-
-    position: Position | None = None
-    direction: Position | None = None
-    cutoff: float | None = None
-    beam: float | None = None
+def pose_of(site: Site) -> Pose:
+    """Return the pose that brings a light to `site`."""
+    return Pose(position=site.position, target=site.target, cutoff=site.cutoff, beam=site.beam)
 
 
 #: Plugins that point somewhere by themselves, and shapes that do if they shine.
@@ -114,6 +106,15 @@ def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
         for key in ("cutoff_angle", "beam_width")
     )
     return Site(_three(matrix[:3, 3]), direction, cutoff, beam)
+
+
+def upward_axis(props: Any) -> Position:
+    """Return the axis nearest to what a sensor with these properties has upwards."""
+    up = np.array([0.0, 1.0, 0.0]) if "to_world" not in props else _matrix(props)[:3, 1]
+    axis = np.zeros(3)
+    k = int(np.argmax(np.abs(up)))
+    axis[k] = 1.0 if up[k] >= 0 else -1.0
+    return _three(axis)
 
 
 def _matrix(parameters: Any) -> Doubles:
