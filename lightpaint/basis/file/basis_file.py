@@ -21,12 +21,9 @@ from lightpaint.basis.file.file_parts import (
     PLANE_CHANNELS,
     checked_text,
     encoded_planes_of,
-    extra_of,
-    features_of,
-    guide_table_of,
+    fields_of_others,
     light_channels,
     light_texts,
-    objects_of,
     other_parts,
     plane_sets,
     scales_of,
@@ -327,11 +324,8 @@ def _checked_basis(
             noise=noise,
             emitters_seen=seen[0] > 0,
             origin=origin,
-            guide_table=guide_table_of(others, checksums),
-            features=features_of(others, images.size),
-            objects=objects_of(others, images.size),
             indirect=IndirectLight(planes(order, 2), planes(order, 3)) if has_indirect else None,
-            extra=extra_of(others, images.size),
+            **fields_of_others(others, checksums, images.size),
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error

@@ -166,6 +166,21 @@ def other_parts(basis: Basis) -> Iterator[ExrPart]:
         yield ExrPart(free_name(EXTRA_PART, basis.names), counts, about_it)
 
 
+def fields_of_others(
+    others: Sequence[ExrPart], checksums: Checksums | None, size: tuple[int, int]
+) -> dict[str, Any]:
+    """Return the fields of a `Basis` that stand in parts of their own, by name.
+
+    size: (height, width) of its planes. Raises BasisError for damaged ones that are needed.
+    """
+    return {
+        "guide_table": guide_table_of(others, checksums),
+        "features": features_of(others, size),
+        "objects": objects_of(others, size),
+        "extra": extra_of(others, size),
+    }
+
+
 def guide_table_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Floats | None:
     """Return the table of the emitter guide; None if missing or damaged: nothing needs it."""
     for channels in (p.channels for p in others if {"received", "asked"} <= p.channels.keys()):
