@@ -1,6 +1,7 @@
 """Lights that may move are placed by a solve, verified, and written into the user's text."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.errors import LightpaintError
 from lightpaint.files import write_bytes
+from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -122,3 +124,26 @@ def test_a_job_is_sent_with_what_may_move(tmp_path: Path) -> None:
     again = lp.Job.from_json(job.to_json())
     assert again == job
     assert repr(again.rigging) == repr(rigging)
+
+
+@pytest.mark.parametrize("space", ["linear", "display"])
+def test_what_is_not_painted_is_held_at_the_look_before_the_move(
+    room: Scene, tmp_path: Path, space: str
+) -> None:
+    """A basis with lights elsewhere is solved for the look that was painted over."""
+    basis = lp.render_basis(room, spp=64, seed=1)
+    moved = lp.render_basis(room.moved({"beam": AIMED}), spp=64, seed=1)
+    look, half = basis.present_look, basis.noise.mix(basis.present_weights)
+    held = replace(moved, former=Estimate(look, half))
+    assert np.array_equal(held.present_look, look)
+    importance = np.zeros(basis.size, np.float32)
+    importance[:2] = 1
+    target = replace(lp.Target.of(look), importance=importance, everything=False)
+    far, near = (lp.solve(its, target, space=space, hold=4, colors="free") for its in (moved, held))
+
+    # Where the look to hold is taken for that of the lights as they hang now, nothing is missed.
+    wrong, right = (sum(x.certificate.relative_objective) for x in (far, near))
+    assert wrong < 1e-6 < 1e-4 < right
+    if space == "linear":
+        counted = np.broadcast_to(near.weight > 0, look.shape)
+        np.testing.assert_allclose(near.image[counted], look[counted], rtol=1e-5)

@@ -65,6 +65,8 @@ class Basis(Shown):
         sums: The undivided sums of both halves of the samples, (n or 2n, h, w, 3) float32 each, of
             which `planes`, `noise` and `indirect` are made; only where more samples are to be
             added, which so come to the bits of one render; of memory only.
+        former: The look of the scene before its lights were moved, with its noise: what a painting
+            was painted over; None where none were. Of memory only.
         render_s: Seconds that all of it took to render in this process; None where that is not
             known, as of what was kept; of memory only.
 
@@ -87,6 +89,7 @@ class Basis(Shown):
     extra: Indices | None = None
     source: str = field(default="", compare=False)
     sums: tuple[Floats, Floats] | None = field(default=None, compare=False)
+    former: Estimate | None = field(default=None, compare=False)
     render_s: float | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -197,7 +200,11 @@ class Basis(Shown):
         return self.noise.array()
 
     def on_pixels(
-        self, planes: Planes | Floats, noise: Planes | Floats, emitters_seen: Bools
+        self,
+        planes: Planes | Floats,
+        noise: Planes | Floats,
+        emitters_seen: Bools,
+        former: Estimate | None = None,
     ) -> "Basis":
         """Return a basis of the same lights on other pixels: some, or those of several views.
 
@@ -214,6 +221,7 @@ class Basis(Shown):
             indirect=None,
             sums=None,
             extra=None,
+            former=former,
             origin=replace(self.origin, extra_spp=0.0),
         )
 
@@ -251,8 +259,17 @@ class Basis(Shown):
 
     @cached_property
     def present_look(self) -> npt.NDArray[np.float32]:
-        """The scene as it is, (h, w, 3)."""
+        """The scene as it is, (h, w, 3), or as it was before its lights were moved."""
+        if self.former is not None:
+            return read_only(self.former.image)
         return read_only(self.mix(self.present_weights))
+
+    @property
+    def present_noise(self) -> Floats:
+        """The half difference of `present_look`, (h, w, 3)."""
+        if self.former is not None:
+            return self.former.half_difference
+        return self.noise.mix(self.present_weights)
 
     @cached_property
     def surface_filter(self) -> SurfaceFilter | None:

@@ -47,6 +47,8 @@ def denoise_mix(
 def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
     """Return the scene as it is without its grain, (h, w, 3) float32."""
     mixed = basis.present_look
+    if basis.former is not None:
+        return denoised(mixed, basis.features, quality=quality)
     return denoise_mix(basis, basis.present_weights, mixed=mixed, quality=quality)
 
 

@@ -65,7 +65,10 @@ def joint_basis(bases: Sequence[Basis]) -> tuple[Basis, tuple[Basis, ...]]:
         check_same_lights(first, basis)
     planes, views_planes = joined_planes([basis.planes for basis in bases], ROW_PIXELS)
     noise, views_noise = joined_planes([basis.noise for basis in bases], ROW_PIXELS)
-    joint = first.on_pixels(planes, noise, join_rows([basis.emitters_seen for basis in bases]))
+    seen = join_rows([basis.emitters_seen for basis in bases])
+    formers = [basis.former for basis in bases if basis.former is not None]
+    former = joint_estimate(formers) if len(formers) == len(bases) else None
+    joint = first.on_pixels(planes, noise, seen, former)
     views = tuple(
         replace(basis, planes=view_planes, noise=view_noise)
         for basis, view_planes, view_noise in zip(bases, views_planes, views_noise, strict=True)

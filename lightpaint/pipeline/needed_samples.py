@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -177,16 +177,15 @@ def _topped_up(
         job.views, bases, needed_counts(state, bases, job.settings.error), strict=True
     ):
         assert view.scene is not None
-        made.append(
-            top_up_basis(
-                view.scene,
-                basis,
-                counts,
-                use_cache=job.settings.use_cache,
-                progress=view_listener(job, view, listen),
-                is_enough=is_over,
-            )
+        topped = top_up_basis(
+            view.scene,
+            basis,
+            counts,
+            use_cache=job.settings.use_cache,
+            progress=view_listener(job, view, listen),
+            is_enough=is_over,
         )
+        made.append(replace(topped, former=basis.former))
     return made
 
 
@@ -196,13 +195,12 @@ def _doubled(job: Job, bases: Sequence[Basis], listen: Listener) -> list[Basis]:
     for view, basis in zip(job.views, bases, strict=True):
         assert view.scene is not None
         spp = 2 * max(PILOT_SPP, basis.origin.spp)
-        made.append(
-            obtain_basis(
-                view.scene,
-                spp=spp,
-                seed=job.settings.seed,
-                use_cache=job.settings.use_cache,
-                progress=view_listener(job, view, listen),
-            )
+        doubled = obtain_basis(
+            view.scene,
+            spp=spp,
+            seed=job.settings.seed,
+            use_cache=job.settings.use_cache,
+            progress=view_listener(job, view, listen),
         )
+        made.append(replace(doubled, former=basis.former))
     return made

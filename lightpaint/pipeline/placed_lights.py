@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
+from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job_bases import obtain, view_listener
@@ -58,5 +59,8 @@ def _bases_of(job: Job, before: Sequence[Basis], listen: Listener) -> list[Basis
         settings = replace(job.settings, time_s=None, quality=None, resolution=None, seed=seed)
         if settings.error is None:
             settings = replace(settings, spp=max(2, round(basis.origin.mean_spp)))
-        made.append(obtain(view.scene, settings, view_listener(job, view, listen), before=basis))
+        found = obtain(view.scene, settings, view_listener(job, view, listen), before=basis)
+        # What was painted over, and holds what was not painted, is the scene before the move.
+        look = basis.present_look, basis.present_noise
+        made.append(replace(found, former=Estimate(*look)))
     return made

@@ -79,7 +79,9 @@ class CleanLooks:
         if (planes := cached_clean_planes(basis)) is None:
             shown = denoise_present_look(basis), denoise_mix(basis, weights, mixed=predicted)
         else:
-            shown = planes.present, planes.mix(weights)
+            former = basis.former is not None
+            now = denoise_present_look(basis) if former else planes.present
+            shown = now, planes.mix(weights)
         return cls(*shown, verified, texts)
 
     @classmethod

@@ -8,9 +8,10 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Doubles
+from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means
+from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import block_sums
 from lightpaint.lighting.analysis.appearance.constraint_kinds import (
     ConstraintKind,
@@ -228,9 +229,19 @@ def _average_blocks(views: Views, side: int) -> Views:
         unseen = ~basis.emitters_seen[:height, :width]
         counts = unseen.astype(np.float64)
         images, halves = (block_means(x, counts, side) for x in (basis.planes, basis.noise))
-        bases.append(basis.on_pixels(images, halves, block_sums(counts, side) == 0))
+        former = basis.former
+        if former is not None:
+            pictures = (former.image, former.half_difference)
+            safe = np.maximum(block_sums(counts, side), 1)[..., None]
+            former = Estimate(*(block_sums(_cropped(x, counts), side) / safe for x in pictures))
+        bases.append(basis.on_pixels(images, halves, block_sums(counts, side) == 0, former))
         targets.append(averaged)
     return Views(tuple(bases), tuple(targets))
+
+
+def _cropped(image: Floats, counts: Doubles) -> Floats:
+    """Return the pixels of whole blocks, those that do not count as 0."""
+    return image[: counts.shape[0], : counts.shape[1]] * counts[..., None]
 
 
 def _pixel_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tuple[Basis, Target]:
@@ -239,8 +250,12 @@ def _pixel_row(basis: Basis, target: Target, chosen: npt.NDArray[np.intp]) -> tu
     def cut(image: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return image.reshape(1, -1, *image.shape[2:])[:, chosen]
 
+    former = basis.former
+    if former is not None:
+        former = Estimate(cut(former.image), cut(former.half_difference))
+    picked = basis.planes.picked(chosen), basis.noise.picked(chosen)
     row = basis.with_requests(type(basis.requests)()).on_pixels(
-        basis.planes.picked(chosen), basis.noise.picked(chosen), cut(basis.emitters_seen)
+        *picked, cut(basis.emitters_seen), former
     )
     target_row = replace(
         target,

@@ -32,7 +32,7 @@ class Residuals:
         predicted, r, share = basis.predict(weights), problem.refinement, problem.squares.share
         half, present = predicted.half_difference, None
         if share.any():
-            present = basis.noise.mix(basis.present_weights).reshape(-1, 3)
+            present = basis.present_noise.reshape(-1, 3)
         if r is not None:
             half = r.noise + basis.noise.mix(weights - r.before)
         image, mixed, half = (x.reshape(-1, 3) for x in (solution.image, predicted.image, half))
