@@ -12,8 +12,11 @@ from lightpaint.basis.render import guide_training
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.analysis.noise.uncertainty import error_bars
+from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job.settings import PILOT_SPP, Settings
+from lightpaint.pipeline.needed_samples import add_needed_samples
 from lightpaint.pipeline.one_call import paint_with_light
+from lightpaint.progress import listener
 from lightpaint.report.measures import picture_errors
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -25,10 +28,14 @@ class Heard:
 
     def __init__(self) -> None:
         self.remarks: list[str] = []
+        self.notes: list[str] = []
         self.work: set[str] = set()
 
     def __call__(self, label: str, *_: object) -> None:
         self.work.add(label)
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
 
     def say(self, text: str) -> None:
         self.remarks.append(text)
@@ -57,6 +64,25 @@ def answer(scene: Any, target: Any, folder: Path, **how: Any) -> tuple[Any, Hear
     heard = Heard()
     how = {"verify": False, "report": False, "force": True} | how
     return paint_with_light(scene, target, folder, progress=heard, **how), heard
+
+
+def test_the_scene_stays_loaded_over_the_rounds(
+    small_room: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    target = painting(small_room)
+    loads: list[Scene] = []
+    load = Scene.load
+    monkeypatch.setattr(Scene, "load", lambda self, *a: loads.append(self) or load(self, *a))
+    pilot = render_basis(small_room, spp=PILOT_SPP)
+    rendered = len(loads)
+    job = Job(
+        (small_room,), (target,), tmp_path / "b", settings=Settings(error=0.15, use_cache=False)
+    )
+    listen = Heard()
+    [basis] = add_needed_samples(job, [pilot], listener(listen))
+    assert len(listen.notes) > 1  # one for each round
+    assert len(loads) == rendered + 1
+    assert basis.origin.extra_spp > 0
 
 
 @pytest.mark.usefixtures("own_cache")

@@ -10,6 +10,7 @@ from lightpaint.arrays import Doubles, Indices
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import obtain_basis, top_up_basis
 from lightpaint.basis.render.render_origin import ONE_PASS
+from lightpaint.basis.render.top_up import KeptTracer, kept_loaded
 from lightpaint.colour.color import LUMINANCE
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.analysis.noise.sample_demand import (
@@ -85,16 +86,17 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
         return time.monotonic() - begin_s > limit_s
 
     before = [basis.origin.mean_spp for basis in bases]
-    for _ in range(MAX_ROUNDS):
-        state = Certainty.of(without_noise(job, solution_of(problem_of(job, bases))))
-        most = max(basis.origin.mean_spp for basis in bases)
-        if state.error <= settings.error or is_over() or most >= MAX_SPP:
-            break
-        listen.note(_text(state, bases))
-        if all(basis.origin.method == ONE_PASS for basis in bases):
-            bases = _topped_up(job, bases, state, is_over, listen)
-        else:
-            bases = _doubled(job, bases, listen)
+    with kept_loaded() as tracers:
+        for _ in range(MAX_ROUNDS):
+            state = Certainty.of(without_noise(job, solution_of(problem_of(job, bases))))
+            most = max(basis.origin.mean_spp for basis in bases)
+            if state.error <= settings.error or is_over() or most >= MAX_SPP:
+                break
+            listen.note(_text(state, bases))
+            if all(basis.origin.method == ONE_PASS for basis in bases):
+                bases = _topped_up(job, bases, state, is_over, tracers, listen)
+            else:
+                bases = _doubled(job, bases, listen)
     added = sum(x.origin.mean_spp for x in bases) > sum(before)
     text = _text(state, bases)
     if state.error > settings.error:
@@ -168,6 +170,7 @@ def _topped_up(
     bases: Sequence[Basis],
     state: Certainty,
     is_over: Callable[[], bool],
+    tracers: KeptTracer,
     listen: Listener,
 ) -> list[Basis]:
     """Return the bases with a round of samples where they are needed."""
@@ -184,6 +187,7 @@ def _topped_up(
             use_cache=job.settings.use_cache,
             progress=view_listener(job, view, listen),
             is_enough=is_over,
+            tracers=tracers,
         )
         made.append(replace(topped, former=basis.former))
     return made

@@ -24,7 +24,7 @@ from lightpaint.basis.render.render_origin import (
     is_on_the_way,
     method_of,
 )
-from lightpaint.basis.render.top_up import top_up
+from lightpaint.basis.render.top_up import KeptTracer, top_up
 from lightpaint.errors import BasisError, SceneError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.progress import Progress, silent
@@ -178,10 +178,19 @@ def top_up_basis(
     use_cache: bool = True,
     progress: Progress = silent,
     is_enough: Callable[[], bool] = lambda: False,
+    tracers: KeptTracer | None = None,
 ) -> Basis:
     """Return `basis` with further samples of some pixels, kept in its place. See `top_up`."""
     keep = cache.keep if use_cache else None
-    made = top_up(scene, basis, counts, keep=keep, progress=progress, is_enough=is_enough)
+    made = top_up(
+        scene,
+        basis,
+        counts,
+        keep=keep,
+        progress=progress,
+        is_enough=is_enough,
+        tracers=tracers,
+    )
     return as_stored(made) if keep is None else as_stored(made, keep)
 
 

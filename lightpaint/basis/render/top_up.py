@@ -8,7 +8,9 @@ samples: either can go on where it stopped, whatever was added of the other.
 
 import gc
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,8 +30,52 @@ from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import largest_pass, view_seed
 
+if TYPE_CHECKING:
+    from lightpaint.basis.render.tracer.one_pass import Tracer
 
-@MITSUBA.taken()
+
+class KeptTracer:
+    """The tracer of the last top-up: its scene stays loaded until another one is asked for."""
+
+    def __init__(self) -> None:
+        self._tracer: Tracer | None = None
+        self._seed = 0
+
+    def of(self, scene: Scene, basis: Basis) -> "Tracer":
+        """Return a tracer that goes on with `basis`, which was rendered of `scene`."""
+        from lightpaint.basis.render.tracer.one_pass import Tracer
+
+        its, seed = self._tracer, basis.origin.seed
+        is_same = its is not None and its.scene is scene and self._seed == seed
+        if its is None or not is_same or not _is_equal(its.guide_table, basis.guide_table):
+            self.close()
+            its = Tracer(scene, view_seed(seed, scene.sensor), basis.guide_table)
+            self._tracer, self._seed = its, seed
+        return its
+
+    def close(self) -> None:
+        """Release the scene."""
+        if self._tracer is not None:
+            self._tracer.close()
+            self._tracer = None
+            gc.collect()
+
+
+def _is_equal(a: Floats | None, b: Floats | None) -> bool:
+    return a is b or (a is not None and b is not None and np.array_equal(a, b))
+
+
+@contextmanager
+def kept_loaded() -> Iterator[KeptTracer]:
+    """Hold Mitsuba, and keep the scene of a top-up loaded for the next one within the block."""
+    with MITSUBA.taken():
+        tracers = KeptTracer()
+        try:
+            yield tracers
+        finally:
+            tracers.close()
+
+
 def top_up(
     scene: Scene,
     basis: Basis,
@@ -38,29 +84,33 @@ def top_up(
     keep: Callable[[Basis], bool] | None = None,
     progress: Progress = silent,
     is_enough: Callable[[], bool] = lambda: False,
+    tracers: KeptTracer | None = None,
 ) -> Basis:
     """Return `basis` with further samples of its pixels.
 
     scene: of which `basis` was rendered, in one pass. counts: (h, w), samples to add to each half;
     they must not depend on the light of their own pixel. is_enough: asked between passes, whether
     to leave the rest. keep: called with what there is when Ctrl-C ends the work early; returns
-    whether it could be kept.
+    whether it could be kept. tracers: of a block in which the scene stays loaded.
 
     Raises BasisError for a basis of something else, and Interrupted for Ctrl-C.
     """
-    from lightpaint.basis.render.tracer.one_pass import Tracer
-
     if basis.origin.method != ONE_PASS or not is_of(scene, basis, basis.origin.seed):
         raise BasisError("the basis to top up is not a one-pass basis of this scene and film")
     extra = np.zeros(basis.size, np.intp) if basis.extra is None else basis.extra.copy()
     sums = _PlaneSums(scene, basis)
     batches = list(pixel_batches(counts, 2 * plane_count(scene)))
-    with render_errors(scene.path):
-        tracer = Tracer(scene, view_seed(basis.origin.seed, scene.sensor), basis.guide_table)
+    guide_table = basis.guide_table
+    with (
+        nullcontext(tracers) if tracers is not None else kept_loaded() as kept,
+        render_errors(scene.path),
+    ):
         try:
             with tracing() as let_others_through:
+                tracer = kept.of(scene, basis)
                 if batches and not tracer.is_trained:
                     train(tracer, let_others_through)
+                guide_table = tracer.guide_table
                 progress("top-up", 0, len(batches))
                 for k, pixels in enumerate(batches):
                     if is_enough():
@@ -76,13 +126,9 @@ def top_up(
                     extra.ravel()[pixels] += spp
                     progress("top-up", k + 1, len(batches))
         except KeyboardInterrupt:
-            if keep is None or not keep(sums.basis(extra, tracer.guide_table)):
+            if keep is None or not keep(sums.basis(extra, guide_table)):
                 raise
             raise Interrupted("the samples so far are kept; the same command goes on") from None
-        finally:
-            guide_table = tracer.guide_table
-            tracer.close()
-            gc.collect()
     return sums.basis(extra, guide_table)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from renderer import SAME_SAMPLES, render_in_parts, same_basis, write_room
+from renderer import LIGHTS, SAME_SAMPLES, render_in_parts, same_basis, write_room
 
 import lightpaint.scene.scene_render
 from lightpaint.basis.basis import Basis
@@ -73,6 +73,26 @@ def test_in_two_goes_as_in_one(small_room: Scene, counts: Any, tmp_path: Path):
     read = read_basis(tmp_path / "b.exr")
     np.testing.assert_array_equal(read.extra, begun.extra)
     same_basis(top_up.top_up(small_room, read, counts - first), in_one, of_file=True)
+
+
+def test_a_scene_that_stays_loaded_changes_no_bit(
+    small_room: Scene, counts: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Two views in turn: the scene of each is loaded anew only after the other's."""
+    scenes = [small_room, load_scene(write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"]))]
+    kept = [render_basis(scene, spp=4) for scene in scenes]
+    alone, rounds = list(kept), [0, 0, 1, 0]
+    for k in rounds:
+        alone[k] = top_up.top_up(scenes[k], alone[k], counts)
+    loads: list[Scene] = []
+    load = Scene.load
+    monkeypatch.setattr(Scene, "load", lambda self, *a: loads.append(self) or load(self, *a))
+    with top_up.kept_loaded() as tracers:
+        for k in rounds:
+            kept[k] = top_up.top_up(scenes[k], kept[k], counts, tracers=tracers)
+    assert [scenes.index(its) for its in loads] == [0, 1, 0]
+    for a, b in zip(kept, alone, strict=True):
+        same_basis(a, b)
 
 
 def test_uniform_samples_go_on_after_a_top_up(small_room: Scene, counts: Any):

@@ -69,9 +69,25 @@ def test_quiet_pixels_have_the_floor():
     variances = np.zeros(SIZE)
     variances[:, :4] = 1
     demand = sample_demand(variances, np.ones(SIZE, bool), np.ones(SIZE))
-    quiet = demand.density[:, 8:]
-    mean = np.where(demand.variance > 0, np.sqrt(demand.variance), 0).mean()
+    quiet, loud = demand.density[:, 8:], demand.density[:, :4]
+    # Roots of 0 and 1: their mean over the neighbours is that of the squares.
+    mean = demand.variance.mean()
     np.testing.assert_allclose(quiet, FLOOR * mean)
+    np.testing.assert_allclose(loud, demand.variance[:, :4])
+
+
+def test_one_firefly_attracts_few_samples():
+    """Half differences of heavy-tailed noise: variance by allocation against the best there is."""
+    rng = np.random.default_rng(0)
+    sigma = np.where(np.arange(SIZE[1]) < 6, 4.0, 1.0) * np.ones(SIZE)
+    best = np.square(sigma.sum())
+    spent = []
+    for _ in range(50):
+        shown = np.square(sigma) * rng.standard_t(3, SIZE) ** 2 / 3
+        density = sample_demand(shown, np.ones(SIZE, bool), np.ones(SIZE)).density
+        spent.append((np.square(sigma) / density).sum() * density.sum() / best)
+    # With roots of the mean of squares it is 1.16.
+    assert np.mean(spent) < 1.13
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 4))

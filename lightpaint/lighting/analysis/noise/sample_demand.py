@@ -2,8 +2,9 @@
 
 The variance of a weight is a sum over pixels, and a pixel with n samples has 1/n of the variance of
 one. For a given number of samples in all, Σ q/n is least with n in proportion to √q (Neyman
-allocation). q of a pixel is the mean over its neighbours, never itself: so how many samples it gets
-does not depend on those that it has, and their mean stays unbiased (docs/method.md).
+allocation). √q of a pixel is the mean over its neighbours, never itself: so how many samples it
+gets does not depend on those that it has, and their mean stays unbiased (docs/method.md). A mean of
+roots, since few samples show the variance of a pixel by a number that is often far too large.
 """
 
 from dataclasses import dataclass
@@ -21,8 +22,8 @@ from lightpaint.threads import parallel_map
 #: Pixels on either side whose mean tells the variance of a pixel.
 AROUND = 2
 
-#: Least density of a pixel that counts, in parts of the mean.
-FLOOR = 0.1
+#: Least density of a pixel that counts, in parts of the mean (docs/benchmarks.md).
+FLOOR = 0.3
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,11 @@ def sample_demand(variances: Doubles, counted: Bools, have: Doubles) -> SampleDe
     w), samples that pixels have.
     """
     # Of a single sample, since neighbours may have other numbers of samples.
-    of_one = _sum_around(np.where(counted, variances * have, 0))
-    mean = np.where(counted, of_one / np.maximum(_sum_around(counted.astype(np.float64)), 1), 0)
-    density = np.sqrt(mean)
+    of_one = np.where(counted, variances * have, 0)
+    count = np.maximum(_sum_around(counted.astype(np.float64)), 1)
+    mean, density = (
+        np.where(counted, _sum_around(x) / count, 0) for x in (of_one, np.sqrt(of_one))
+    )
     floor = FLOOR * density.sum() / max(np.count_nonzero(counted), 1)
     density = np.where(counted, np.maximum(density, floor), 0)
     return SampleDemand(mean / np.maximum(have, 1), density)
