@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 from lightpaint.basis.basis import Basis
@@ -18,7 +19,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
 from lightpaint.progress import Listener
-from lightpaint.scene.quality_presets import on_film, samples
+from lightpaint.scene.quality_presets import on_film
 
 
 def has_basis(task: Task, worker_cache: WorkerCache) -> bool:
@@ -29,7 +30,7 @@ def has_basis(task: Task, worker_cache: WorkerCache) -> bool:
     settings: Settings = fields["settings"]
     [scene] = fields["scenes"]
     film = on_film(scene.content, settings.quality, settings.resolution)
-    requested_spp = samples(settings.quality, spp=settings.spp, time_s=None)
+    requested_spp = replace(settings, time_s=None).basis_spp
     sensor = film.sensor_names[film.sensor]
     cached_spp = cache.cached_spp(film.identity, sensor, settings.seed, film.size)
     exact = settings.exact_spp or not settings.use_cache

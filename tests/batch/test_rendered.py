@@ -171,3 +171,32 @@ def test_a_scene_is_checked_before_its_first_sample(here: Path) -> None:
         assert all(x.startswith("lightpaint batch: ") for x in found.stderr.splitlines())
         assert said in found.stderr
         assert not (here / "none").exists()
+
+
+BY_ERROR = """
+[defaults]
+scene = "room.xml"
+want = ["solve"]
+settings = { error = 0.05 }
+
+[[look]]
+paintings = ["bright.exr", "dark.exr"]
+"""
+
+
+def test_looks_get_the_samples_that_an_error_needs(
+    here: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They begin with the same samples, and each goes on as `solve --error` does."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    (here / "by-error.toml").write_text(BY_ERROR, encoding="utf-8")
+    succeed(here, "batch", "by-error.toml", "-o", str(tmp_path / "out"), "-q")
+    for name in ("bright", "dark"):
+        given = ("room.xml", f"{name}.exr", "--error", "5%", "--no-cache", "--no-verify")
+        told = run(here, "solve", *given, "-o", tmp_path / name)
+        assert "where the painting needs them" in told.stderr
+        alone, of_batch = (
+            read_lighting(tmp_path / folder / "lighting.json") for folder in (name, f"out/{name}")
+        )
+        assert of_batch.emission == alone.emission
+        assert [x.interval for x in of_batch.lights] == [x.interval for x in alone.lights]

@@ -76,7 +76,7 @@ def check_by_sums(mistakes: Mistakes, table: Table) -> None:
     settings = look.get("settings", {})
     if settings.get("literal") is not True and "settings" not in table.unclear:
         mistakes.add(label, "want has 'lights': settings need literal = true, or images are needed")
-    for key in ("time_s", "noise_correction", "refine", "suggest"):
+    for key in ("time_s", "error", "noise_correction", "refine", "suggest"):
         if settings.get(key):
             mistakes.add(label, f"want has 'lights', and {key} needs images: leave it out")
 

@@ -130,7 +130,7 @@ SEQUENCE_KEYS: dict[str, Check] = {
 SETTINGS = tuple(
     name
     for name in Settings.expected
-    if name not in ("transform", "command", "force", "verify", "report", "use_cache", "error")
+    if name not in ("transform", "command", "force", "verify", "report", "use_cache")
 )
 
 

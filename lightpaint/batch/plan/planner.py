@@ -32,7 +32,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.results.result_folder import is_as_written
 from lightpaint.pipeline.results.results import view_names
 from lightpaint.relit.relight import scene_of
-from lightpaint.scene.quality_presets import on_film, samples
+from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
@@ -233,7 +233,7 @@ class _Planner:
         for key, film in zip(bases_of(entry), films, strict=True):
             if film is None or key in self.costs:
                 continue
-            spp = samples(settings.quality, spp=settings.spp, time_s=settings.time_s)
+            spp = settings.basis_spp
             self.costs[key] = Cost(
                 f"{film.path.name} through {film.sensor_names[film.sensor]}",
                 len(film.lights),
