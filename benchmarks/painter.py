@@ -4,6 +4,7 @@
     python benchmarks/painter.py [--cases 12x960x540 64x960x540 ...] [--strokes N] [--minutes M]
     python benchmarks/painter.py --start scenes/gallery/scene.xml [--times N]
     python benchmarks/painter.py --answers
+    python benchmarks/painter.py --moves scenes/gallery/scene.xml
 
 A basis of soft lights that is made up, the painter's own server, and headless Chromium that
 renders in software. A pointer is moved 60 times a second over the picture. For every answer that
@@ -13,6 +14,10 @@ waiting for it. With --minutes, how the memory of page and server grows while so
 
 With --start, how soon `lightpaint paint SCENE` can be used: a first time with nothing kept, then
 with what that has kept, from the start of its process. The browser is open already.
+
+With --moves, the processor's time of Python for each answer while a light of the scene is dragged
+at 960x540: its plane along frozen paths, the lights solved around it, and the picture that the page
+fetches.
 
 With --answers, how long a small answer over a connection that is kept takes, beside what it takes
 where the system may wait for more before it sends (Nagle).
@@ -48,6 +53,7 @@ from lightpaint.basis.origin import Origin
 from lightpaint.lighting.fit import resolve_fit
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.paint import protocol
 from lightpaint.paint.launch import low_latency
 from lightpaint.paint.server.server import Server
 from lightpaint.paint.store.store import Store
@@ -104,9 +110,13 @@ def main() -> None:
     parser.add_argument("--start", metavar="SCENE")
     parser.add_argument("--times", type=int, default=5)
     parser.add_argument("--answers", action="store_true")
+    parser.add_argument("--moves", metavar="SCENE")
     options = parser.parse_args()
     if options.answers:
         print_answers()
+        return
+    if options.moves:
+        print_moves(options.moves)
         return
     if options.start:
         print_starts(options.start, options.times)
@@ -361,6 +371,48 @@ def print_answers(count: int = 50) -> None:
         serving.join()
         server.close()
         studio.close()
+
+
+def print_moves(path: str, moves: int = 30) -> None:
+    """Print the processor's time for each answer while a spot is dragged."""
+    from lightpaint.scene.scene_reader import load_scene
+
+    scene = load_scene(path, parameters={"width": 960, "height": 540})
+    name = next(light.name for light in scene.lights if light.plugin == "spot")
+    place = np.array(scene.light(name).members[0].site.position)
+    for space in ("display", "linear"):
+        with tempfile.TemporaryDirectory() as folder:
+            settings = Settings(spp=2, use_cache=False, space=space)
+            subject = Subject("moves", Path(folder), scene=scene, settings=settings)
+            studio = Studio([subject], lambda its: Store.open(None, its))
+            studio.start()
+            while studio.store is None or studio._threads._threads[0].is_alive():
+                time.sleep(0.2)
+            height, width = scene.size
+            region = (height // 4, height // 2, width // 4, width // 2)
+            shape = region[1] - region[0], region[3] - region[2]
+            image = np.full((*shape, 3), 0.4, np.float32)
+            importance = np.ones(shape, np.float32)
+            studio.handle(
+                protocol.Paint(0, region, True), {"image": image, "importance": importance}
+            )
+            time.sleep(2)
+            k, parts = studio.session.basis.names.index(name), []
+            for step in range(moves):
+                began = time.process_time(), time.perf_counter()
+                pose = {"position": (place + np.array([0.01 * step, 0, 0])).tolist()}
+                studio.handle(protocol.MoveLights({name: pose}, done=False), {})
+                studio.resource(f"clean/{k}").tobytes()
+                ended = time.process_time(), time.perf_counter()
+                parts.append([b - a for a, b in zip(began, ended, strict=True)])
+            cpu, wall = np.median(parts[5:], axis=0)
+            lights = len(scene.lights)
+            print(
+                f"{lights} lights at {width}x{height}, {space}: {1000 * cpu:.0f} ms of processor "
+                f"for each answer, {1000 * wall:.0f} ms of the clock"
+            )
+            studio.close()
+            studio.wait()
 
 
 def answer_of(asking: HTTPConnection, path: str, key: str) -> bytes:

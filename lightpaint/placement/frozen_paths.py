@@ -109,13 +109,10 @@ class FrozenPaths:
         sites: of points and spots at intensity 1 W/sr and, without a position, of suns at 1 W/m².
         """
         height, width = self.size
-        made = self._sums(self.direct, sites)
+        made = self._sums(self.direct, sites).reshape(-1, height, width, 3)
         if self.indirect is not None:
-            indirect = self._sums(self.indirect, sites)
-            for column, its in zip(made, indirect, strict=True):
-                image = its.reshape(height, width, 3)
-                column += (image if self._filter is None else self._filter(image)).reshape(-1, 3)
-        return made.reshape(-1, height, width, 3)
+            made += self.indirect_images(sites)
+        return made
 
     def contributions(self, vertices: Vertices, site: Site) -> Floats:
         """Return what `site` adds at each vertex, (v, 3); of a spot, as if it shone all around."""
@@ -138,6 +135,16 @@ class FrozenPaths:
         """Return the images of direct light alone, (k, h · w, 3) float32; see `columns`."""
         return self._sums(self.direct, sites)
 
+    def indirect_images(self, sites: Sequence[Site]) -> Floats:
+        """Return the images of indirect light alone, (k, h, w, 3) float32; see `columns`."""
+        made = np.zeros((len(sites), *self.size, 3), np.float32)
+        if self.indirect is None:
+            return made
+        for image, its in zip(made, self._sums(self.indirect, sites), strict=True):
+            raw = its.reshape(image.shape)
+            image[...] = raw if self._filter is None else self._filter(raw)
+        return made
+
     def points(self, vertices: Vertices) -> Floats:
         """Return the places of vertices, (v, 3)."""
         return np.array(vertices.interaction.p, dtype=np.float32).reshape(3, -1).T
@@ -145,7 +152,7 @@ class FrozenPaths:
     def _sums(self, vertices: Vertices, sites: Sequence[Site]) -> Floats:
         made = np.empty((len(sites), self.size[0] * self.size[1], 3), np.float32)
         rows = np.array([_row(site) for site in sites], np.float32).reshape(-1, _ROW)
-        at_once = max(1, LANES // max(len(vertices), 1))
+        at_once = max(1, min(LANES // max(len(vertices), 1), len(rows)))
         with tracing() as let_others_through:
             for start in range(0, len(rows), at_once):
                 here = rows[start : start + at_once]

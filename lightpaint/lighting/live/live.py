@@ -19,6 +19,7 @@ from operator import add
 from typing import Any
 
 from lightpaint.arrays import Doubles
+from lightpaint.basis.basis import Basis
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, Space
 from lightpaint.lighting.linear_problem import reduce_lights
@@ -81,6 +82,16 @@ class LiveSolver:
         for view in self._views:
             view.set_transform(fit.transform)
 
+    def follow_planes(self) -> Basis:
+        """Note that planes of some lights are others, of which the views know; return the first
+        view's basis.
+        """
+        self._basis = self._views[0].basis
+        self._pulls, self._untouched, self._gamuts_of = None, None, ()
+        if self._films is not None:
+            self._films[1].join()
+        return self._basis
+
     def prepare(self) -> None:
         """Compute now all sums that the first answer needs."""
         for view in self._views:
@@ -94,10 +105,13 @@ class LiveSolver:
         """The space of the answers."""
         return self._fit.space or "linear"
 
-    def answer(self, start: Doubles) -> Doubles:
+    def answer(self, start: Doubles, *, while_moving: bool = False) -> Doubles:
         """Return the best weights (n, 3), from the last ones.
 
         Before anything is painted, lights stay as they are, within the constraints.
+
+        while_moving: whether a light is being moved. Sums over tiles would be formed anew for each
+        of its places, so that linear light, too, is averaged to a few thousand pixels.
         """
         views = tuple(view for view in self._views if view.is_painted)
         if not views:
@@ -116,7 +130,7 @@ class LiveSolver:
         def allowed(weights: Doubles) -> Doubles:
             return clip_to_gamuts(reduction, snap_to_whites(reduction, weights))
 
-        if self.mode == "linear":
+        if self.mode == "linear" and not while_moving:
             equations = reduce(add, (x.tiles().equations(unpainted) for x in views))
             pull = self._pull(views, self._basis.present_weights)
             weights = best(equations, start)

@@ -1,6 +1,6 @@
 """The sums behind answers under a brush: of light by tiles, and of a display over a small film."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from math import ceil
 
@@ -32,7 +32,7 @@ class PaintedTiles:
 
     def __init__(self, basis: Basis, image: Floats, importance: Floats) -> None:
         self._importance, self._seen = importance, basis.emitters_seen
-        self._present = basis.present_weights
+        self._present, self._is_moved = basis.present_weights, basis.former is not None
         self._paint = TiledEquations(basis.planes, image, importance)
         self._unpainted = np.where(basis.emitters_seen, np.float32(0), np.float32(1))
         rest = basis.planes, basis.present_look, self._unpainted
@@ -53,6 +53,9 @@ class PaintedTiles:
         pixels = tuple(
             slice(part.start * side, part.stop * side) for part in self._rest.tiles_in(region)
         )
+        if self._is_moved:  # the rest is held near a look of other planes
+            self._rest.update(region)
+            return
         counted = self._importance[pixels] + self._unpainted[pixels]
         expected = np.where(self._seen[pixels], np.float32(0), np.float32(1))
         if np.abs(counted - expected).max(initial=0) <= IMPORTANCE_ROUND_OFF:
@@ -120,6 +123,11 @@ class SmallFilm:
         total = block_sums(image * self._shown[..., None], self._side)
         return np.asarray(total / block_sums(self._shown, self._side)[..., None], np.float32)
 
+    def replace_planes(self, basis: Basis, lights: Iterable[int]) -> None:
+        """Average anew the planes of some lights, by number, which are others now."""
+        for k in lights:
+            self.rows[:, k] = _planes(self._average(basis.planes.plane(k)))
+
     def update(self, region: Slices) -> None:
         """Average anew the blocks that a rectangle touches."""
         side, (height, width) = self._side, self._importance.shape
@@ -162,7 +170,7 @@ class SmallFilm:
         rest = rest_weight * self._left
         weight = self._a + rest
         share = np.where(weight > 0, rest / np.where(weight > 0, weight, 1), 0)
-        seen = self._seen_painted, self._seen_current
+        seen = None if transform is None else (self._seen_painted, self._seen_current)
         return PaintedPixels(self._painted, weight, share, self._current, None, transform, seen)
 
 
@@ -171,7 +179,11 @@ class Films:
 
     def __init__(self, films: Sequence[SmallFilm]) -> None:
         self._films = films
-        rows = [film.rows for film in films]
+        self.join()
+
+    def join(self) -> None:
+        """Join the planes of the films again, of which some are others now."""
+        rows = [film.rows for film in self._films]
         self._rows = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
 
     def pixels(self, rest_weight: float, transform: ViewTransform | None) -> PaintedPixels:

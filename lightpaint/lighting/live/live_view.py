@@ -1,5 +1,7 @@
 """A view of a live painting, with sums that follow the brush."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Slices
@@ -62,6 +64,12 @@ class LiveView:
             self._light.update(region, with_importance=with_importance)
         if self._display is not None:
             self._display.update(region)
+
+    def replace_planes(self, basis: Basis, lights: Collection[int]) -> None:
+        """Continue with a basis in which the planes of some lights, by number, are others."""
+        self.basis, self._light = basis, None
+        if self._display is not None:
+            self._display.replace_planes(basis, lights)
 
     def tiles(self) -> PaintedTiles:
         """Return the sums in linear light."""

@@ -16,8 +16,9 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means, in_one_row
-from lightpaint.basis.planes import BLOCK_PIXELS, Planes
+from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.images.estimate import Estimate
 from lightpaint.images.pixel_blocks import block_sums, enlarged
 from lightpaint.lighting.loss.lit_pixels import LitPixels
 from lightpaint.lighting.loss.loss import Cut, Loss
@@ -56,7 +57,7 @@ class BinnedPixels:
     def equations(self) -> NormalEquations:
         """The linear problem at the present lighting, with the importance of all pixels of a
         block."""
-        goal = self.loss.goal(self.basis.mix(self.basis.present_weights))
+        goal = self.loss.goal(self.basis.present_look)
         return NormalEquations.of(self.basis, goal, self.loss.importance[..., None])
 
     @cached_property
@@ -135,6 +136,7 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
     """
     images: list[Planes] = []
     halves: list[Planes] = []
+    looks: list[Estimate] = []
     parts: list[tuple[Cut, Doubles]] = []
     for k, basis in enumerate(views.bases):
         cut = partial(views.part, k=k)
@@ -146,9 +148,22 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
         counts[glows & (weights[: counts.shape[0], : counts.shape[1]] > 0)] = 0
         images.append(block_means(basis.planes, counts, side))
         halves.append(block_means(basis.noise, counts, side))
+        if basis.former is not None:
+            looks.append(
+                Estimate(
+                    *(
+                        block_means(as_planes(x[None]), counts, side).plane(0).reshape(1, -1, 3)
+                        for x in (basis.former.image, basis.former.half_difference)
+                    )
+                )
+            )
         parts.append((cut, counts))
     if (blocks := loss.block_means(parts, side)) is None:
         return None
     row, noise = in_one_row(images), in_one_row(halves)
-    basis = views.bases[0].on_pixels(row, noise, np.zeros(row.size, dtype=bool))
+    look = None
+    if looks:
+        pictures = zip(*((x.image, x.half_difference) for x in looks), strict=True)
+        look = Estimate(*(np.concatenate(parts, axis=1) for parts in pictures))
+    basis = views.bases[0].on_pixels(row, noise, np.zeros(row.size, dtype=bool), look)
     return BinnedPixels(basis, blocks, side)

@@ -10,10 +10,13 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.paint.protocol.base import OPTIONAL, Message
 from lightpaint.paint.protocol.message_parts import (
+    Camera,
     EditState,
     Findings,
     LightInfo,
+    LightPlace,
     LookInfo,
+    Place,
     SampleCount,
     TableInfo,
     Tone,
@@ -185,7 +188,7 @@ class LookList(Message, kind="looks"):
 class TaskStarted(Message, kind="started"):
     """Notice that a long task has started. what: the request, or `stop`."""
 
-    what: Literal["export", "verify", "explain", "preview", "stop"]
+    what: Literal["export", "verify", "explain", "preview", "rig", "stop"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -234,6 +237,22 @@ class PreviewResult(Message, kind="previewed"):
     is_old: bool
     before: npt.NDArray[np.uint8]
     after: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rig(Message, kind="rig"):
+    """The places of all lights. Unasked after a move, once it was asked for.
+
+    lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
+    the axis that is nearest to upwards, 0, 1 or 2. low, high: corners of a box with all that is
+    seen, and all lights.
+    """
+
+    lights: tuple[LightPlace, ...]
+    cameras: tuple[Camera | None, ...]
+    up: int
+    low: Place
+    high: Place
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -286,6 +305,7 @@ EVENTS: Mapping[str, type[Any]] = {
         VerificationResult,
         Explanation,
         PreviewResult,
+        Rig,
         Notice,
         Failure,
         Closing,

@@ -32,6 +32,44 @@ class LightInfo:
     scale: float
 
 
+#: Three coordinates in units of the scene.
+Place = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class LightPlace:
+    """The place of a light, and what it points at.
+
+    position: null for one that is infinitely far away, or has no place. direction: of unit length,
+    that it points along; null for one that points nowhere. target: the point that it points at: the
+    one that was asked for, or else the surface that its axis meets. cutoff, beam: degrees from its
+    axis; null for all but spots. rail: both ends of what it slides along. why_not: why it cannot be
+    moved; "" if it can.
+    """
+
+    position: Place | None
+    direction: Place | None
+    target: Place | None
+    cutoff: float | None
+    beam: float | None
+    rail: tuple[Place, Place] | None
+    why_not: str
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera without a lens. A pixel (x, y) sees origin + s · (x · across + y · down + ahead).
+
+    is_parallel: all rays have the direction `ahead`, and begin at origin + x · across + y · down.
+    """
+
+    origin: Place
+    across: Place
+    down: Place
+    ahead: Place
+    is_parallel: bool
+
+
 @dataclass(frozen=True)
 class ViewInfo:
     """A view that is painted.
@@ -170,13 +208,15 @@ class EditState:
     """The steps that can be undone, and the requests in effect.
 
     asked: constraints by name of light, keys and values as in a lights file. ties: names on one
-    dimmer. settings: set by somebody. meant: the values in effect.
+    dimmer. settings: set by somebody. meant: the values in effect. poses: of lights that were
+    moved, by name.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
     asked: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
     ties: tuple[tuple[str, ...], ...] | None = field(default=None, metadata=OPTIONAL)
     settings: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
+    poses: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
     meant: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
 
 

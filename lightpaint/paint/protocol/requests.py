@@ -91,6 +91,45 @@ class AskAll(Message, kind="ask_all"):
 
 
 @dataclass(frozen=True)
+class MoveLights(Message, kind="move"):
+    """Places, targets and cones of lights from now on, by name. Answered by `answer`; `rig`
+    follows.
+
+    poses: as of `lightpaint.Pose`: of position, target, cutoff and beam those that are not as in
+    the scene; an empty object puts a light back. done: whether it becomes a step; false while a
+    light is dragged.
+    """
+
+    poses: Mapping[str, Mapping[str, Any]]
+    done: bool = True
+
+
+@dataclass(frozen=True)
+class PointLight(Message, kind="point"):
+    """A move of a light that follows from a place in the picture. Answered by `answer`; `rig`
+    follows.
+
+    how: `aim` points it there; `highlight` hangs it where its reflection is seen there; `shadow`
+    hangs it where the shadow of what is seen at `edge` ends there. at, edge: column and row in
+    pixels. view: whose picture it is. done: as of `move`.
+    """
+
+    light: int
+    how: Literal["aim", "highlight", "shadow"]
+    at: tuple[float, float]
+    edge: tuple[float, float] | None = None
+    view: int = 0
+    done: bool = True
+
+
+@dataclass(frozen=True)
+class ShowRig(Message, kind="show_rig"):
+    """A request for where all lights hang, and of `rig` after every move from now on. Answered by
+    `started`, later by `rig`.
+    """
+
+
+@dataclass(frozen=True)
 class TieLights(Message, kind="tie"):
     """The lights that share a dimmer: all such groups, of names. Answered by `answer`."""
 
@@ -249,6 +288,9 @@ AnyRequest = (
     | Redo
     | Ask
     | AskAll
+    | MoveLights
+    | PointLight
+    | ShowRig
     | TieLights
     | Set
     | Preview

@@ -32,11 +32,13 @@ from lightpaint.paint.protocol import (
     Fetch,
     LookList,
     Message,
+    MoveLights,
     Notice,
     Observe,
     Paint,
     PictureData,
     PictureUpdate,
+    PointLight,
     ProgressReport,
     Propose,
     SessionState,
@@ -59,6 +61,9 @@ REST_S = 10.0
 
 #: Seconds for pages to receive the last messages.
 CLOSING_S = 1.0
+
+#: Requests that follow a hand, until one of them is done.
+LIVE_REQUESTS = (Paint, Ask, MoveLights, PointLight)
 
 #: Events that observers receive.
 OBSERVED_EVENTS = (
@@ -200,7 +205,7 @@ class Connections:
             if self._owner.page is not client:
                 return [_taken_message("this tab does not have the session")]
             assert incoming.request is not None
-            is_live = isinstance(incoming.request, Paint | Ask) and not incoming.request.done
+            is_live = isinstance(incoming.request, LIVE_REQUESTS) and not incoming.request.done
             (self._brush_up.clear if is_live else self._brush_up.set)()
             return await self._run(self.session.handle, incoming.request, incoming.arrays)
         except LightpaintError as error:

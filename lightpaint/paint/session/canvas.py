@@ -1,6 +1,6 @@
 """The painting of one view: its pixels, and the open stroke."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,14 @@ class Canvas:
         self._open_stroke = OpenStroke()
         if painted is not None:
             self._paint_over(region, painted)
+
+    def replace_planes(self, basis: Basis, lights: Collection[int]) -> None:
+        """Continue with a basis in which the planes of some lights, by number, are others.
+
+        The present look stays that of before these lights moved.
+        """
+        self.basis = basis
+        self.live.replace_planes(basis, lights)
 
     @property
     def image(self) -> npt.NDArray[np.float32]:
@@ -211,6 +219,11 @@ class Canvases:
         """Improve each canvas."""
         for view, basis, present in zip(self, bases, presents, strict=True):
             view.improve(basis, present, steps)
+
+    def replace_planes(self, bases: Sequence[Basis], lights: Collection[int]) -> None:
+        """Continue with bases in which the planes of some lights, by number, are others."""
+        for view, basis in zip(self, bases, strict=True):
+            view.replace_planes(basis, lights)
 
     @property
     def live(self) -> list[LiveView]:

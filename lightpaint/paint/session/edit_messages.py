@@ -21,6 +21,7 @@ def edit_state(history: History, live_answer: LiveAnswer) -> dict[str, Any]:
         "asked": {name: dict(constraints) for name, constraints in requests.lights.items()},
         "ties": requests.ties,
         "settings": dict(requests.values),
+        "poses": dict(requests.poses),
         "meant": ResolvedFit(fit.space, fit.hold, fit.colors),
     }
 

@@ -31,6 +31,14 @@ def constrain_lights(
     return requests
 
 
+def move_lights(
+    requests: SessionRequests, lights: Lights, poses: Mapping[str, Mapping[str, Any]]
+) -> SessionRequests:
+    """Return the requests with the poses of some lights replaced, by their names."""
+    _check_names(poses, lights)
+    return requests.with_poses(poses)
+
+
 def tie_lights(
     requests: SessionRequests, lights: Lights, ties: Sequence[Sequence[str]]
 ) -> SessionRequests:

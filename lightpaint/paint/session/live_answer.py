@@ -46,6 +46,10 @@ class LiveAnswer:
         self._live = LiveSolver(views, fit=self.fit, constraints=self._constraints(self.requests))
         self._live.prepare()
 
+    def follow_planes(self) -> None:
+        """Note that the planes of some lights are others, of which the views know already."""
+        self._basis = self._live.follow_planes()
+
     @property
     def requests_at_rest(self) -> SessionRequests:
         """The requests without those of a slider that still moves."""
@@ -104,7 +108,10 @@ class LiveAnswer:
 
     def solve(self) -> None:
         """Solve for the weights, with the paint as it is."""
-        self.weights = self._live.answer(self.weights)
+        is_moving = (
+            self.before_slider is not None and self.before_slider.poses != self.requests.poses
+        )
+        self.weights = self._live.answer(self.weights, while_moving=is_moving)
 
     def _fit(self, requests: SessionRequests) -> Settings:
         settings = requests.settings(self._settings)

@@ -149,7 +149,7 @@ class LookLibrary:
             for light, w in zip(lights, weights, strict=True)
             if not light.is_fixed
         }
-        return SessionRequests(locks)
+        return SessionRequests(locks, poses=self._session.requests.poses)
 
     def _proposed_look(self, message: Propose) -> StoredLook:
         """Return the painting as it is with a proposed lighting."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
@@ -76,7 +76,12 @@ def changes_under_brush(name: str) -> bool:
 
 def light_thumbnail(basis: Basis, k: int) -> Picture:
     """Return a thumbnail of light k alone, in display values."""
-    picture, _ = thumbnail(basis.planes.plane(k), basis.emitters_seen)
+    return plane_thumbnail(basis.planes.plane(k), basis.emitters_seen)
+
+
+def plane_thumbnail(plane: Floats, emitters_seen: Bools) -> Picture:
+    """Return a thumbnail of a plane (h, w, 3), in display values."""
+    picture, _ = thumbnail(plane, emitters_seen)
     return np.round(picture * 255).astype(np.uint8)
 
 

@@ -27,8 +27,14 @@ from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.session.answer_messages import Judgement, answer_findings
 from lightpaint.paint.session.edit_messages import canvas_patches, edit_state, unpainted_headline
 from lightpaint.paint.session.history import History, restore
-from lightpaint.paint.session.light_changes import constrain_light, constrain_lights, tie_lights
+from lightpaint.paint.session.light_changes import (
+    constrain_light,
+    constrain_lights,
+    move_lights,
+    tie_lights,
+)
 from lightpaint.paint.session.live_answer import LiveAnswer
+from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, PlaneSource
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.session_requests import TITLES, SessionRequests
@@ -48,6 +54,7 @@ class Session:
         transform: View transform to paint through.
         constraints: On the lights, from before the session began.
         name: Of the painting.
+        plane_source: Makes the planes of lights that are moved; without one, none are.
 
     Attributes:
         views: Canvas of each view.
@@ -68,6 +75,7 @@ class Session:
         transform: ViewTransform,
         constraints: Constraints | None = None,
         name: str = "painting",
+        plane_source: PlaneSource | None = None,
     ) -> None:
         self.store, self.name, self.transform = store, name, transform
         self.version, self._stroke = 0, -1
@@ -86,6 +94,7 @@ class Session:
             transform=transform,
         )
         self._history = History(store, self.views, self.live_answer)
+        self._moved_lights = MovedLights(plane_source or NoPlaneSource(), bases)
         self._update_answer()
 
     # State
@@ -94,6 +103,11 @@ class Session:
     def basis(self) -> Basis:
         """Basis of the first view, whose lights are those of all."""
         return self.views[0].basis
+
+    @property
+    def bases(self) -> tuple[Basis, ...]:
+        """Bases of all views, with every light where the scene has it."""
+        return self._moved_lights.bases
 
     @property
     def requests(self) -> SessionRequests:
@@ -161,7 +175,7 @@ class Session:
         A slider that still moves is reset before any other request, and where its last value is
         refused.
         """
-        if not isinstance(message, protocol.Ask):
+        if not isinstance(message, protocol.Ask | protocol.MoveLights):
             self._reset_slider()
         try:
             return self._dispatch(message, arrays)
@@ -183,6 +197,8 @@ class Session:
                 return self._move_step(+1)
             case protocol.Ask():
                 return [self._constrain_light(message)]
+            case protocol.MoveLights():
+                return [self._move_lights(message)]
             case protocol.AskAll():
                 requests = constrain_lights(self.requests, self.basis.lights, message.asked)
                 return [self._append_requests(", ".join(message.asked), requests)]
@@ -240,8 +256,14 @@ class Session:
 
         An open stroke stays open.
         """
-        self.views.improve(bases, presents, self.store.steps[: self.store.position])
+        moved = self._moved_lights.improve(bases, self.requests.poses)
+        self.views.improve(moved, presents, self.store.steps[: self.store.position])
         self.live_answer.set_views(self.views.live)
+        self._update_answer()
+
+    def renew_planes(self, names: Sequence[str]) -> None:
+        """Take the planes of moved lights anew, which have been rendered meanwhile."""
+        self._moved_lights.renew(names, self.requests.poses, self.views, self.live_answer)
         self._update_answer()
 
     def client_left(self, *, with_stroke: bool) -> None:
@@ -274,6 +296,7 @@ class Session:
         """
         self._reset_slider()
         self.live_answer.check(requests)
+        self._moved_lights.check(requests.poses)
         if self.views.is_open:
             self._drop_stroke()
         patches = self._history.replace_all(paintings, requests, label)
@@ -327,6 +350,16 @@ class Session:
         self._update_answer()
         return self.answer_update()
 
+    def _move_lights(self, message: protocol.MoveLights) -> Message:
+        requests = move_lights(self.requests, self.basis.lights, message.poses)
+        self._moved_lights.check(requests.poses)
+        if message.done:
+            return self._append_requests(f"move {', '.join(message.poses)}", requests)
+        # While a light is dragged nothing is kept.
+        self.live_answer.move_slider(requests)
+        self._update_answer()
+        return self.answer_update(poses=dict(requests.poses))
+
     def _append_requests(self, label: str, requests: SessionRequests) -> Message:
         """Set requests from now on: a step."""
         self._history.append_requests(label, requests)
@@ -337,6 +370,7 @@ class Session:
 
     def _update_answer(self) -> None:
         self.version += 1
+        self._moved_lights.follow(self.requests.poses, self.views, self.live_answer)
         self.live_answer.solve()
 
     def _patch_messages(self, *regions: tuple[int, Region]) -> list[Message]:

@@ -20,7 +20,7 @@ def state_fields(
     target_spp: the samples per pixel that the basis will have; None for those that it has.
     """
     basis = session.basis
-    views = tuple(view_info(view) for view in session.views)
+    views = tuple(map(view_info, session.views, session.bases))
     return {
         "size": views[0].size,
         "objects": views[0].objects,

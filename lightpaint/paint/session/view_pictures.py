@@ -23,12 +23,17 @@ def offer_transforms(table: PictureTable, transforms: Sequence[ViewTransform]) -
 
 
 def offer_view(
-    table: PictureTable, view: Canvas, transform: ViewTransform, clean: DenoisedPlanes | None
+    table: PictureTable,
+    view: Canvas,
+    basis: Basis,
+    transform: ViewTransform,
+    clean: DenoisedPlanes | None,
 ) -> None:
     """Offer the pictures of a view; rough planes stand in for denoised ones that are not
     made yet.
+
+    basis: of the view, with every light where the scene has it.
     """
-    basis = view.basis
 
     def offer(name: str, make: Any) -> None:
         table.offer(name_in_view(name, view.view), make)
@@ -66,12 +71,15 @@ def _rough_plane(planes: RoughPlanes, k: int) -> Picture:
     return as_halves(planes.plane(k), scale_of(planes.basis.planes.plane(k)))
 
 
-def view_info(view: Canvas) -> ViewInfo:
-    """Return the description of a view for clients."""
-    objects, (height, width) = view.basis.objects, view.size
+def view_info(view: Canvas, basis: Basis) -> ViewInfo:
+    """Return the description of a view for clients.
+
+    basis: of the view, with every light where the scene has it: moves change no scale.
+    """
+    objects, (height, width) = basis.objects, view.size
     return ViewInfo(
         name=view.name,
         size=(height, width),
         objects=() if objects is None else tuple(objects.names),
-        scales=tuple(scale_of(plane) for plane in view.basis.planes),
+        scales=tuple(scale_of(plane) for plane in basis.planes),
     )

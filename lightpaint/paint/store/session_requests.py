@@ -33,22 +33,31 @@ class SessionRequests:
 
     lights: by name of light, keys and values as of a lights file. ties: names that share a dimmer.
     values: of FIT_KEYS and ALL_LIGHTS_KEYS, those that differ from the painting's defaults.
+    poses: of lights that were moved, by name: position, target, cutoff and beam, as in a `Pose`.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     ties: tuple[tuple[str, ...], ...] = ()
     values: Mapping[str, Any] = field(default_factory=dict)
+    poses: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "SessionRequests":
         """Return the requests that `as_json` wrote."""
         ties = tuple(tuple(names) for names in data.get("ties", ()))
-        return cls(dict(data.get("lights", {})), ties, dict(data.get("values", {})))
+        poses = {name: dict(pose) for name, pose in data.get("poses", {}).items()}
+        return cls(dict(data.get("lights", {})), ties, dict(data.get("values", {})), poses)
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
         lights = {name: dict(constraints) for name, constraints in self.lights.items()}
-        return {"lights": lights, "ties": [list(x) for x in self.ties], "values": dict(self.values)}
+        moved = {name: dict(pose) for name, pose in self.poses.items()}
+        return {
+            "lights": lights,
+            "ties": [list(x) for x in self.ties],
+            "values": dict(self.values),
+            **({"poses": moved} if moved else {}),
+        }
 
     def with_light(self, name: str, asked: Mapping[str, Any]) -> "SessionRequests":
         """Return these requests with all those on one light replaced.
@@ -58,6 +67,11 @@ class SessionRequests:
         tied = next((names for names in self.ties if name in names), ())
         lights = {**self.lights, name: asked}
         return replace(self, lights=_hold_once(lights, (name, *tied)))
+
+    def with_poses(self, poses: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
+        """Return these requests with these poses of lights; an empty one is that of the scene."""
+        merged = {**self.poses, **poses}
+        return replace(self, poses={name: dict(pose) for name, pose in merged.items() if pose})
 
     def with_ties(self, ties: Sequence[Sequence[str]]) -> "SessionRequests":
         """Return these requests with these dimmers; the first held light of each holds it."""

@@ -24,6 +24,8 @@ from lightpaint.paint.protocol import (
     TaskStopped,
     VerificationResult,
 )
+from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.rig.moved_subjects import of_moved_scenes
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_requests import SessionRequests
@@ -53,6 +55,13 @@ class JobHost(Protocol):
 
         requests: replace those of the session, if given.
         """
+
+    @property
+    def rig(self) -> LampRig:
+        """The lights and their places."""
+
+    def finish_planes(self, check: Callable[[], None]) -> None:
+        """Render the planes of moved lights that are quick ones so far. check: raises to stop."""
 
     def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
         """Return the denoised planes of these bases; None for each that has none yet."""
@@ -127,6 +136,8 @@ class BackgroundJobs:
 
     def solve_command(self, sensors: Sequence[str], requests: SessionRequests) -> str:
         """Return the command that solves exported paintings to the same answer; "" if none."""
+        if requests.poses:
+            return ""  # which has no words for them
         subject = self._host.subjects[0]
         paths = {sensor: str(painting_path(subject.folder, sensor)) for sensor in sensors}
         return subject.command(paths, requests) if paths else ""
@@ -145,13 +156,23 @@ class BackgroundJobs:
             raise PaintError(f"no view {view}: there are {len(subjects)}")
         return subjects[view]
 
-    def _exact_answer(self) -> tuple[SessionSnapshot, Lighting]:
-        """Return the paintings as they are now, and the exact answer to them."""
+    def _exact_answer(
+        self, check: Callable[[], None]
+    ) -> tuple[tuple[Subject, ...], SessionSnapshot, Lighting]:
+        """Return the subjects with lights where they hang, the paintings as they are now, and the
+        exact answer to them. check: raises to stop.
+        """
+        self._host.finish_planes(check)
         snapshot, lighting = self._host.snapshot_and_lighting()
+        is_moved = bool(snapshot.requests.poses)
+        subjects, snapshot = of_moved_scenes(self._host.subjects, snapshot, self._host.rig)
         solution = snapshot.solution()
-        if solution is None:
-            return snapshot, lighting
-        return snapshot, with_findings(solution, analyse(solution)).lighting
+        if solution is not None:
+            lighting = with_findings(solution, analyse(solution)).lighting
+        elif is_moved:
+            basis = snapshot.bases[0]
+            lighting = Lighting.of_weights(basis, lighting.weights_for(basis))
+        return subjects, snapshot, lighting
 
     def _run_export(self, message: protocol.Export, stop_count: int) -> None:
         """Write the requested files.
@@ -174,10 +195,9 @@ class BackgroundJobs:
         try:
             # A stop also ends the exact solve, which may take long.
             with cancellable(check):
-                snapshot, lighting = self._exact_answer()
+                subjects, snapshot, lighting = self._exact_answer(check)
                 with self._write_lock:
                     check()
-                    subjects = self._host.subjects
                     for file in export(subjects, snapshot, lighting, message.what, report):
                         files.append(file)  # one by one: a stop keeps those already written
         except StoppedError:
@@ -220,10 +240,10 @@ class BackgroundJobs:
             check()
             self._host.report_progress(label, done, total, unit)
 
-        snapshot, lighting = self._exact_answer()
+        subjects, snapshot, lighting = self._exact_answer(check)
         progress: Progress = report
         picture, text, agrees = render_verification(
-            self._subject(view), snapshot.bases[view], lighting, progress
+            subjects[view], snapshot.bases[view], lighting, progress
         )
         check()
         self._host.publish_picture(name_in_view("verified", view), as_halves(picture))

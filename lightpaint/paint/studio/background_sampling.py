@@ -64,7 +64,8 @@ class BackgroundSampling:
         def is_outdated() -> bool:
             return not self._host.is_open or self._host.version != snapshot.version
 
-        if not is_outdated():
+        # Samples are of the scene, in which no light is moved.
+        if not (is_outdated() or snapshot.requests.poses):
             bases = add_round(self._host.subjects, snapshot, solution, is_enough=is_outdated)
             if bases is not None:
                 self._host.use_bases(bases)

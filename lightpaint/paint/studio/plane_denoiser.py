@@ -1,6 +1,6 @@
 """Denoised planes, computed one after the other while the user paints."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from lightpaint.basis.cache.denoised_planes import (
 from lightpaint.basis.denoised_mixes import denoise_present_look
 from lightpaint.paint.session.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture
+from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import name_in_view
 
 
@@ -71,25 +72,28 @@ class PlaneDenoiser:
             for k, basis in enumerate(bases)
         ]
 
-    def denoise(self, views: Iterable[Canvas]) -> None:
-        """Denoise the planes that are missing, one view after the other."""
-        for view in views:
-            planes_of_view = self._by_view.get(view.view)
-            if planes_of_view is None or not planes_of_view.matches(view.basis):
-                self._denoise_view(view)
+    def denoise(self, session: Session) -> None:
+        """Denoise the planes that are missing, one view after the other.
 
-    def _denoise_view(self, view: Canvas) -> None:
-        basis = view.basis
+        Of moved lights they are those of before, which undo brings back.
+        """
+        for view, basis in zip(session.views, session.bases, strict=True):
+            planes_of_view = self._by_view.get(view.view)
+            if planes_of_view is None or not planes_of_view.matches(basis):
+                self._denoise_view(session, view, basis)
+
+    def _denoise_view(self, session: Session, view: Canvas, basis: Basis) -> None:
         halves, scales = (
             np.empty((len(basis.lights), *basis.size, 3), np.float16),
             np.ones(len(basis.lights)),
         )
         planes = DenoisedPlanes(halves, scales, view.present)
         for k in range(len(basis.lights)):
-            if not self._is_needed() or view.basis is not basis:
+            if not self._is_needed() or session.bases[view.view] is not basis:
                 return
             planes.halves[k], planes.scales[k] = denoise_to_halves(basis, k)
-            self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
+            if basis.names[k] not in session.requests.poses:
+                self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
         self._by_view[view.view] = _ViewPlanes(basis, planes)
 
     def write_cache(self) -> None:

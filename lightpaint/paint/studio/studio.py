@@ -4,8 +4,8 @@ Requests are answered at once, by one thread at a time. Rendering the basis, exa
 denoising, exports and verification have threads of their own, which publish through `on_message`.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from threading import RLock
 from typing import Any
@@ -35,6 +35,8 @@ from lightpaint.paint.protocol import (
     SessionState,
     Tone,
 )
+from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
@@ -92,6 +94,7 @@ class Studio:
         self._write_retry = UnsavedRetry(lambda: self.store, self._publish_save_state)
         self._threads = BackgroundThreads(self.publish)
         self._jobs = BackgroundJobs(self, self._threads)
+        self._mover = LightMover(self, LampRig(self.subjects), self._threads)
 
     @property
     def session(self) -> Session:
@@ -126,6 +129,7 @@ class Studio:
         self.is_open = False
         self._exact_answers.stop()
         self._sampling.stop()
+        self._mover.stop()
         self._write_retry.stop()
         with self._lock:
             if self._session is not None:
@@ -193,10 +197,15 @@ class Studio:
                     return self._jobs.handle(message)
                 case protocol.Preview():
                     return self._jobs.start_preview(message, session.preview_requests(message))
+                case protocol.ShowRig():
+                    return self._mover.show_rig()
+                case protocol.PointLight():
+                    messages = session.handle(self._mover.move_of(message), arrays)
                 case protocol.LoadLook():
                     messages = looks.load(message)
                 case _:
                     messages = session.handle(message, arrays)
+            self._mover.follow()
         self._exact_answers.notify()
         return messages
 
@@ -224,6 +233,7 @@ class Studio:
         """
         with self._lock:
             messages = self.session.load(paintings, requests, label)
+            self._mover.follow()
         self._exact_answers.notify()
         return messages
 
@@ -248,7 +258,32 @@ class Studio:
 
     def clean_planes(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
         """Return the denoised planes of these bases; None for each that has none yet."""
+        if any(basis.former is not None for basis in bases):
+            return [None] * len(bases)
         return self._denoiser.planes_for(bases)
+
+    def denoised(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
+        """Return the denoised planes of bases without moved lights; None for each that has none."""
+        return self._denoiser.planes_for(bases)
+
+    @contextmanager
+    def changing(self) -> Iterator[Session]:
+        """Return a block in which nobody else changes the session."""
+        with self._lock:
+            yield self.session
+
+    def planes_rendered(self) -> None:
+        """Note that the session has rendered planes in the place of quick ones."""
+        self._exact_answers.notify()
+
+    def finish_planes(self, check: Callable[[], None]) -> None:
+        """Render the planes of moved lights that are quick ones so far. check: raises to stop."""
+        self._mover.finish(self.session.requests.poses, check)
+
+    @property
+    def rig(self) -> LampRig:
+        """The lights and their places."""
+        return self._mover.rig
 
     def publish_picture(self, name: str, picture: Picture) -> None:
         """Store a picture and tell the page that there is a new one."""
@@ -281,7 +316,7 @@ class Studio:
             with MITSUBA.low_priority():
                 for bases in obtain_bases(self.subjects, self.report_progress):
                     self.use_bases(bases)
-                    self._denoiser.denoise(self.session.views)
+                    self._denoiser.denoise(self.session)
             self.publish(ProgressReport(what="basis", done=1, total=1, unit=""))
             self._denoiser.write_cache()
             self._sampling.run()
@@ -309,10 +344,12 @@ class Studio:
             else:
                 self._session.improve(bases, presents)
             session = self._session
-            for view, clean in zip(session.views, clean_planes, strict=True):
-                offer_view(self.pictures, view, session.transform, clean)
+            for view, basis, clean in zip(session.views, bases, clean_planes, strict=True):
+                offer_view(self.pictures, view, basis, session.transform, clean)
             offer_transforms(self.pictures, offered_transforms(session))
+            self._mover.offer_all(session)
         self.publish_made(self.state)
+        self._mover.render_behind()
         self._exact_answers.notify()
 
     def _make_session(
@@ -328,6 +365,7 @@ class Studio:
                 settings=self.subjects[0].settings,
                 transform=painting_transform(self.subjects, bases),
                 constraints=self.subjects[0].constraints,
+                plane_source=self._mover.rig if self.has_scenes else None,
             )
             looks = LookLibrary(session, self.pictures)
             for remark in store.remarks:

@@ -33,6 +33,38 @@ export interface LightInfo {
 }
 
 /**
+ * The place of a light, and what it points at.
+ *
+ * position: null for one that is infinitely far away, or has no place. direction: of unit length,
+ * that it points along; null for one that points nowhere. target: the point that it points at: the
+ * one that was asked for, or else the surface that its axis meets. cutoff, beam: degrees from its
+ * axis; null for all but spots. rail: both ends of what it slides along. why_not: why it cannot be
+ * moved; "" if it can.
+ */
+export interface LightPlace {
+  position: number[] | null;
+  direction: number[] | null;
+  target: number[] | null;
+  cutoff: number | null;
+  beam: number | null;
+  rail: [number[], number[]] | null;
+  why_not: string;
+}
+
+/**
+ * A camera without a lens. A pixel (x, y) sees origin + s · (x · across + y · down + ahead).
+ *
+ * is_parallel: all rays have the direction `ahead`, and begin at origin + x · across + y · down.
+ */
+export interface Camera {
+  origin: number[];
+  across: number[];
+  down: number[];
+  ahead: number[];
+  is_parallel: boolean;
+}
+
+/**
  * A view that is painted.
  *
  * size: height and width in pixels. objects: names, in the order of the picture `objects`. scales:
@@ -165,13 +197,15 @@ export interface Findings {
  * The steps that can be undone, and the requests in effect.
  *
  * asked: constraints by name of light, keys and values as in a lights file. ties: names on one
- * dimmer. settings: set by somebody. meant: the values in effect.
+ * dimmer. settings: set by somebody. meant: the values in effect. poses: of lights that were
+ * moved, by name.
  */
 export interface EditState {
   history?: HistoryInfo;
   asked?: Record<string, Record<string, any>>;
   ties?: string[][];
   settings?: Record<string, any>;
+  poses?: Record<string, Record<string, any>>;
   meant?: ResolvedFit;
 }
 
@@ -193,6 +227,7 @@ export interface SessionState {
   asked?: Record<string, Record<string, any>>;
   ties?: string[][];
   settings?: Record<string, any>;
+  poses?: Record<string, Record<string, any>>;
   meant?: ResolvedFit;
   version: number;
   scene: string;
@@ -258,6 +293,7 @@ export interface AnswerUpdate {
   asked?: Record<string, Record<string, any>>;
   ties?: string[][];
   settings?: Record<string, any>;
+  poses?: Record<string, Record<string, any>>;
   meant?: ResolvedFit;
   version: number;
   stroke: number;
@@ -280,6 +316,7 @@ export interface CanvasPatch {
   asked?: Record<string, Record<string, any>>;
   ties?: string[][];
   settings?: Record<string, any>;
+  poses?: Record<string, Record<string, any>>;
   meant?: ResolvedFit;
   region: Region;
   view: number;
@@ -344,7 +381,7 @@ export interface ProgressReport {
 export interface TaskStarted {
   kind: 'started';
   reply?: number;
-  what: 'export' | 'verify' | 'explain' | 'preview' | 'stop';
+  what: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'stop';
   arrays: {  };
 }
 
@@ -416,6 +453,24 @@ export interface PreviewResult {
   is_at_cost: boolean;
   is_old: boolean;
   arrays: { before: Picture; after: Picture };
+}
+
+/**
+ * The places of all lights. Unasked after a move, once it was asked for.
+ *
+ * lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
+ * the axis that is nearest to upwards, 0, 1 or 2. low, high: corners of a box with all that is
+ * seen, and all lights.
+ */
+export interface Rig {
+  kind: 'rig';
+  reply?: number;
+  lights: LightPlace[];
+  cameras: (Camera | null)[];
+  up: number;
+  low: number[];
+  high: number[];
+  arrays: {  };
 }
 
 /**
@@ -523,6 +578,43 @@ export interface Ask {
  */
 export interface AskAll {
   asked: Record<string, Record<string, any>>;
+}
+
+/**
+ * Places, targets and cones of lights from now on, by name. Answered by `answer`; `rig`
+ * follows.
+ *
+ * poses: as of `lightpaint.Pose`: of position, target, cutoff and beam those that are not as in
+ * the scene; an empty object puts a light back. done: whether it becomes a step; false while a
+ * light is dragged.
+ */
+export interface MoveLights {
+  poses: Record<string, Record<string, any>>;
+  done?: boolean;
+}
+
+/**
+ * A move of a light that follows from a place in the picture. Answered by `answer`; `rig`
+ * follows.
+ *
+ * how: `aim` points it there; `highlight` hangs it where its reflection is seen there; `shadow`
+ * hangs it where the shadow of what is seen at `edge` ends there. at, edge: column and row in
+ * pixels. view: whose picture it is. done: as of `move`.
+ */
+export interface PointLight {
+  light: number;
+  how: 'aim' | 'highlight' | 'shadow';
+  at: [number, number];
+  edge?: [number, number] | null;
+  view?: number;
+  done?: boolean;
+}
+
+/**
+ * A request for where all lights hang, and of `rig` after every move from now on. Answered by
+ * `started`, later by `rig`.
+ */
+export interface ShowRig {
 }
 
 /**
@@ -683,6 +775,7 @@ export interface Events {
   verified: VerificationResult;
   explained: Explanation;
   previewed: PreviewResult;
+  rig: Rig;
   say: Notice;
   failed: Failure;
   closed: Closing;
@@ -698,6 +791,9 @@ export interface Requests {
   redo: Redo;
   ask: Ask;
   ask_all: AskAll;
+  move: MoveLights;
+  point: PointLight;
+  show_rig: ShowRig;
   tie: TieLights;
   set: Set;
   preview: Preview;

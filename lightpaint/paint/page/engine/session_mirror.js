@@ -42,6 +42,8 @@ export class SessionMirror {
     /** @type {Show | null} */
     this.shown = null;
     this.weights = new Float64Array();
+    /** Whether lights are elsewhere than in the present look. */
+    this.isMoved = false;
     /** How often the session had changed, as its last message says. */
     this.version = -1;
     /** @type {import("../../../viewer/drawing/lut.js").Lut} */
@@ -125,6 +127,7 @@ export class SessionMirror {
 
   /** Weights that come with a message. @param {Message} message */
   mix(message) {
+    if (message.poses) this.isMoved = Object.keys(message.poses).length > 0;
     const weights = message.arrays?.weights?.data;
     if (!weights) return;
     this.weights = Float64Array.from(weights);
@@ -276,7 +279,9 @@ export class SessionMirror {
       state?.lights.flatMap((/** @type {{present: number[]}} */ light) => light.present) ?? [];
     const isClean = shown?.clean ?? true;
     const isPresent =
-      isClean && weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
+      isClean &&
+      !this.isMoved &&
+      weights.every((weight, i) => Math.abs(weight - present[i]) <= 1e-9 * present[i]);
     screen.isPresent = isPresent && this.knowsPresent;
     if (screen.isPresent !== this.hasPresent && canvas) this.showPresent();
   }

@@ -4,6 +4,7 @@ import { html } from '../vendor/preact.js';
 import { AdviceButton } from './advice.js';
 import { Button, TruncatedText, reveal } from './controls.js';
 import { lightText, number, shortened } from './format.js';
+import { pointingHint } from './lamp_fields.js';
 import { isAnswerHidden, saveLook } from './look_actions.js';
 import { toolHint } from './tools.js';
 import { exposureOf } from './ui_state.js';
@@ -67,6 +68,10 @@ export function AnswerLine({ ui, app }) {
 /** What light is under the pointer, and which lights make it up; else what the tool does.
  * @param {{ui: Ui}} props */
 export function PointerStatus({ ui }) {
+  if (ui.pointing) {
+    const text = pointingHint(ui.pointing, ui.lights[ui.pointing.light].label);
+    return html`<p class="here" id="lp-status" role="status"><strong>${text}</strong></p>`;
+  }
   if (!ui.pointed) {
     const text = ui.ready ? toolHint(ui.tool) : ''; // there is nothing to drag on yet
     return html`<p class="here" id="lp-status"><span class="hint-text">${text}</span></p>`;

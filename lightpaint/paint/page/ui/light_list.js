@@ -80,7 +80,7 @@ function row(ui, app, k, isMany) {
     isLive=${ui.isLive} isSolo=${ui.solo.includes(k)} isMute=${ui.mute.includes(k)} isOpen=${isOpen}
     here=${ui.pointed?.shares[k]} hasSlider=${isOpen || !isMany}
     picture=${inView(`thumb/${k}`, ui.view)} thumb=${ui.resources[inView(`thumb/${k}`, ui.view)]}
-    others=${isOpen ? ui.lights : undefined} />`;
+    others=${isOpen ? ui.lights : undefined} ui=${isOpen ? ui : undefined} />`;
 }
 
 /** @param {{name: string, ui: Ui, app: App, members: number[], isMany: boolean}} props */

@@ -6,6 +6,7 @@ import { LightConstraints } from './light_constraints.js';
 import { Button, Slider } from './controls.js';
 import { number, percent, stopsText, whiteText } from './format.js';
 import { Icon } from './icons.js';
+import { LampFields } from './lamp_fields.js';
 import { BRIGHTEST, DARKEST, Level, atLevel, nowOf, stopsOf } from './level_field.js';
 import { Thumbnail } from './thumbnail.js';
 
@@ -17,7 +18,8 @@ import { Thumbnail } from './thumbnail.js';
 /**
  * @typedef {{k: number, light: Light, app: App, rgb: RGB, lit?: LightAnswer, asked?: Constraints,
  *   tied?: string[], isLive: boolean, isSolo: boolean, isMute: boolean, isOpen: boolean,
- *   here?: number, hasSlider: boolean, picture: string, thumb?: number, others?: Light[]}} Props
+ *   here?: number, hasSlider: boolean, picture: string, thumb?: number, others?: Light[],
+ *   ui?: import("./ui_state.js").Ui}} Props
  */
 
 /** @extends {Component<Props>} */
@@ -41,7 +43,7 @@ export class LightRow extends Component {
   }
 
   render() {
-    const { k, light, app, isOpen, hasSlider, here, isMute, asked } = this.props;
+    const { k, light, app, isOpen, hasSlider, here, isMute, asked, ui } = this.props;
     const { store } = app;
     const dim = isMute || asked?.off ? 'is-dim' : '';
     const hover = (/** @type {number | null} */ hovered) => () => store.set({ hovered });
@@ -67,6 +69,7 @@ export class LightRow extends Component {
         ${hasSlider && !light.is_fixed && this.dimmer()}
       </div>
       ${isOpen && html`<${LightConstraints} ...${this.props} />`}
+      ${isOpen && ui && html`<${LampFields} k=${k} ui=${ui} app=${app} />`}
     </div>`;
   }
 

@@ -1,5 +1,6 @@
 /** Turns actions of a person into requests to the session. */
 
+import { LampMoves } from './lamp_moves.js';
 import { SessionLink } from './session_link.js';
 import { lockedLights, lockingLight } from './tied_lights.js';
 
@@ -8,6 +9,8 @@ import { lockedLights, lockingLight } from './tied_lights.js';
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
 
 export class SessionController extends SessionLink {
+  lampMoves = new LampMoves(this);
+
   /**
    * Set the constraints on a light.
    * @param {number} light @param {Constraints} asked @param {boolean} [done] false while a slider moves
@@ -154,6 +157,26 @@ export class SessionController extends SessionLink {
       return this.changeSetting(key, value);
     }
     return kind === 'tie' ? this.tieAll(fields.ties) : this.sendChange(kind, fields);
+  }
+
+  /** Mark the lights in the pictures, or not. Their places are asked for when first marked. */
+  toggleLamps() {
+    const { lamps, rig } = this.store.value;
+    this.store.set({ lamps: !lamps, pointing: null });
+    if (!lamps && !rig) void this.send('show_rig');
+  }
+
+  /** Move a light. @param {number} light @param {Record<string, any>} change of its pose
+   * @param {boolean} [done] false while it is dragged */
+  moveLamp(light, change, done = true) {
+    const { poses, lights } = this.store.value;
+    const before = poses[lights[light].name] ?? {};
+    this.lampMoves.ask(light, { kind: 'move', pose: { ...before, ...change } }, done);
+  }
+
+  /** Put a light back where the scene has it. @param {number} light */
+  putBack(light) {
+    this.lampMoves.ask(light, { kind: 'move', pose: {} });
   }
 
   /** Request the reasons why the current view is not closer. */

@@ -29,6 +29,7 @@ const EVENT_KINDS = [
   'answer',
   'patch',
   'renewed',
+  'rig',
   'progress',
   'stopped',
   'say',
@@ -105,6 +106,7 @@ export class SessionLink {
       renewed: (/** @type {HostEvents['renewed']} */ m) => ({
         resources: { ...this.store.value.resources, ...m.resources },
       }),
+      rig: (/** @type {HostEvents['rig']} */ m) => ({ rig: m }),
       progress: (/** @type {HostEvents['progress']} */ m) => progressUpdate(m, this.store.value),
       stopped: (/** @type {HostEvents['stopped']} */ m) => this.taskEnded(m.what),
       say: (/** @type {HostEvents['say']} */ m) => this.showNotice(m),

@@ -75,6 +75,14 @@ export const SHORTCUTS = [
         act: ({ store }) => togglePanels(store),
       },
       {
+        keys: 'd',
+        shown: ['D'],
+        does: 'mark the lights, and move them',
+        act: ({ store, session }) => {
+          if (store.value.state?.can_render) session.toggleLamps();
+        },
+      },
+      {
         keys: '?',
         shown: ['?'],
         does: 'show these shortcuts',
@@ -112,7 +120,7 @@ export const SHORTCUTS = [
         does: 'cancel the stroke',
         act: ({ engine, store }) => {
           const isClosed = engine.cancel() ? {} : { panel: null };
-          store.set({ asking: null, hovered: null, ...isClosed });
+          store.set({ asking: null, hovered: null, pointing: null, ...isClosed });
         },
       },
       {

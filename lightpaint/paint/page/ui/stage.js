@@ -13,6 +13,7 @@ import { PointerLabel } from './pointer_label.js';
 import { ObjectOutline } from './object_outline.js';
 import { Pointer } from './pointer_input.js';
 import { firstHint, flowOf, updateShow } from './tools.js';
+import { LampMarks } from './lamp_marks.js';
 import { Legend } from './analysis_panel.js';
 import { ProgressBar } from './progress_bar.js';
 import { Button } from './controls.js';
@@ -138,7 +139,7 @@ export function Stage({ ui, app }) {
   const panes = ui.ready ? engine.panes() : [];
   const fit = panes.length ? panes[0].scale / ui.show.zoom : null;
   useLayoutEffect(() => store.set({ fit }), [fit?.toPrecision(6)]);
-  return html`<div class=${`stage is-${ui.tool} ${ui.asking ? 'is-asking' : ''}`} ref=${frame} tabindex="0" role="application"
+  return html`<div class=${`stage is-${ui.tool} ${ui.asking ? 'is-asking' : ''} ${ui.pointing ? 'is-pointing' : ''}`} ref=${frame} tabindex="0" role="application"
     aria-label="Pictures. Arrow keys move the brush, Enter paints, Shift Enter a line." aria-describedby="lp-status">
     ${ui.ready && html`<${ObjectOutline} ui=${ui} engine=${engine} panes=${panes} />`}
     <div class="rings" ref=${rings} hidden aria-hidden="true">
@@ -147,6 +148,7 @@ export function Stage({ ui, app }) {
     ${panes.map(
       (pane, k) => html`<${Tag} key=${k} ui=${ui} app=${app} pane=${pane} panes=${panes} />`,
     )}
+    ${ui.ready && html`<${LampMarks} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.ready && html`<${Legend} ui=${ui} app=${app} panes=${panes} />`}
     ${ui.show.layout === 'wipe' && ui.ready && html`<${Wipe} ui=${ui} app=${app} />`}
     ${ui.hint && ui.ready && !ui.history.undo.length && html`<${Hint} panes=${panes} tool=${ui.tool} />`}

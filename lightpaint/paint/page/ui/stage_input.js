@@ -3,6 +3,8 @@
 import { useEffect } from '../vendor/preact.js';
 import { pointAway } from './brush_cursor.js';
 import { isTyping } from './keyboard.js';
+import { pointLamp } from './lamp_fields.js';
+import { paneAt } from './pointer_input.js';
 
 /** @typedef {import("./engine_interface.js").Engine} Engine */
 /** @typedef {import("./pointer_input.js").Pointer} Pointer */
@@ -15,13 +17,17 @@ export function useStageInput(frame, pointer, app) {
   useEffect(() => {
     const element = frame.current;
     if (!element) return undefined;
-    const { store, engine } = app;
+    const { store } = app;
     const ends = new AbortController();
     const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ hear) =>
       element.addEventListener(name, hear, { signal: ends.signal, passive: false });
     // Whoever came by a pointer sees where they are; the outline is for the keyboard.
     on('pointerdown', (event) => {
       element.dataset.by = 'pointer';
+      if (store.value.pointing && event.button === 0 && !pointer.isSpace) {
+        event.preventDefault();
+        return pointLamp(app, pointer.point(event));
+      }
       pointer.down(event);
     });
     on('blur', () => delete element.dataset.by);
@@ -35,7 +41,7 @@ export function useStageInput(frame, pointer, app) {
       const rings = /** @type {HTMLElement | null} */ (element.querySelector('.rings'));
       if (rings && !pointer.doing) rings.hidden = true;
     });
-    on('keydown', (event) => byKeys(event, pointer, engine, store));
+    on('keydown', (event) => byKeys(event, pointer, app));
     const pan = (/** @type {boolean} */ isSpace) => {
       pointer.isSpace = isSpace;
       element.classList.toggle('is-panning', isSpace);
@@ -57,9 +63,10 @@ export function useStageInput(frame, pointer, app) {
   }, []);
 }
 
-/** The brush by keys: arrows move it, Enter paints a dab, or with Shift a line. @param {KeyboardEvent} event
- * @param {Pointer} pointer @param {Engine} engine @param {UiStore} store */
-function byKeys(event, pointer, engine, store) {
+/** The brush by keys: arrows move it, Enter paints a dab, or with Shift a line; or points a light.
+ * @param {KeyboardEvent} event @param {Pointer} pointer @param {App} app */
+function byKeys(event, pointer, app) {
+  const { engine, store } = app;
   const way = /** @type {Record<string, [number, number]>} */ ({
     ArrowLeft: [-1, 0],
     ArrowRight: [1, 0],
@@ -76,5 +83,8 @@ function byKeys(event, pointer, engine, store) {
   const x = Number(rings.dataset.x ?? pane.x + pane.width / 2) + (way ? way[0] * step : 0);
   const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0);
   pointer.moved(x, y);
-  if (event.key === 'Enter') pointer.dab(x, y, event.shiftKey);
+  if (event.key === 'Enter' && store.value.pointing) {
+    const its = paneAt(engine, x, y);
+    pointLamp(app, its && { x: (x - its.left) / its.scale, y: (y - its.top) / its.scale });
+  } else if (event.key === 'Enter') pointer.dab(x, y, event.shiftKey);
 }

@@ -30,7 +30,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
   const isBack = before.connection !== 'open' || before.closed !== null;
   const views = message.views ?? [];
   const view = before.view < views.length ? before.view : 0;
-  const { lights, asked, ties, settings, meant, history, looks, resources, basis } = message;
+  const { lights, asked, ties, settings, meant, poses, history, looks, resources, basis } = message;
   return {
     ready: true,
     state: stateOfView(message, view),
@@ -42,6 +42,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
     ties: ties ?? [],
     settings: settings ?? {},
     meant: meant ?? {},
+    poses: poses ?? {},
     history,
     looks: looks ?? [],
     resources: resources ?? {},
@@ -200,7 +201,7 @@ export function answerUpdate(message, ui) {
   if (message.version < ui.version) return {};
   const made = /** @type {Partial<Ui>} */ (weightsOf(message));
   made.version = message.version ?? ui.version;
-  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'meant'])) {
+  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'meant', 'poses'])) {
     if (message[key]) made[key] = message[key];
   }
   if (message.lights) Object.assign(made, answerFields(message, ui));

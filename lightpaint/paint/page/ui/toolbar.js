@@ -61,6 +61,11 @@ export function ToolBar({ ui, app }) {
       disabled=${tool === 'fill' && !ui.state?.objects?.length} />`,
     )}
     <div class="spring"></div>
+    ${
+      ui.state?.can_render &&
+      html`<${Button} icon="lamp" tip="Lights in the picture: mark and move them" keys="D"
+      on=${ui.lamps} act=${() => app.session.toggleLamps()} />`
+    }
     <button type="button" class="two-colours" style=${style} data-tip="Swap colours" data-keys="X"
       aria-keyshortcuts="X" aria-label=${`Swap colours: the current one is ${toHex(ui.colour)}, ${signed(ui.stops)} stops`}
       onClick=${() => swapColours(store)}><i></i><i></i></button>

@@ -20,6 +20,8 @@ import { ofKelvin } from './paint_colour.js';
  *   before: import("./engine_interface.js").Picture | null, after: import("./engine_interface.js").Picture | null}}
  *   Preview */
 /** @typedef {import("../engine/messages.js").Closeness} Seen */
+/** A light that the next click points; edge: what casts the shadow, once that was clicked.
+ * @typedef {{light: number, how: "aim" | "highlight" | "shadow", edge?: [number, number]}} Pointing */
 /** since: when it was first heard of, in ms, and how much was done then; left_s: about how many
  * seconds are left, once that can be told.
  * @typedef {{what: string, done: number, total: number, unit: string,
@@ -52,6 +54,14 @@ import { ofKelvin } from './paint_colour.js';
  * @property {boolean} isJudged whether what is said of the answer is of the last one
  * @property {Record<string, Constraints>} asked
  * @property {string[][]} ties
+ * @property {Record<string, Record<string, any>>} poses of lights that were moved, by name
+ * @property {import("../engine/messages.js").Rig | null} rig where the lights hang, once it is known
+ * @property {boolean} lamps whether lights are marked in the pictures
+ * @property {number | null} lamp the marked light that was chosen, which has handles
+ * @property {{light: number, place: Partial<import("../engine/messages.js").LightPlace>,
+ *   at?: [number, number]} | null} dragged where a light is that the pointer drags; at: the pixel that
+ *   it points at
+ * @property {Pointing | null} pointing what the next click on a picture does to that light
  * @property {Record<string, any>} settings
  * @property {Record<string, any>} meant
  * @property {{undo: string[], redo: string[], count?: number}} history labels of the last steps,
@@ -155,6 +165,12 @@ export function initialState() {
     isJudged: true,
     asked: {},
     ties: [],
+    poses: {},
+    rig: null,
+    lamps: false,
+    lamp: null,
+    dragged: null,
+    pointing: null,
     settings: {},
     meant: {},
     history: { undo: [], redo: [] },

@@ -1,0 +1,94 @@
+/** Place, target and cone of a light in numbers, and buttons that point it by a click. */
+
+import { html } from '../vendor/preact.js';
+import { Button, NumberField } from './controls.js';
+import { placeOf } from './lamp_marks.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").App} App */
+
+/** What a click does to a light, by name. */
+const WAYS = /** @type {const} */ ({
+  aim: { label: 'Aim here', tip: 'Click a surface: the light points there' },
+  highlight: {
+    label: 'Highlight here',
+    tip: 'Click a shiny surface: the light hangs where its reflection is seen there',
+  },
+  shadow: {
+    label: 'Shadow edge here',
+    tip: 'Click the edge that casts it, then where its shadow ends',
+  },
+});
+
+/** What is to be clicked next. @param {import("./ui_state.js").Pointing} pointing @param {string} name */
+export function pointingHint({ how, edge }, name) {
+  if (how === 'aim') return `Click what ${name} is to point at. Esc cancels.`;
+  if (how === 'highlight') return `Click where the highlight of ${name} is to be seen. Esc cancels.`;
+  return edge
+    ? 'Now click where that shadow is to end. Esc cancels.'
+    : `Click the edge of what casts the shadow of ${name}. Esc cancels.`;
+}
+
+/** A click on a picture while a light is pointed. @param {App} app
+ * @param {{x: number, y: number} | null} point in pixels of the picture */
+export function pointLamp(app, point) {
+  const { pointing, view } = app.store.value;
+  if (!pointing || !point) return;
+  const { light, how, edge } = pointing;
+  const at = /** @type {[number, number]} */ ([point.x, point.y]);
+  if (how === 'shadow' && !edge) return app.store.set({ pointing: { light, how, edge: at } });
+  app.store.set({ pointing: null });
+  app.session.lampMoves.ask(light, { kind: 'point', how, at, ...(edge ? { edge } : {}), view });
+}
+
+/** @param {{k: number, ui: Ui, app: App}} props */
+export function LampFields({ k, ui, app }) {
+  const { session, store } = app;
+  if (!ui.state?.can_render) return null;
+  if (!ui.rig)
+    return html`<div class="lamp-fields"><${Button} label="Place and aim" class="wide"
+      tip="Mark the lights in the pictures, and move them" act=${() => session.toggleLamps()} /></div>`;
+  const place = placeOf(ui, k);
+  const { name, label } = ui.lights[k];
+  if (place.why_not)
+    return html`<p class="faint lamp-fields">${label} ${place.why_not}: it stays where it is.</p>`;
+  const vector = (
+    /** @type {"position" | "target"} */ key,
+    /** @type {string} */ title,
+    /** @type {number[] | null} */ value,
+  ) =>
+    value &&
+    html`<div class="lamp-vector" role="group" aria-label=${`${title} of ${label}`}>
+      <span class="name">${title}</span>
+      ${['x', 'y', 'z'].map(
+        (axis, c) => html`<${NumberField} key=${axis} label=${`${title} ${axis}`} hidden value=${value[c]}
+        figures=${4} step=${0.05} change=${(/** @type {number} */ x) =>
+          session.moveLamp(k, { [key]: value.map((was, i) => (i === c ? x : was)) })} />`,
+      )}</div>`;
+  const point = (/** @type {"aim" | "highlight" | "shadow"} */ how) => {
+    const isOn = ui.pointing?.how === how && ui.pointing.light === k;
+    return html`<${Button} key=${how} label=${WAYS[how].label} tip=${WAYS[how].tip} on=${isOn}
+      act=${() =>
+        store.set({ lamps: true, lamp: k, pointing: isOn ? null : { light: k, how } })} />`;
+  };
+  return html`<div class="lamp-fields" data-numbers>
+    <h3>Place</h3>
+    ${vector('position', 'Position', place.position)}
+    ${place.position && place.direction && vector('target', 'Target', place.target)}
+    ${
+      place.cutoff !== null &&
+      html`<div class="ask-fields is-pair">
+        <${NumberField} label="Cone" unit="°" value=${place.cutoff} least=${1} most=${89} step=${1}
+          digits=${1} change=${(/** @type {number} */ x) =>
+            session.moveLamp(k, { cutoff: x, beam: Math.min(x, place.beam ?? x) })} />
+        <${NumberField} label="Beam" unit="°" value=${place.beam} least=${0.5} most=${place.cutoff}
+          step=${1} digits=${1} change=${(/** @type {number} */ x) =>
+            session.moveLamp(k, { beam: x, cutoff: place.cutoff })} />
+      </div>`
+    }
+    <div class="lamp-ways" role="group" aria-label=${`Point ${label} by a click`}>
+      ${place.position && place.direction && point('aim')}
+      ${point('highlight')}${point('shadow')}
+      ${name in ui.poses && html`<${Button} label="Put back" tip="Back to where the scene has it" act=${() => session.putBack(k)} />`}
+    </div></div>`;
+}

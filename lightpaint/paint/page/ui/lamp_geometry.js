@@ -1,0 +1,136 @@
+/** Where points of the scene are seen, and which points a pointer means: rays of a camera. */
+
+/** @typedef {import("../engine/messages.js").Camera} Camera */
+/** @typedef {[number, number, number]} Vector */
+
+/** Rays that come this near to a plane's own directions (sine of the angle) do not meet it well. */
+const GRAZING = 0.04;
+
+/** @param {number[]} a @param {number[]} b */
+export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+/** a + t b. @param {number[]} a @param {number[]} b @param {number} [t] @returns {Vector} */
+export const plus = (a, b, t = 1) => [a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]];
+
+/** @param {number[]} a @param {number[]} b @returns {Vector} */
+export const minus = (a, b) => plus(a, b, -1);
+
+/** @param {number[]} a @param {number[]} b @returns {Vector} */
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
+
+/** @param {number[]} a @returns {Vector} */
+export function unit(a) {
+  const length = Math.hypot(...a) || 1;
+  return [a[0] / length, a[1] / length, a[2] / length];
+}
+
+/** How much of each of three vectors makes up a fourth. @param {number[]} a @param {number[]} b
+ * @param {number[]} c @param {number[]} v @returns {Vector} */
+function parts(a, b, c, v) {
+  const whole = dot(a, cross(b, c));
+  return [
+    dot(v, cross(b, c)) / whole,
+    dot(a, cross(v, c)) / whole,
+    dot(a, cross(b, v)) / whole,
+  ];
+}
+
+/**
+ * Return where a point is seen, in pixels of the picture, and whether it is before the camera. Of
+ * one behind it the place is that of the opposite direction.
+ * @param {Camera} camera @param {number[]} point @returns {{x: number, y: number, isAhead: boolean}}
+ */
+export function seenAt(camera, point) {
+  const [x, y, s] = parts(
+    camera.across,
+    camera.down,
+    camera.ahead,
+    minus(point, camera.origin),
+  );
+  if (camera.is_parallel) return { x, y, isAhead: s > 0 };
+  return { x: x / s, y: y / s, isAhead: s > 0 };
+}
+
+/** Return the same for a direction: a point that is infinitely far away. @param {Camera} camera
+ * @param {number[]} direction */
+export function seenTowards(camera, direction) {
+  const far = 1e6 * (Math.hypot(...camera.origin) + 1);
+  return seenAt(camera, plus(camera.origin, unit(direction), far));
+}
+
+/** The ray of a pixel. @param {Camera} camera @param {number} x @param {number} y
+ * @returns {{origin: Vector, way: Vector}} */
+export function rayAt({ origin, across, down, ahead, is_parallel: isParallel }, x, y) {
+  const shifted = plus(plus([0, 0, 0], across, x), down, y);
+  return isParallel
+    ? { origin: plus(origin, shifted), way: unit(ahead) }
+    : { origin: plus(origin, [0, 0, 0]), way: unit(plus(shifted, ahead)) };
+}
+
+/**
+ * Return the place to which a pointer drags a light in its horizontal plane. Where the plane is seen
+ * from its side, the light moves along the picture instead, at its distance.
+ * @param {Camera} camera @param {number[]} place of the light @param {number} up axis
+ * @param {number} x @param {number} y in pixels of the picture @returns {Vector}
+ */
+export function inPlane(camera, place, up, x, y) {
+  const { origin, way } = rayAt(camera, x, y);
+  const far = dot(minus(place, origin), way);
+  const distance = (place[up] - origin[up]) / way[up];
+  const isMet = Math.abs(way[up]) > GRAZING && distance > 0 && distance < 8 * Math.abs(far);
+  const made = plus(origin, way, isMet ? distance : far);
+  made[up] = place[up];
+  return made;
+}
+
+/** Return the point of a line that is nearest to a pointer's ray. @param {Camera} camera
+ * @param {number[]} start @param {number[]} along @param {number} x @param {number} y
+ * @returns {number} as a multiple of `along` from `start` */
+function nearestOnLine(camera, start, along, x, y) {
+  const { origin, way } = rayAt(camera, x, y);
+  const between = minus(start, origin);
+  const [a, b, c] = [dot(along, along), dot(along, way), dot(way, way)];
+  const whole = a * c - b * b;
+  if (whole < 1e-9 * a * c) return 0;
+  return (b * dot(way, between) - c * dot(along, between)) / whole;
+}
+
+/** Return the place to which a pointer drags a light up and down. @param {Camera} camera
+ * @param {number[]} place @param {number} up @param {number} x @param {number} y @returns {Vector} */
+export function upAndDown(camera, place, up, x, y) {
+  const along = /** @type {Vector} */ ([0, 0, 0].map((_, k) => (k === up ? 1 : 0)));
+  return plus(place, along, nearestOnLine(camera, place, along, x, y));
+}
+
+/** Return the place on its rail to which a pointer drags a light. @param {Camera} camera
+ * @param {number[][]} rail both ends @param {number} x @param {number} y @returns {Vector} */
+export function onRail(camera, [start, end], x, y) {
+  const along = minus(end, start);
+  const share = nearestOnLine(camera, start, along, x, y);
+  return plus(start, along, Math.min(1, Math.max(0, share)));
+}
+
+/**
+ * Return a place within a rectangle, for one that may be outside: on the edge, in its direction from
+ * the middle.
+ * @param {{x: number, y: number, isAhead: boolean}} seen
+ * @param {{left: number, top: number, right: number, bottom: number}} box
+ * @returns {{x: number, y: number, isInside: boolean, angle: number}} angle: in radians, outwards
+ */
+export function within({ x, y, isAhead }, { left, top, right, bottom }) {
+  const [cx, cy] = [(left + right) / 2, (top + bottom) / 2];
+  const isInside = isAhead && x >= left && x <= right && y >= top && y <= bottom;
+  const sign = isAhead ? 1 : -1;
+  const [dx, dy] = [sign * (x - cx), sign * (y - cy)];
+  const angle = Math.atan2(dy, dx);
+  if (isInside) return { x, y, isInside, angle };
+  const t = Math.min(
+    (right - left) / 2 / Math.max(Math.abs(dx), 1e-9),
+    (bottom - top) / 2 / Math.max(Math.abs(dy), 1e-9),
+  );
+  return { x: cx + t * dx, y: cy + t * dy, isInside, angle };
+}

@@ -1,0 +1,241 @@
+/** Lights, marked where they hang in the pictures, with handles on the one that was chosen. */
+
+import { html, useRef } from '../vendor/preact.js';
+import { inPlane, onRail, seenAt, seenTowards, upAndDown, within } from './lamp_geometry.js';
+import { toHex } from './paint_colour.js';
+import { atFull, luminance } from './paint_colour.js';
+
+/** @typedef {import("./engine_interface.js").Pane} Pane */
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").App} App */
+/** @typedef {import("../engine/messages.js").LightPlace} LightPlace */
+/** @typedef {import("../engine/messages.js").Camera} Camera */
+/** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
+
+/** CSS pixels between a mark at the edge and the edge. */
+const MARGIN = 14;
+
+/** @param {{ui: Ui, app: App, panes: Pane[]}} props */
+export function LampMarks({ ui, app, panes }) {
+  const camera = ui.lamps && ui.rig ? ui.rig.cameras[ui.view] : null;
+  if (!camera) return null;
+  return html`<div class=${`lamps ${ui.pointing ? 'is-pointing' : ''}`}>
+    ${apart(panes).map(
+      (pane, k) => html`<${PaneMarks} key=${k} ui=${ui} app=${app} pane=${pane} camera=${camera}
+      isTwin=${k > 0} />`,
+    )}</div>`;
+}
+
+/** Panes that lie beside each other; of those over each other the first. @param {Pane[]} panes */
+function apart(panes) {
+  return panes.filter(
+    (pane, k) => panes.findIndex((x) => x.left === pane.left && x.top === pane.top) === k,
+  );
+}
+
+/** The part of a pane in which its picture is seen. @param {Pane} pane @param {[number, number]} size
+ * @returns {Box} */
+function boxOf(pane, [height, width]) {
+  return {
+    left: Math.max(pane.x, pane.left),
+    top: Math.max(pane.y, pane.top),
+    right: Math.min(pane.x + pane.width, pane.left + width * pane.scale),
+    bottom: Math.min(pane.y + pane.height, pane.top + height * pane.scale),
+  };
+}
+
+/** @param {{ui: Ui, app: App, pane: Pane, camera: Camera, isTwin: boolean}} props isTwin: the keyboard
+ * reaches the marks of the other picture */
+function PaneMarks({ ui, app, pane, camera, isTwin }) {
+  const box = boxOf(pane, ui.state.size);
+  const inner = {
+    left: box.left + MARGIN,
+    top: box.top + MARGIN,
+    right: box.right - MARGIN,
+    bottom: box.bottom - MARGIN,
+  };
+  /** @param {{x: number, y: number, isAhead: boolean}} seen in pixels of the picture */
+  const onPage = (seen) => ({
+    ...seen,
+    x: pane.left + seen.x * pane.scale,
+    y: pane.top + seen.y * pane.scale,
+  });
+  const places = /** @type {LightPlace[]} */ (ui.rig?.lights ?? []);
+  return html`
+    ${ui.lamp !== null && html`<${Beam} place=${placeOf(ui, ui.lamp)} camera=${camera} box=${box} onPage=${onPage} />`}
+    ${places.map((_, k) => {
+      const place = placeOf(ui, k);
+      const seen = markAt(camera, place);
+      if (!seen) return null;
+      return html`<${Mark} key=${k} ui=${ui} app=${app} light=${k} place=${place} pane=${pane}
+        camera=${camera} at=${within(onPage(seen), inner)} isTwin=${isTwin} />`;
+    })}
+    ${ui.lamp !== null && html`<${AimHandle} ui=${ui} app=${app} light=${ui.lamp} pane=${pane} camera=${camera} inner=${inner}
+      onPage=${onPage} isTwin=${isTwin} />`}`;
+}
+
+/** Where a light is; while it is dragged, where the pointer has it. @param {Ui} ui @param {number} k
+ * @returns {LightPlace} */
+export function placeOf({ rig, dragged }, k) {
+  const place = /** @type {LightPlace} */ (rig?.lights[k]);
+  return dragged?.light === k ? { ...place, ...dragged.place } : place;
+}
+
+/** Where the mark of a light belongs; that of one that is infinitely far away where its light comes
+ * from. @param {Camera} camera @param {LightPlace} place */
+function markAt(camera, { position, direction }) {
+  if (position) return seenAt(camera, position);
+  if (!direction) return null;
+  return seenTowards(
+    camera,
+    direction.map((x) => -x),
+  );
+}
+
+/**
+ * @param {{ui: Ui, app: App, light: number, place: LightPlace, pane: Pane, camera: Camera,
+ *   at: {x: number, y: number, isInside: boolean, angle: number}, isTwin: boolean}} props
+ */
+function Mark({ ui, app, light, place, pane, camera, at, isTwin }) {
+  const { label } = ui.lights[light];
+  const rgb = ui.weights[light] ?? ui.lights[light].present;
+  const isOn = luminance(rgb) > 0;
+  const canDrag = place.why_not === '' && place.position !== null;
+  const choose = () => app.store.set({ lamp: light });
+  const tip = place.why_not
+    ? `${label} ${place.why_not}: it stays where it is`
+    : `${label}: drag to move it, with Shift up and down`;
+  const drag = useDrag(app, pane, (x, y, isShift, start) => {
+    if (!canDrag || !place.position || !ui.rig) return null;
+    const from = /** @type {number[]} */ (start.place.position);
+    const moved = place.rail
+      ? onRail(camera, place.rail, x, y)
+      : isShift
+        ? upAndDown(camera, from, ui.rig.up, x, y)
+        : inPlane(camera, from, ui.rig.up, x, y);
+    return { place: { position: moved }, asked: { kind: 'move', pose: { position: moved } } };
+  });
+  return html`<button type="button" class=${[
+    'lamp',
+    at.isInside ? '' : 'is-outside',
+    ui.lamp === light ? 'is-chosen' : '',
+    place.why_not ? 'is-fixed' : '',
+    isOn ? '' : 'is-off',
+  ].join(' ')} style=${{
+    left: `${at.x}px`,
+    top: `${at.y}px`,
+    '--lit': isOn ? toHex(atFull(rgb)) : 'transparent',
+    '--outwards': `${at.angle}rad`,
+  }} aria-label=${label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
+    aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label} onClick=${choose}
+    onPointerDown=${(/** @type {PointerEvent} */ event) => {
+      if (ui.pointing) return; // the click is on what is seen behind
+      choose();
+      drag.down(event, light, place);
+    }} onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
+}
+
+/**
+ * @param {{ui: Ui, app: App, light: number, pane: Pane, camera: Camera, inner: Box,
+ *   onPage: (seen: any) => any, isTwin: boolean}} props
+ */
+function AimHandle({ ui, app, light, pane, camera, inner, onPage, isTwin }) {
+  const place = placeOf(ui, light);
+  const drag = useDrag(app, pane, (x, y) => ({
+    place: {},
+    at: [x, y],
+    asked: { kind: 'point', how: 'aim', at: [x, y], view: ui.view },
+  }));
+  if (!place.position || !place.direction || !place.target || place.why_not) return null;
+  const dragged = ui.dragged?.light === light ? ui.dragged.at : undefined;
+  const seen = dragged
+    ? { x: dragged[0], y: dragged[1], isAhead: true }
+    : seenAt(camera, place.target);
+  const at = within(onPage(seen), inner);
+  const { label } = ui.lights[light];
+  return html`<button type="button" class=${`lamp-aim ${at.isInside ? '' : 'is-outside'}`}
+    style=${{ left: `${at.x}px`, top: `${at.y}px` }} tabindex=${isTwin ? -1 : 0}
+    aria-hidden=${isTwin ? 'true' : undefined} aria-label=${`Aim of ${label}`}
+    data-tip=${`Drag what ${label} points at`}
+    onPointerDown=${(/** @type {PointerEvent} */ event) =>
+      ui.pointing ? undefined : drag.down(event, light, place)}
+    onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
+}
+
+/** The line from a light to what it points at. @param {{place: LightPlace, camera: Camera, box: Box,
+ *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
+function Beam({ place, camera, box, onPage }) {
+  if (!place.position || !place.target) return null;
+  const [from, to] = [place.position, place.target].map((point) => onPage(seenAt(camera, point)));
+  if (!from.isAhead || !to.isAhead) return null;
+  const { left, top, right, bottom } = box;
+  const style = { left: `${left}px`, top: `${top}px` };
+  return html`<svg class="lamp-beam" style=${style} width=${right - left} height=${bottom - top}
+    aria-hidden="true"><line x1=${from.x - left} y1=${from.y - top} x2=${to.x - left}
+      y2=${to.y - top} /></svg>`;
+}
+
+/**
+ * A drag of a mark, which asks for a place with every move and keeps the last one.
+ * @param {App} app @param {Pane} pane
+ * @param {(x: number, y: number, isShift: boolean, start: {place: LightPlace}) =>
+ *   {place: Partial<LightPlace>, at?: [number, number],
+ *    asked: import("./lamp_moves.js").Asked} | null} of the pointer, in pixels of the picture
+ */
+function useDrag(app, pane, of) {
+  const start = useRef(
+    /** @type {{light: number, place: LightPlace, dx: number, dy: number, isMoved: boolean,
+     *   last: import("./lamp_moves.js").Asked | null} | null} */ (null),
+  );
+  const inPicture = (/** @type {PointerEvent} */ event) => {
+    const { left, top } = app.engine.element.getBoundingClientRect();
+    return [
+      (event.clientX - left - pane.left) / pane.scale,
+      (event.clientY - top - pane.top) / pane.scale,
+    ];
+  };
+  const down = (
+    /** @type {PointerEvent} */ event,
+    /** @type {number} */ light,
+    /** @type {LightPlace} */ place,
+  ) => {
+    if (event.button !== 0) return;
+    event.stopPropagation();
+    const button = /** @type {HTMLElement} */ (event.currentTarget);
+    button.setPointerCapture(event.pointerId);
+    const { left, top, width, height } = button.getBoundingClientRect();
+    // A mark follows the pointer from where it was grasped.
+    const grasp = { dx: event.clientX - left - width / 2, dy: event.clientY - top - height / 2 };
+    start.current = { light, place, ...grasp, isMoved: false, last: null };
+  };
+  const move = (/** @type {PointerEvent} */ event) => {
+    const its = start.current;
+    if (!its) return;
+    event.stopPropagation();
+    const [x, y] = inPicture(event);
+    const made = of(x - its.dx / pane.scale, y - its.dy / pane.scale, event.shiftKey, its);
+    if (!made) return;
+    its.isMoved = true;
+    its.last = made.asked;
+    app.store.set({ dragged: { light: its.light, place: made.place, at: made.at } });
+    app.session.lampMoves.ask(its.light, withPose(app, its.light, made.asked), false);
+  };
+  const up = (/** @type {PointerEvent} */ event) => {
+    const its = start.current;
+    if (!its) return;
+    event.stopPropagation();
+    start.current = null;
+    if (its.isMoved && its.last)
+      app.session.lampMoves.ask(its.light, withPose(app, its.light, its.last), true);
+    app.store.set({ dragged: null });
+  };
+  return { down, move, up };
+}
+
+/** A move, with what else is asked of the light. @param {App} app @param {number} light
+ * @param {import("./lamp_moves.js").Asked} asked @returns {import("./lamp_moves.js").Asked} */
+function withPose(app, light, asked) {
+  if (asked.kind === 'point') return asked;
+  const { poses, lights } = app.store.value;
+  return { ...asked, pose: { ...poses[lights[light].name], ...asked.pose } };
+}

@@ -1,0 +1,138 @@
+"""The rays of a camera: what each pixel sees, as a page draws lamps with it, and first hits."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.paint.protocol import Camera, Place
+from lightpaint.scene.runtime.render_lock import tracing
+from lightpaint.scene.scene import Scene
+
+#: Part of a ray by which it may miss the rays of a pinhole, as through a fisheye lens.
+STRAIGHT = 1e-3
+
+
+@dataclass(frozen=True)
+class FirstHit:
+    """The surface that a pixel sees first.
+
+    eye: where its ray begins. point, normal: of the surface, towards the eye.
+    """
+
+    eye: Doubles
+    point: Doubles
+    normal: Doubles
+
+
+def camera_of(scene: Scene, loaded: Any) -> Camera | None:
+    """Return the camera of `scene`; None for one whose rays do not go through a pinhole."""
+    corners = np.array([(0, 0), (1, 0), (0, 1), (0.7, 0.6)])
+    origin, direction = _rays(scene, loaded, corners)
+    if np.allclose(direction, direction[0], atol=1e-5):
+        across, down, ahead = origin[1] - origin[0], origin[2] - origin[0], direction[0]
+        expected = origin[0] + 0.7 * across + 0.6 * down
+        is_straight = np.linalg.norm(expected - origin[3]) <= STRAIGHT * np.linalg.norm(across)
+        return _camera(scene, origin[0], across, down, ahead, is_parallel=True, ok=is_straight)
+    eye = _crossing(origin, direction)
+    off = np.linalg.norm(np.cross(origin - eye, direction), axis=1)
+    if (off > STRAIGHT * max(float(np.linalg.norm(origin - eye, axis=1).max()), STRAIGHT)).any():
+        return None
+    # All rays end in one plane before the eye: that which the first ray meets after a length of 1.
+    middle = _rays(scene, loaded, np.array([(0.5, 0.5)]))[1][0]
+    ends = direction / (direction @ middle)[:, None]
+    across, down = ends[1] - ends[0], ends[2] - ends[0]
+    expected = ends[0] + 0.7 * across + 0.6 * down
+    is_straight = np.linalg.norm(expected - ends[3]) <= STRAIGHT
+    return _camera(scene, eye, across, down, ends[0], is_parallel=False, ok=bool(is_straight))
+
+
+def _crossing(origin: Doubles, direction: Doubles) -> Doubles:
+    """Return the point that is nearest to all rays, which begin at a plane before the eye."""
+    beside = np.eye(3) - direction[:, :, None] * direction[:, None, :]
+    found: Doubles = np.linalg.solve(beside.sum(axis=0), (beside @ origin[..., None]).sum(axis=0))
+    return found[:, 0]
+
+
+def _camera(
+    scene: Scene,
+    origin: Doubles,
+    across: Doubles,
+    down: Doubles,
+    ahead: Doubles,
+    *,
+    is_parallel: bool,
+    ok: bool,
+) -> Camera | None:
+    height, width = scene.size
+    if not ok:
+        return None
+    return Camera(
+        origin=_listed(origin),
+        across=_listed(across / width),
+        down=_listed(down / height),
+        ahead=_listed(ahead),
+        is_parallel=is_parallel,
+    )
+
+
+def _listed(vector: Doubles) -> Place:
+    return tuple(map(float, vector))
+
+
+def up_axis(cameras: list[Camera | None]) -> int:
+    """Return the axis nearest to upwards in these views; y where no camera tells."""
+    ups = [-np.array(camera.down) for camera in cameras if camera is not None]
+    total = (
+        np.sum([up / max(np.linalg.norm(up), 1e-30) for up in ups], axis=0) if ups else [0, 1, 0]
+    )
+    return int(np.argmax(np.abs(total)))
+
+
+def first_hit(scene: Scene, loaded: Any, at: tuple[float, float]) -> FirstHit | None:
+    """Return what the pixel (column, row) of `scene` sees first; None for nothing."""
+    import mitsuba as mi
+
+    height, width = scene.size
+    with tracing():
+        rays = _mitsuba_rays(scene, loaded, np.array([(at[0] / width, at[1] / height)]))
+        si = loaded.ray_intersect(rays)
+        if not bool(np.array(si.is_valid()).all()):
+            return None
+        point, normal = _rows(si.p)[0], _rows(mi.Vector3f(si.sh_frame.n))[0]
+        eye, way = _rows(rays.o)[0], _rows(rays.d)[0]
+    return FirstHit(eye, point, normal if normal @ way < 0 else -normal)
+
+
+def free_length(loaded: Any, start: Doubles, direction: Doubles) -> float:
+    """Return how far a ray goes before it meets a surface; inf for none."""
+    import mitsuba as mi
+
+    with tracing():
+        ray = mi.Ray3f(mi.Point3f(*map(float, start)), mi.Vector3f(*map(float, direction)))
+        si = loaded.ray_intersect(ray)
+        if not bool(np.array(si.is_valid()).all()):
+            return np.inf
+        return float(np.array(si.t).ravel()[0])
+
+
+def _rays(scene: Scene, loaded: Any, at: Doubles) -> tuple[Doubles, Doubles]:
+    """Return origins and directions of rays, (k, 3) each. at: (k, 2), parts of the picture."""
+    with tracing():
+        rays = _mitsuba_rays(scene, loaded, at)
+        return _rows(rays.o), _rows(rays.d)
+
+
+def _mitsuba_rays(scene: Scene, loaded: Any, at: Doubles) -> Any:
+    import mitsuba as mi
+
+    camera = scene.camera(loaded)
+    position = mi.Point2f(np.asarray(at, np.float32).T)
+    middle = mi.Point2f(0.5, 0.5)  # of the lens
+    rays, _ = camera.sample_ray(camera.shutter_open(), 0.5, position, middle)
+    return mi.Ray3f(rays)
+
+
+def _rows(vectors: Any) -> Doubles:
+    return np.array(vectors, dtype=float).reshape(3, -1).T

@@ -1,0 +1,319 @@
+"""The lights of the painted scene with their places, and their planes wherever they are moved."""
+
+import json
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from threading import RLock
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import PaintError, SceneError
+from lightpaint.paint.protocol import LightPlace, PointLight, Rig
+from lightpaint.paint.rig.cameras import FirstHit, camera_of, first_hit, free_length, up_axis
+from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
+from lightpaint.paint.rig.pointing import aimed, with_highlight, with_shadow
+from lightpaint.paint.rig.quick_planes import QuickPlanes
+from lightpaint.paint.session.moved_lights import Poses
+from lightpaint.paint.subject import Subject
+from lightpaint.placement.place import SEARCHED
+from lightpaint.scene.properties.emission import MULTIPLE
+from lightpaint.scene.properties.pose import Pose, Site, motion_of
+from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.surfaces import render_features
+
+#: Rendered planes that are kept, so that undo finds them: each of all views.
+MAX_RENDERED = 32
+
+#: A light and its pose, as text.
+PoseKey = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class RigView:
+    """A view of the loaded scene. quick: makes planes at any place; None where none can be."""
+
+    scene: Scene
+    loaded: Any
+    quick: QuickPlanes | None
+
+
+class LampRig:
+    """The rig of a session: the source of the planes of moved lights.
+
+    Scene and paths are loaded when somebody first asks for them. Bases are of all views, in which
+    every light is where the scene has it.
+    """
+
+    def __init__(self, subjects: Sequence[Subject]) -> None:
+        self._subjects = tuple(subjects)
+        self._lock = RLock()
+        self._views: tuple[RigView, ...] | None = None
+        self._rendered = OrderedDict[PoseKey, list[Basis]]()
+        self._bounds: tuple[Doubles, Doubles] | None = None
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of the first view. Raises PaintError where there is none."""
+        if self._subjects[0].scene is None:
+            raise PaintError("there is no scene to render: its lights cannot be moved")
+        return self._subjects[0].loaded_scene
+
+    @property
+    def is_open(self) -> bool:
+        """True if scene and paths are loaded."""
+        return self._views is not None
+
+    def open(self, bases: Sequence[Basis]) -> None:
+        """Load scene and paths, unless they are loaded."""
+        with self._lock:
+            if self._views is None:
+                with _in_this_thread():
+                    self._views = tuple(map(self._open_view, self._subjects, bases))
+
+    def _open_view(self, subject: Subject, basis: Basis) -> RigView:
+        scene = subject.loaded_scene
+        loaded = scene.load()
+        features = basis.features
+        if features is None or features.position is None:
+            features = render_features(scene)
+        assert features.position is not None
+        seen = features.position[features.normal.any(axis=-1)]
+        if len(seen):
+            corners = [seen.min(axis=0), seen.max(axis=0)]
+            if self._bounds is not None:
+                corners = [
+                    np.minimum(corners[0], self._bounds[0]),
+                    np.maximum(corners[1], self._bounds[1]),
+                ]
+            self._bounds = corners[0].astype(float), corners[1].astype(float)
+        quick = None if scene.has_media else QuickPlanes(scene, loaded, features)
+        return RigView(scene, loaded, quick)
+
+    # Poses
+
+    def check(self, poses: Poses) -> None:
+        """Raise LightpaintError for poses that these lights cannot have."""
+        for name, values in poses.items():
+            self.site(name, values)
+
+    def why_not(self, name: str) -> str:
+        """Return why a light cannot be moved, in words that follow its name; "" if it can."""
+        scene = self.scene
+        if scene.has_media:
+            return "stands in a scene with fog or the like"
+        light = scene.light(name)
+        if light.is_fixed:
+            return "is kept as it is"
+        if len(light.members) > 1:
+            return f"is a group of {len(light.members)} emitters"
+        if light.plugin not in SEARCHED:
+            return f"is of the kind {light.plugin}; only points, spots and suns are moved here"
+        return "has a picture in its beam" if light.unit == MULTIPLE else ""
+
+    def site(self, name: str, values: Mapping[str, Any]) -> Site:
+        """Return the place of a light with a pose. Raises LightpaintError for what it cannot do."""
+        light = self.scene.light(name)
+        if reason := self.why_not(name):
+            raise PaintError(f"{name} {reason}: it cannot be moved here")
+        its = light.members[0].site
+        if not values:
+            return its
+        return motion_of(name, light.plugin, its, _pose(name, values)).site
+
+    def moved_scene(self, poses: Poses, view: int = 0) -> Scene:
+        """Return the scene of a view with lights moved."""
+        scene = self._subjects[view].loaded_scene
+        named = {name: _pose(name, values) for name, values in poses.items()}
+        return scene.moved(named) if named else scene
+
+    # Planes
+
+    def bases(self, bases: Sequence[Basis], poses: Poses) -> list[Basis]:
+        """Return the bases with the planes of moved lights: rendered ones, or else quick ones."""
+        if not poses:
+            return list(bases)
+        moved = {name: self._planes(bases, name, values) for name, values in poses.items()}
+        is_rendered = all(self._is_rendered(name, values) for name, values in poses.items())
+        names = bases[0].names
+        return [
+            with_planes_of(
+                basis,
+                {names.index(name): planes[k] for name, planes in moved.items()},
+                in_memory=is_rendered,
+            )
+            for k, basis in enumerate(bases)
+        ]
+
+    def _planes(self, bases: Sequence[Basis], name: str, values: Mapping[str, Any]) -> list[Basis]:
+        """Return the plane of a light with a pose in each view."""
+        key = _key(name, values)
+        with self._lock:
+            if (rendered := self._rendered.get(key)) is not None:
+                self._rendered.move_to_end(key)
+                return rendered
+        self.open(bases)
+        assert self._views is not None
+        site, made = self.site(name, values), []
+        for view, basis in zip(self._views, bases, strict=True):
+            assert view.quick is not None
+            light = basis.lights[basis.names.index(name)]
+            with _in_this_thread():
+                plane = view.quick.plane(site)
+            made.append(one_light_basis(basis, replace(light, identity=""), plane))
+        return made
+
+    def _is_rendered(self, name: str, values: Mapping[str, Any]) -> bool:
+        return _key(name, values) in self._rendered
+
+    def unrendered(self, poses: Poses) -> list[str]:
+        """Return the moved lights whose planes are quick ones so far."""
+        return [name for name, values in poses.items() if not self._is_rendered(name, values)]
+
+    def render(
+        self,
+        bases: Sequence[Basis],
+        name: str,
+        values: Mapping[str, Any],
+        check: Callable[[], None],
+    ) -> None:
+        """Render the planes of a light with a pose, that light alone, in all views.
+
+        check: called between passes; raises to stop.
+        """
+        from lightpaint.basis.cache.cached_render import obtain_basis
+
+        def progress(label: str, done: int, total: int, unit: str = "passes") -> None:
+            del label, done, total, unit
+            check()
+
+        made = []
+        for subject, basis in zip(self._subjects, bases, strict=True):
+            scene = subject.loaded_scene.moved({name: _pose(name, values)}).only([name])
+            with MITSUBA.low_priority():
+                made.append(
+                    obtain_basis(
+                        scene,
+                        spp=max(basis.origin.spp, 1),
+                        seed=basis.origin.seed,
+                        use_cache=subject.settings.use_cache,
+                        progress=progress,
+                    )
+                )
+        with self._lock:
+            self._rendered[_key(name, values)] = made
+            while len(self._rendered) > MAX_RENDERED:
+                self._rendered.popitem(last=False)
+
+    # Places in the picture
+
+    def pointed(self, request: PointLight, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the pose of a light after a request to point it, from its present pose."""
+        with _in_this_thread():
+            return {**values, **self._pointing(request, name, self.site(name, values))}
+
+    def _pointing(self, request: PointLight, name: str, site: Site) -> dict[str, Any]:
+        view = self._view(request.view)
+        hit = self._hit(view, request.at)
+        length = partial(free_length, view.loaded)
+        if request.how == "aim":
+            return aimed(name, site, hit)
+        if request.how == "highlight":
+            return with_highlight(name, site, hit, length)
+        if request.edge is None:
+            raise PaintError("a shadow needs two places: the edge that casts it, and where it ends")
+        return with_shadow(name, site, self._hit(view, request.edge), hit, length)
+
+    def _view(self, number: int) -> RigView:
+        assert self._views is not None
+        if number >= len(self._views):
+            raise PaintError(f"no view {number}: there are {len(self._views)}")
+        return self._views[number]
+
+    def _hit(self, view: RigView, at: tuple[float, float]) -> FirstHit:
+        height, width = view.scene.size
+        if not (0 <= at[0] < width and 0 <= at[1] < height):
+            raise PaintError(f"the place {list(at)} is outside the picture, {width}x{height}")
+        hit = first_hit(view.scene, view.loaded, at)
+        if hit is None:
+            raise PaintError("nothing is seen there: click on a surface")
+        return hit
+
+    def state(self, poses: Poses) -> Rig:
+        """Return where all lights are, for pages. The rig is open."""
+        assert self._views is not None
+        with _in_this_thread():
+            places = tuple(
+                self._place(light.name, poses.get(light.name, {})) for light in self.scene.lights
+            )
+            cameras = [camera_of(view.scene, view.loaded) for view in self._views]
+        hung = [np.array(place.position) for place in places if place.position is not None]
+        low, high = self._bounds or (np.zeros(3), np.ones(3))
+        low, high = np.min([low, *hung], axis=0), np.max([high, *hung], axis=0)
+        return Rig(
+            lights=places,
+            cameras=tuple(cameras),
+            up=up_axis(cameras),
+            low=tuple(map(float, low)),
+            high=tuple(map(float, high)),
+        )
+
+    def _place(self, name: str, values: Mapping[str, Any]) -> LightPlace:
+        reason = self.why_not(name)
+        light = self.scene.light(name)
+        site = self.site(name, values) if not reason else light.members[0].site
+        if reason and len(light.members) > 1:
+            site = Site()
+        target = values.get("target") or self._target(site)
+        return LightPlace(
+            position=site.position,
+            direction=site.direction,
+            target=None if target is None else tuple(map(float, target)),
+            cutoff=site.cutoff,
+            beam=site.beam,
+            rail=None,
+            why_not=reason,
+        )
+
+    def _target(self, site: Site) -> Doubles | None:
+        """Return the point of the first surface along a light's axis."""
+        if site.position is None or site.direction is None:
+            return None
+        place, way = np.array(site.position), np.array(site.direction)
+        length = free_length(self._view(0).loaded, place + 1e-3 * way, way)
+        low, high = self._bounds or (np.zeros(3), np.ones(3))
+        return np.asarray(place + min(length, float(np.linalg.norm(high - low))) * way)
+
+
+@contextmanager
+def _in_this_thread() -> Iterator[None]:
+    """Hold Mitsuba, and let this thread use what another one has loaded or traced."""
+    import drjit as dr
+    import mitsuba as mi
+
+    with tracing():
+        dr.detail.new_scope(dr.backend_v(mi.Float))
+        yield
+
+
+def _pose(name: str, values: Mapping[str, Any]) -> Pose:
+    """Return the pose of a light that a client asks for. Raises PaintError for no pose."""
+    known = {"position", "target", "cutoff", "beam"}
+    if unknown := [key for key in values if key not in known]:
+        raise PaintError(
+            f"{name}: a pose has no {unknown[0]!r}: expected {', '.join(sorted(known))}"
+        )
+    try:
+        return Pose(**values)
+    except SceneError as error:
+        raise PaintError(f"{name}: {error}") from None
+
+
+def _key(name: str, values: Mapping[str, Any]) -> PoseKey:
+    return name, json.dumps(values, sort_keys=True)

@@ -1,0 +1,205 @@
+"""Lights that a session moves: their pictures at once, and their planes rendered behind."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.denoised_planes import (
+    DenoisedPlanes,
+    as_halves,
+    denoise_to_halves,
+    scale_of,
+)
+from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
+from lightpaint.paint.protocol import (
+    Message,
+    MoveLights,
+    Notice,
+    PictureUpdate,
+    PointLight,
+    TaskStarted,
+)
+from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.session.moved_lights import Poses
+from lightpaint.paint.session.picture_table import Picture, PictureTable, plane_thumbnail
+from lightpaint.paint.session.session import Session
+from lightpaint.paint.store.steps import name_in_view
+
+
+class MoverHost(Protocol):
+    """The studio, as lights that are moved see it."""
+
+    pictures: PictureTable
+
+    @property
+    def session(self) -> Session:
+        """The session. Raises PaintError before there is a basis."""
+
+    def changing(self) -> AbstractContextManager[Session]:
+        """Return a block in which nobody else changes the session."""
+
+    def publish(self, message: Message | None) -> None:
+        """Send a message to pages."""
+
+    def denoised(self, bases: Sequence[Basis]) -> Sequence[DenoisedPlanes | None]:
+        """Return the denoised planes of bases without moved lights, of each view."""
+
+    def planes_rendered(self) -> None:
+        """Note that the session has rendered planes in the place of quick ones."""
+
+
+class LightMover:
+    """Moves lights of a session for its studio.
+
+    Attributes:
+        rig: The lights and their places, and the source of their planes.
+    """
+
+    def __init__(self, host: MoverHost, rig: LampRig, threads: BackgroundThreads) -> None:
+        self.rig, self._host, self._threads = rig, host, threads
+        self._shows_rig, self._shown_poses = False, dict[str, Mapping[str, Any]]()
+        self._dragged = set[str]()  # lights that are
+        self._work = LatestWork(self._render, host.publish)
+        self._is_working, self._is_open = False, True
+
+    def stop(self) -> None:
+        """End the work in the background."""
+        self._is_open = False
+        self._work.stop()
+
+    def show_rig(self) -> list[Message]:
+        """Load the rig in the background, and publish it now and after every move."""
+        self._shows_rig = True
+        self._threads.start_low_priority(self._open_rig, "rig")
+        return [TaskStarted(what="rig")]
+
+    def _open_rig(self) -> None:
+        self.rig.open(self._host.session.bases)
+        self._publish_rig()
+
+    def _publish_rig(self) -> None:
+        if self._shows_rig and self.rig.is_open:
+            self._host.publish(self.rig.state(self._host.session.requests.poses))
+
+    def move_of(self, request: PointLight) -> MoveLights:
+        """Return the move that a request to point a light comes to. Raises LightpaintError."""
+        session = self._host.session
+        self.rig.open(session.bases)
+        name = (
+            session.basis.names[request.light] if request.light < len(session.basis.names) else ""
+        )
+        pose = self.rig.pointed(request, name, session.requests.poses.get(name, {}))
+        return MoveLights({name: pose}, request.done)
+
+    def follow(self) -> None:
+        """Show the planes of lights that were moved since, and render them once they rest."""
+        session = self._host.session
+        poses = session.requests.poses
+        shown, is_dragged = self._shown_poses, session.is_open
+        names = {name for name in {*poses, *shown} if poses.get(name) != shown.get(name)}
+        names |= set() if is_dragged else self._dragged
+        if not names:
+            return
+        self._shown_poses, self._dragged = dict(poses), names if is_dragged else set()
+        self._offer(session, sorted(names), is_dragged=is_dragged)
+        self._publish_rig()
+        if not is_dragged:
+            self._warn_of_unlit(session, names & {*poses})
+            self.render_behind()
+
+    def _warn_of_unlit(self, session: Session, names: Collection[str]) -> None:
+        """Say which of these lights light nothing that is seen, as in a wall or behind one."""
+        for name in sorted(names):
+            k = session.basis.names.index(name)
+            if not any(view.basis.planes.plane(k).any() for view in session.views):
+                text = f"{name} lights nothing that is seen from there: it may be in a wall"
+                self._host.publish(Notice(text=text, tone="warn"))
+
+    def render_behind(self) -> None:
+        """Render the planes that are quick ones so far, in the background."""
+        poses = self._host.session.requests.poses
+        if not poses:
+            return
+        if not self._is_working:
+            self._is_working = True
+            self._threads.start_low_priority(self._work.run, "planes")
+        self._work.give(poses)
+
+    def _render(self, poses: Poses) -> None:
+        """Render the quick planes of these poses, as long as they are those of the session."""
+        host = self._host
+
+        def check() -> None:
+            if not self._is_open or host.session.requests.poses != poses:
+                raise StoppedError
+
+        with suppress(StoppedError):
+            self.finish(poses, check)
+            for name in poses:
+                check()
+                self._denoise(name)
+
+    def finish(self, poses: Poses, check: Callable[[], None]) -> None:
+        """Render the quick planes of these poses. check: raises to stop."""
+        for name in self.rig.unrendered(poses):
+            check()
+            self.rig.render(self._host.session.bases, name, poses[name], check)
+            with self._host.changing() as session:
+                if session.requests.poses.get(name) == poses[name]:
+                    session.renew_planes([name])
+                    self._offer(session, [name], is_dragged=False)
+            self._host.planes_rendered()
+
+    def offer_all(self, session: Session) -> None:
+        """Offer the pictures of all moved lights, after those of bases without moves were."""
+        self._shown_poses = dict(session.requests.poses)
+        self._offer(session, list(session.requests.poses), is_dragged=False)
+
+    def _offer(self, session: Session, names: Sequence[str], *, is_dragged: bool) -> None:
+        """Offer the pictures of lights as they are now."""
+        pictures, offered = self._host.pictures, []
+        clean = None if is_dragged else self._host.denoised(session.bases)
+        for view, unmoved in zip(session.views, session.bases, strict=True):
+            for name in names:
+                k = unmoved.names.index(name)
+                scale = scale_of(unmoved.planes.plane(k))
+                is_moved = name in session.requests.poses
+                plane = view.basis.planes.plane(k)
+                make: Callable[[], Picture] = partial(as_halves, plane, scale)
+                kept = clean[view.view] if clean is not None else None
+                if not is_moved and kept is not None:
+                    make = partial(_kept_halves, kept, k)
+                makers: dict[str, Callable[[], Picture]] = {
+                    f"clean/{k}": make,
+                    f"plane/{k}": partial(as_halves, plane, scale),
+                }
+                if not is_dragged:
+                    makers[f"thumb/{k}"] = partial(plane_thumbnail, plane, view.basis.emitters_seen)
+                for plain, maker in makers.items():
+                    full = name_in_view(plain, view.view)
+                    pictures.offer(full, maker)
+                    offered.append(full)
+        resources = {name: pictures.generations[name] for name in offered}
+        self._host.publish(PictureUpdate(resources=resources))
+
+    def _denoise(self, name: str) -> None:
+        """Replace the picture of a rendered plane by a denoised one."""
+        for view, unmoved in zip(self._host.session.views, self._host.session.bases, strict=True):
+            basis, k = view.basis, unmoved.names.index(name)
+            scale = scale_of(unmoved.planes.plane(k))
+            halves, own = denoise_to_halves(basis, k)
+            picture = as_halves(halves.astype("float32") * own, scale)
+            with self._host.changing():
+                if view.basis.planes is basis.planes:
+                    full = name_in_view(f"clean/{k}", view.view)
+                    self._host.pictures.put(full, picture)
+                    number = self._host.pictures.generations[full]
+                    self._host.publish(PictureUpdate(resources={full: number}))
+
+
+def _kept_halves(planes: DenoisedPlanes, k: int) -> Picture:
+    return np.asarray(planes.halves[k])

@@ -1,0 +1,71 @@
+"""Bases in which some lights are elsewhere: their planes beside those of the others."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.derived_planes import PlaneReference, compose_planes
+from lightpaint.basis.file.basis_file import is_large
+from lightpaint.basis.lights import BasisLight
+from lightpaint.basis.planes import MemoryPlanes, Planes
+from lightpaint.images.estimate import Estimate
+
+
+def one_light_basis(basis: Basis, light: BasisLight, plane: Floats) -> Basis:
+    """Return the basis of one light, whose plane (h, w, 3) has no noise."""
+    quiet = MemoryPlanes(np.broadcast_to(np.float32(0), (1, *plane.shape)))
+    lone = replace(
+        basis.on_pixels(basis.planes, basis.noise, basis.emitters_seen),
+        lights=(light,),  # type: ignore[arg-type]
+        planes=MemoryPlanes(plane[None]),
+        noise=quiet,
+        origin=replace(basis.origin, each_light=(), extra_spp=0.0),
+    )
+    return lone
+
+
+def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool) -> Basis:
+    """Return `basis` with the lights, planes and noise of bases of one light each, by number.
+
+    Unpainted parts are still held near the look of `basis`. in_memory: whether planes are copied,
+    which saves time when all of them are read many times.
+    """
+    in_memory = in_memory and not is_large(len(basis.lights), basis.size)
+
+    def compose(planes: Planes, others: Mapping[int, Planes]) -> Planes:
+        picks: list[PlaneReference] = [
+            (others[k], 0) if k in others else (planes, k) for k in range(planes.count)
+        ]
+        return compose_planes(picks, basis.size, in_memory=in_memory)
+
+    indirect = None
+    if basis.indirect is not None and all(its.indirect is not None for its in moved.values()):
+        parts = {k: its.indirect for k, its in moved.items() if its.indirect is not None}
+        indirect = IndirectLight(
+            compose(basis.indirect.planes, {k: part.planes for k, part in parts.items()}),
+            compose(basis.indirect.noise, {k: part.noise for k, part in parts.items()}),
+        )
+    lights = tuple(
+        moved[k].lights[0] if k in moved else light for k, light in enumerate(basis.lights)
+    )
+    made = replace(
+        basis,
+        lights=type(basis.lights)(lights, basis.requests),
+        planes=compose(basis.planes, {k: its.planes for k, its in moved.items()}),
+        noise=compose(basis.noise, {k: its.noise for k, its in moved.items()}),
+        indirect=indirect,
+        former=Estimate(basis.present_look, basis.present_noise),
+        guide_table=None,
+        sums=None,
+        origin=replace(basis.origin, is_composed=True),
+    )
+    # A walk over all planes would come to the same as those of each.
+    for name in ("power", "totals"):
+        rows = getattr(basis, name).copy()
+        for k, its in moved.items():
+            rows[k] = getattr(its, name)[0]
+        vars(made)[name] = rows
+    return made

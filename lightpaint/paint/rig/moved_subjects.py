@@ -1,0 +1,24 @@
+"""The subjects of a session whose lights hang elsewhere, for its exports and verification."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.session.snapshot import SessionSnapshot
+from lightpaint.paint.subject import Subject
+
+
+def of_moved_scenes(
+    subjects: Sequence[Subject], snapshot: SessionSnapshot, rig: LampRig
+) -> tuple[tuple[Subject, ...], SessionSnapshot]:
+    """Return subjects and snapshot of scenes whose lights hang where the session has them."""
+    poses = snapshot.requests.poses
+    if not poses:
+        return tuple(subjects), snapshot
+    scenes = [rig.moved_scene(poses, k) for k in range(len(subjects))]
+    moved = tuple(replace(x, scene=scene) for x, scene in zip(subjects, scenes, strict=True))
+    bases = tuple(
+        replace(basis, origin=replace(basis.origin, scene_identity=scene.identity))
+        for basis, scene in zip(snapshot.bases, scenes, strict=True)
+    )
+    return moved, replace(snapshot, bases=bases)

@@ -1,0 +1,94 @@
+"""Closed forms of where a light is whose light, highlight or shadow falls on a place."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.errors import PaintError
+from lightpaint.paint.rig.cameras import FirstHit
+from lightpaint.scene.properties.pose import Site
+
+#: A light hangs at most at this part of the way to the next surface, and there is room for it where
+#: that is at least this part of its distance from what it lights.
+BEFORE_WALL, LEAST_ROOM = 0.9, 0.05
+
+#: Least distance of a light beyond what casts its shadow, relative to its distance from the shadow.
+BEYOND_EDGE = 0.3
+
+#: How far a ray goes from a point in a direction before it meets a surface.
+FreeLength = Callable[[Doubles, Doubles], float]
+
+Pose = dict[str, Any]
+
+
+def aimed(name: str, site: Site, hit: FirstHit) -> Pose:
+    """Return the change that points a light at what is seen. Raises PaintError if none does."""
+    if site.direction is None:
+        raise PaintError(f"{name} shines all around: it cannot be aimed")
+    if site.position is None:
+        raise PaintError(f"{name} is infinitely far away: choose where its shadow ends instead")
+    return {"target": _listed(hit.point)}
+
+
+def with_highlight(name: str, site: Site, hit: FirstHit, free_length: FreeLength) -> Pose:
+    """Return the change that lets a light's reflection be seen at `hit`: the eye's ray, mirrored.
+
+    The light keeps its distance from there as far as there is room.
+    """
+    ahead = _unit(hit.point - hit.eye)
+    mirrored = _unit(ahead - 2 * (ahead @ hit.normal) * hit.normal)
+    if mirrored @ hit.normal <= 0:
+        raise PaintError("the surface is seen from behind there: choose another place")
+    return _hung(name, site, hit.point, hit.point, mirrored, free_length)
+
+
+def with_shadow(
+    name: str, site: Site, edge: FirstHit, hit: FirstHit, free_length: FreeLength
+) -> Pose:
+    """Return the change that lets the shadow of `edge` end at `hit`: the line through both."""
+    between = edge.point - hit.point
+    if not np.linalg.norm(between) > 0:
+        raise PaintError("the shadow and what casts it are one place: choose two places")
+    if between @ hit.normal <= 0:
+        raise PaintError(
+            "what casts the shadow is behind the surface: choose another edge or place"
+        )
+    return _hung(name, site, hit.point, edge.point, _unit(between), free_length)
+
+
+def _hung(
+    name: str,
+    site: Site,
+    lit: Doubles,
+    start: Doubles,
+    way: Doubles,
+    free_length: FreeLength,
+) -> Pose:
+    """Return the change that hangs a light on the line from `start`, and aims it at `lit`."""
+    if site.position is None:
+        if site.direction is None:
+            raise PaintError(f"{name} has no place and no direction: it cannot be moved")
+        return {"target": _listed(-way)}
+    distance = float(np.linalg.norm(np.array(site.position) - lit))
+    before = float(np.linalg.norm(start - lit))
+    wanted = max(distance - before, BEYOND_EDGE * distance)
+    nudge = 1e-3 * max(distance, before)
+    room = BEFORE_WALL * free_length(start + nudge * way, way)
+    if room < LEAST_ROOM * distance:
+        raise PaintError(f"there is no room for {name} on that line: choose another place")
+    place = start + min(wanted, room) * way
+    pose: Pose = {"position": _listed(place)}
+    if site.direction is not None:
+        pose["target"] = _listed(lit)
+    return pose
+
+
+def _unit(vector: Doubles) -> Doubles:
+    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-30))
+
+
+def _listed(point: Doubles) -> list[float]:
+    """Return a point as JSON has it, without the noise of single precision."""
+    return [float(f"{x:.6g}") for x in point]

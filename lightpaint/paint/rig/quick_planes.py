@@ -1,0 +1,123 @@
+"""The plane of a light at any place within a tenth of a second, while somebody drags it.
+
+Direct light has edges: one frozen path for each pixel finds it. Indirect light is smooth: a small
+film has it, averaged along surfaces, and each pixel takes it from the four cells around it, by how
+alike their surfaces are to its own.
+"""
+
+from collections.abc import Sequence
+from itertools import product
+from math import isqrt, prod
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.images.denoiser import DARKEST, Features
+from lightpaint.placement.frozen_paths import FrozenPaths
+from lightpaint.scene.properties.film import reduction_to
+from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.scene import Scene
+
+#: First hits of the whole picture, about, if each pixel has one at least and this many at most.
+FIRST_HITS, MOST_PER_PIXEL = 2**19, 16
+
+#: Cells of the film of indirect light, about, and paths of the whole film.
+CELLS, PATHS = 2**13, 2**15
+
+#: Distance from a cell's tangent plane, relative to the distance of the cells, at which its weight
+#: is 1/e; and by how much its normal counts.
+NEAR_PLANE, NORMAL_POWER = 0.5, 16.0
+
+#: Least weight of a cell: where no surface is alike, all four count.
+LEAST_WEIGHT = 1e-4
+
+
+class QuickPlanes:
+    """The planes of points, spots and suns on the film of a scene.
+
+    loaded: that scene, loaded, which has to stay. features: of each pixel, with positions.
+    """
+
+    def __init__(self, scene: Scene, loaded: Any, features: Features, *, seed: int = 0) -> None:
+        small = scene.reduced(f"1/{reduction_to(scene.film, CELLS)}")
+        cells = _sampled(features, small.size)
+        self.size = scene.size
+        hits = isqrt(min(max(FIRST_HITS // prod(scene.size), 1), MOST_PER_PIXEL)) ** 2
+        paths = min(max(PATHS // prod(small.size), 1), MOST_PER_PIXEL)
+        self._direct = FrozenPaths(scene, loaded, first_hits=hits, bounces=0, seed=seed)
+        scattered = FrozenPaths(small, loaded, first_hits=1, bounces=paths, seed=seed)
+        self._indirect = scattered.filtered_along(cells)
+        self._spread = _Spreading(features, cells)
+        self._cell_albedo = np.maximum(cells.albedo, DARKEST).reshape(-1, 3)
+        self._albedo = np.maximum(features.albedo, DARKEST).reshape(-1, 3)
+
+    def plane(self, site: Site) -> npt.NDArray[np.float32]:
+        """Return the image of a light at unit intensity, (h, w, 3) linear Rec.709."""
+        made = self._direct.direct_images([site])[0]
+        indirect = self._indirect.indirect_images([site])[0].reshape(-1, 3)
+        made += self._spread(indirect / self._cell_albedo) * self._albedo
+        return np.asarray(made.reshape(*self.size, 3), np.float32)
+
+
+def _sampled(features: Features, size: tuple[int, int]) -> Features:
+    """Return the features in the middles of cells, (height, width) of which make up the picture."""
+    assert features.position is not None
+    where = np.ix_(
+        *(
+            ((np.arange(count) + 0.5) * whole / count).astype(np.intp)
+            for count, whole in zip(size, features.size, strict=True)
+        )
+    )
+    return Features(features.albedo[where], features.normal[where], features.position[where])
+
+
+class _Spreading:
+    """Light in cells spread over pixels: of the four cells around each, by how alike they are.
+
+    Attributes:
+        cells, weights: (4, pixels), of which cells, and how much of each.
+    """
+
+    def __init__(self, features: Features, cells: Features) -> None:
+        assert features.position is not None
+        assert cells.position is not None
+        (height, width), (rows, columns) = features.size, cells.size
+        y, along_y = _between(height, rows)
+        x, along_x = _between(width, columns)
+        spacing = _spacing(cells.position)
+        self.cells = np.empty((4, height * width), np.int32)
+        self.weights = np.empty((4, height * width, 1), np.float32)
+        for k, (a, b) in enumerate(product(range(2), repeat=2)):
+            where = np.ix_(y[a], x[b])
+            normal, position = cells.normal[where], cells.position[where]
+            off = np.abs(((features.position - position) * normal).sum(axis=-1))
+            alike = np.clip((features.normal * normal).sum(axis=-1), 0, 1) ** NORMAL_POWER
+            alike *= np.exp(-off / (NEAR_PLANE * spacing))
+            self.cells[k] = np.add.outer(y[a] * columns, x[b]).ravel()
+            weight = np.outer(along_y[a], along_x[b]) * (alike + LEAST_WEIGHT)
+            self.weights[k] = weight.reshape(-1, 1)
+        self.weights /= np.maximum(self.weights.sum(axis=0), 1e-30)
+
+    def __call__(self, light: Floats) -> npt.NDArray[np.float32]:
+        """Return light of cells, (cells, 3), in pixels, (pixels, 3)."""
+        made = np.zeros((self.cells.shape[1], 3), np.float32)
+        for cells, weights in zip(self.cells, self.weights, strict=True):
+            made += np.take(light, cells, axis=0) * weights
+        return made
+
+
+def _between(count: int, cells: int) -> tuple[Sequence[npt.NDArray[np.intp]], Sequence[Floats]]:
+    """Return the two cells that each of `count` pixels lies between, along an axis, and weights."""
+    at = (np.arange(count) + 0.5) * cells / count - 0.5
+    first = np.floor(at).astype(np.intp)
+    share = at - first
+    both = [np.clip(first + k, 0, cells - 1) for k in range(2)]
+    return both, [1 - share, share]
+
+
+def _spacing(position: Floats) -> float:
+    """Return the usual distance of surfaces in cells beside each other."""
+    steps = np.linalg.norm(np.diff(position, axis=1), axis=-1)
+    return float(max(np.median(steps), 1e-12)) if steps.size else 1.0

@@ -1,0 +1,140 @@
+"""Lights that are marked, dragged and pointed in the pictures of a real page over a real scene."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import write_room
+
+from lightpaint.paint.server.server import Server
+from lightpaint.paint.store.store import Store
+from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.placement.free_space import pixels_of
+from lightpaint.scene.scene_reader import load_scene
+
+PAINTER = "document.getElementById('lightpaint').painter"
+
+
+def until(is_so: Callable[[], Any], seconds: float = 60) -> Any:
+    end = time.monotonic() + seconds
+    while not (found := is_so()):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    return found
+
+
+class Room:
+    """A painter of the test room, and a page of it whose lights are marked."""
+
+    def __init__(self, page: Any, folder: Path) -> None:
+        self.page, self.scene = page, load_scene(write_room(folder))
+        settings = Settings(spp=4, use_cache=False)
+        subject = Subject("room", folder, scene=self.scene, settings=settings)
+        self.studio = Studio([subject], lambda its: Store.open(folder / "session.db", its))
+        self.server = Server(self.studio, port=0)
+        self.thread = threading.Thread(target=self.server.run, daemon=True)
+        self.thread.start()
+        self.studio.start()
+        page.goto(self.server.url)
+        page.wait_for_selector(".lightpaint .tag")
+        page.keyboard.press("d")
+        page.wait_for_selector(".lamp")
+
+    @property
+    def poses(self) -> Any:
+        return self.studio.session.requests.poses
+
+    def seen(self, point: Any) -> tuple[float, float]:
+        """Where a point of the scene is on the screen, by the camera of the scene itself."""
+        [place] = self.scene.while_loaded(
+            lambda loaded: pixels_of(self.scene, loaded, np.array([point]))
+        )
+        height, width = self.scene.size
+        left, top, scale = self.page.evaluate(
+            f"() => {{ const {{ engine }} = {PAINTER}; const [pane] = engine.panes();"
+            "const box = engine.element.getBoundingClientRect();"
+            "return [box.left + pane.left, box.top + pane.top, pane.scale] }"
+        )
+        return left + place[0] * width * scale, top + place[1] * height * scale
+
+    def mark(self, name: str) -> tuple[float, float]:
+        """Where the first mark of a light is."""
+        box = self.page.locator(f'[data-lamp="{name}"]').first.bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def drag(self, start: tuple[float, float], dx: float, dy: float) -> None:
+        mouse = self.page.mouse
+        mouse.move(*start)
+        mouse.down()
+        mouse.move(start[0] + dx, start[1] + dy, steps=5)
+        mouse.up()
+
+    def close(self) -> None:
+        self.server.stop()
+        self.thread.join()
+        self.server.close()
+        self.studio.close()
+        self.studio.wait()
+
+
+@pytest.fixture
+def room(browser: Any, tmp_path: Path) -> Iterator[Room]:
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page, wrong = context.new_page(), []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+    made = Room(page, tmp_path)
+    yield made
+    context.close()
+    made.close()
+    assert wrong == []
+
+
+def test_lights_are_marked_dragged_and_taken_back(room: Room) -> None:
+    bulb = (-0.5, 1, 0.5)
+    assert room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1)
+    assert room.page.locator('[data-lamp="sky"]').count() == 0
+    room.drag(room.mark("bulb"), 40, 0)
+    until(lambda: room.studio.session.store.position == 1)
+    place = room.poses["bulb"]["position"]
+    assert place[1] == pytest.approx(bulb[1])  # in its horizontal plane
+    assert place[0] > bulb[0]
+    until(lambda: room.mark("bulb") == pytest.approx(room.seen(place), abs=1))
+    room.page.keyboard.down("Shift")
+    room.drag(room.mark("bulb"), 0, -30)
+    room.page.keyboard.up("Shift")
+    until(lambda: room.studio.session.store.position == 2)
+    higher = room.poses["bulb"]["position"]
+    assert (higher[0], higher[2]) == pytest.approx((place[0], place[2]))
+    assert higher[1] > place[1]
+    room.page.keyboard.press("Control+z")
+    room.page.keyboard.press("Control+z")
+    until(lambda: room.poses == {})
+    until(lambda: room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1))
+
+
+def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: Room) -> None:
+    row = room.page.locator('[data-light="beam"]')
+    row.get_by_role("button", name="beam", exact=True).first.click()
+    row.get_by_role("button", name="Aim here").click()
+    room.page.mouse.click(*room.seen((-0.4, 0, 0.3)))
+    target = until(lambda: room.poses.get("beam"))["target"]
+    assert target == pytest.approx((-0.4, 0, 0.3), abs=0.02)
+    assert not room.studio.session.is_painted
+    row.get_by_label("Position y").fill("1.5")
+    row.get_by_label("Position y").press("Enter")
+    until(lambda: room.poses["beam"].get("position"))
+    assert room.poses["beam"]["position"] == pytest.approx([0.8, 1.5, 1.5])
+    assert room.poses["beam"]["target"] == target
+    # A click that the keyboard gives up paints nothing and points nothing.
+    row.get_by_role("button", name="Highlight here").click()
+    room.page.keyboard.press("Escape")
+    assert room.page.locator(".is-pointing").count() == 0
+    row.get_by_role("button", name="Put back").click()
+    until(lambda: room.poses == {})

@@ -1,0 +1,282 @@
+"""Lights that a session moves: poses in undo, looks and files, planes that renders have."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import write_room
+
+import lightpaint as lp
+from lightpaint.errors import LightpaintError
+from lightpaint.paint import protocol
+from lightpaint.paint.protocol import Message
+from lightpaint.paint.store.store import Store
+from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.placement.free_space import pixels_of
+from lightpaint.scene.scene_reader import load_scene
+
+#: Where the bulb goes.
+POSITION = [0.4, 1.2, 0.1]
+
+#: Middle of the ball of the test room, which is .3 in radius.
+BALL = (0.3, 0.3, 0.2)
+
+
+class Moving:
+    """A studio of the test room, and all that it says."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        path = folder / "room.xml"
+        self.scene = load_scene(path if path.exists() else write_room(folder))
+        subject = Subject(
+            "room", folder, scene=self.scene, settings=Settings(spp=16, use_cache=False)
+        )
+        self.messages: list[Message] = []
+        self.studio = Studio([subject], lambda its: Store.open(folder / "session.db", its))
+        self.studio.on_message = self.messages.append
+        self.studio.start()
+        self.wait(lambda: any(m.kind == "state" for m in self.messages))
+
+    def wait(self, is_it: Callable[[], Any], seconds: float = 60) -> Any:
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            if found := is_it():
+                return found
+            time.sleep(0.02)
+        raise AssertionError([m.fields.get("text", m.kind) for m in self.messages])
+
+    def light(self, name: str) -> int:
+        return self.studio.session.basis.names.index(name)
+
+    def send(self, message: Any, **arrays: Any) -> list[Message]:
+        return self.studio.handle(message, arrays)
+
+    def plane(self, name: str) -> Any:
+        return np.array(self.studio.session.basis.planes.plane(self.light(name)))
+
+    def rendered(self) -> "Moving":
+        """Wait until all planes are rendered ones."""
+        session = self.studio.session
+        self.wait(lambda: not self.studio.rig.unrendered(session.requests.poses))
+        return self
+
+    def close(self) -> None:
+        self.studio.close()
+        self.studio.wait()
+
+
+@pytest.fixture
+def moving(tmp_path: Path) -> Iterator[Moving]:
+    made = Moving(tmp_path)
+    yield made
+    made.close()
+
+
+def stroke(moving: Moving, number: int = 0) -> None:
+    region = (2, 9, 2, 9)
+    moving.send(
+        protocol.Paint(number, region, True),
+        image=np.full((7, 7, 3), 0.7, np.float32),
+        importance=np.ones((7, 7), np.float32),
+    )
+
+
+def test_a_moved_light_has_the_plane_of_its_place(moving: Moving) -> None:
+    """At once about, and rendered soon; the other planes and the present look stay."""
+    session = moving.studio.session
+    before = {name: moving.plane(name) for name in session.basis.names}
+    look = session.basis.present_look.copy()
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, done=False))
+    quick = moving.plane("bulb")
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+    moving.rendered()
+    moved = moving.scene.moved({"bulb": lp.Pose(position=POSITION)})
+    truth = lp.render_basis(moved, spp=512, seed=7).image("bulb")
+    for plane, most in ((quick, 0.15), (moving.plane("bulb"), 0.15)):  # noise of few samples
+        assert np.square(plane - truth).sum() < most * np.square(truth).sum()
+        assert plane.mean() == pytest.approx(truth.mean(), rel=0.1)
+    assert np.square(before["bulb"] - truth).sum() > 0.3 * np.square(truth).sum()
+    for name in session.basis.names:
+        if name != "bulb":
+            assert np.array_equal(moving.plane(name), before[name])
+    assert np.array_equal(session.basis.present_look, look)
+
+
+def test_undo_looks_and_the_file_know_places(moving: Moving) -> None:
+    session, at_rest = moving.studio.session, moving.plane("bulb")
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+    moving.rendered()
+    there = moving.plane("bulb")
+    moving.send(protocol.SaveLook("moved"))
+    moving.send(protocol.Undo())
+    assert session.requests.poses == {}
+    assert np.array_equal(moving.plane("bulb"), at_rest)
+    moving.send(protocol.Redo())
+    assert np.array_equal(moving.plane("bulb"), there)
+    moving.send(protocol.MoveLights({"bulb": {}}))
+    assert np.array_equal(moving.plane("bulb"), at_rest)
+    moving.send(protocol.LoadLook(1))
+    assert session.requests.poses == {"bulb": {"position": POSITION}}
+    assert np.array_equal(moving.plane("bulb"), there)
+    moving.close()
+    again = Moving(moving.folder)
+    try:
+        assert again.studio.session.requests.poses == {"bulb": {"position": POSITION}}
+        again.rendered()
+        assert np.allclose(again.plane("bulb"), there)
+    finally:
+        again.close()
+
+
+def test_a_drag_that_is_given_up_moves_nothing(moving: Moving) -> None:
+    before = moving.plane("bulb")
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}, done=False))
+    assert not np.array_equal(moving.plane("bulb"), before)
+    stroke(moving)
+    assert np.array_equal(moving.plane("bulb"), before)
+    assert moving.studio.session.requests.poses == {}
+
+
+def test_exports_and_verification_have_the_new_places(moving: Moving) -> None:
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+    stroke(moving)
+    moving.send(protocol.Export(("lighting", "relit", "report")))
+    exported = moving.wait(lambda: next((m for m in moving.messages if m.kind == "exported"), None))
+    assert exported.fields["command"] == ""
+    relit = load_scene(moving.folder / "relit.xml")
+    assert relit.light("bulb").members[0].site.position == pytest.approx(POSITION)
+    moving.send(protocol.Verify())
+    verified = moving.wait(lambda: next((m for m in moving.messages if m.kind == "verified"), None))
+    assert verified.fields["agrees"], verified.fields["text"]
+
+
+@pytest.mark.parametrize(
+    ("light", "pose", "text"),
+    [
+        ("bulb", {"position": [math.nan, 0, 0]}, "bulb: position is (nan"),
+        ("bulb", {"position": [1, 2]}, "expected three numbers"),
+        ("bulb", {"position": "here"}, "expected three numbers"),
+        ("bulb", {"height": 2}, "a pose has no 'height'"),
+        ("bulb", {"target": [0, 0, 0]}, "points nowhere"),
+        ("beam", {"cutoff": 120}, "cutoff is 120"),
+        ("sun", {"position": [0, 1, 0]}, "infinitely far away"),
+        ("panel", {"position": [0, 1, 0]}, "is of the kind area"),
+        ("ghost", {"position": [0, 1, 0]}, "no light is called 'ghost'"),
+    ],
+)
+def test_poses_that_no_light_can_have(moving: Moving, light: str, pose: Any, text: str) -> None:
+    version = moving.studio.session.version
+    with pytest.raises(LightpaintError) as caught:
+        moving.send(protocol.MoveLights({light: pose}))
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert (moving.studio.session.version, moving.studio.session.requests.poses) == (version, {})
+
+
+def opened_rig(moving: Moving) -> Any:
+    moving.send(protocol.ShowRig())
+    return moving.wait(lambda: next((m for m in moving.messages if m.kind == "rig"), None))
+
+
+def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: Moving) -> None:
+    rig = opened_rig(moving)
+    places = dict(zip(moving.studio.session.basis.names, rig.lights, strict=True))
+    assert places["bulb"].position == pytest.approx((-0.5, 1, 0.5))
+    assert math.dist(places["beam"].target, BALL) == pytest.approx(0.3, abs=0.01)
+    assert places["sky"].why_not
+    assert places["panel"].why_not
+    assert rig.up == 1
+    moving.send(protocol.MoveLights({"bulb": {"position": POSITION}}))
+    last = moving.wait(lambda: [m for m in moving.messages if m.kind == "rig"][1:])[-1]
+    assert last.lights[moving.light("bulb")].position == pytest.approx(POSITION)
+
+
+def test_a_light_in_a_wall_is_told_of(moving: Moving) -> None:
+    """It may be meant, as on the way through one; undo brings it back."""
+    moving.send(protocol.MoveLights({"bulb": {"position": [0, 1, -1.5]}}))
+    warned = moving.wait(lambda: [m for m in moving.messages if m.kind == "say"])
+    assert warned[0].fields["text"].startswith("bulb lights nothing that is seen from there")
+
+
+def pixel_of(moving: Moving, point: Any) -> tuple[float, float]:
+    """Where the camera of the scene itself sees a point."""
+
+    def seen(loaded: Any) -> Any:
+        return pixels_of(moving.scene, loaded, np.array([point]))[0]
+
+    x, y = moving.scene.while_loaded(seen)
+    height, width = moving.scene.size
+    return x * width, y * height
+
+
+def pointed(moving: Moving, name: str, how: Any, at: Any, **more: Any) -> Any:
+    """The place of a light after it was pointed by a click."""
+    opened_rig(moving)
+    light = moving.light(name)
+    moving.send(protocol.PointLight(light, how, pixel_of(moving, at), **more))
+    return moving.studio.rig.state(moving.studio.session.requests.poses).lights[light]
+
+
+def test_pages_see_points_where_the_camera_does(moving: Moving) -> None:
+    [camera] = opened_rig(moving).cameras
+    axes = np.stack([camera.across, camera.down, camera.ahead], axis=1)
+    for point in ((0.3, 0.3, 0.2), (-0.5, 1, 0.5), (0.1, 1.2, -0.9)):
+        x, y, s = np.linalg.solve(axes, np.array(point) - camera.origin)
+        assert s > 0
+        assert (x / s, y / s) == pytest.approx(pixel_of(moving, point), abs=1e-3)
+
+
+def test_a_spot_is_aimed_at_what_was_clicked(moving: Moving) -> None:
+    place = pointed(moving, "beam", "aim", (-0.4, 0, 0.3))
+    assert place.position == pytest.approx((0.8, 1.8, 1.5))
+    assert place.target == pytest.approx((-0.4, 0, 0.3), abs=2e-3)
+
+
+def test_a_highlight_is_the_mirrored_ray_of_the_eye(moving: Moving) -> None:
+    """On the floor: the mirror image of the eye, the place and the light are on one line."""
+    at = np.array([0.0, 0.0, 0.6])
+    place = pointed(moving, "beam", "highlight", at)
+    mirrored_eye = np.array([0, -1, 3.5])
+    way, towards = at - mirrored_eye, np.array(place.position) - at
+    assert np.linalg.norm(np.cross(way, towards)) < 2e-3 * np.linalg.norm(way)
+    assert way @ towards > 0
+    assert place.target == pytest.approx(at, abs=2e-3)
+
+
+def test_a_shadow_ends_on_the_line_through_its_edge(moving: Moving) -> None:
+    edge, at = np.array([0.3, 0.6, 0.2]), np.array([-0.6, 0, 0.6])
+    seen = pixel_of(moving, edge - (0, 0.01, 0))
+    place = pointed(moving, "bulb", "shadow", at, edge=seen)
+    line = np.array(place.position) - at
+    hit = BALL + 0.3 * (edge - BALL) / 0.3
+    assert np.linalg.norm(np.cross(line, hit - at)) < 0.12 * np.linalg.norm(line)  # a pixel is .1
+    assert line @ (hit - at) > (hit - at) @ (hit - at)
+
+
+@pytest.mark.parametrize(
+    ("name", "how", "at", "text"),
+    [
+        ("bulb", "aim", (12.0, 12.0), "bulb shines all around"),
+        ("sun", "aim", (12.0, 12.0), "infinitely far away"),
+        ("beam", "aim", (0.5, 0.5), "nothing is seen there"),
+        ("beam", "aim", (-3.0, 0.5), "outside the picture"),
+        ("beam", "aim", (math.nan, 0.5), "outside the picture"),
+        ("beam", "shadow", (12.0, 12.0), "a shadow needs two places"),
+        ("panel", "highlight", (12.0, 12.0), "is of the kind area"),
+    ],
+)
+def test_clicks_that_point_no_light(
+    moving: Moving, name: str, how: Any, at: Any, text: str
+) -> None:
+    with pytest.raises(LightpaintError) as caught:
+        moving.send(protocol.PointLight(moving.light(name), how, at))
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert moving.studio.session.requests.poses == {}
