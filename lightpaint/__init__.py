@@ -32,8 +32,8 @@ from lightpaint.version import __version__
 
 if TYPE_CHECKING:
     from lightpaint.basis.basis import Basis as Basis
-    from lightpaint.basis.file.basis_file import read_basis as read_basis
     from lightpaint.basis.file.basis_file import write_basis as write_basis
+    from lightpaint.basis.file.basis_reader import read_basis as read_basis
     from lightpaint.basis.lightgroups.light_groups import LightGroups as LightGroups
     from lightpaint.basis.lightgroups.light_groups import read_light_groups as read_light_groups
     from lightpaint.basis.render.basis_render import render_basis as render_basis
@@ -144,7 +144,7 @@ _HOMES = {
     "load_scene": "scene.scene_reader",
     "paint_with_light": "pipeline.one_call",
     "place": "placement.place",
-    "read_basis": "basis.file.basis_file",
+    "read_basis": "basis.file.basis_reader",
     "read_constraints": "lighting.constraints.constraints_file",
     "read_light_groups": "basis.lightgroups.light_groups",
     "read_lighting": "lighting.answer.lighting_file",

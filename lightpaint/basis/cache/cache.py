@@ -30,7 +30,8 @@ from lightpaint.basis.cache.cache_folder import (
     is_own,
     mark_folder,
 )
-from lightpaint.basis.file.basis_file import FORMAT, read_basis, read_origin, write_basis
+from lightpaint.basis.file.basis_file import FORMAT, write_basis
+from lightpaint.basis.file.basis_reader import read_basis, read_origin
 from lightpaint.basis.origin import Origin
 from lightpaint.errors import BasisError, LightpaintError, OutputError
 from lightpaint.files import replacing

@@ -15,7 +15,8 @@ from lightpaint.basis.cache.plane_reuse import (
     merge,
     restrict,
 )
-from lightpaint.basis.file.basis_file import as_stored, is_large, leave_indirect
+from lightpaint.basis.file.basis_file import as_stored, is_large
+from lightpaint.basis.file.basis_reader import leave_indirect
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import (
     ONE_PASS,

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.file.basis_file import read_basis
+from lightpaint.basis.file.basis_reader import read_basis
 from lightpaint.basis.render.render_parts import PartRenderer
 from lightpaint.batch.work.render_passes import PassRenderer
 from lightpaint.batch.work.spool import read_guide_table

@@ -1,0 +1,256 @@
+"""Reading a basis file: whole into memory or, of a large one, its rows when they are asked for."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from lightpaint.basis.basis import Basis, IndirectLight
+from lightpaint.basis.file.basis_file import (
+    FORMAT,
+    FORMAT_KEY,
+    OLD_FORMAT,
+    ORIGIN_KEY,
+    is_encoded,
+    is_large,
+)
+from lightpaint.basis.file.checksums import CHECKSUMS_KEY, Checksums, check
+from lightpaint.basis.file.file_parts import (
+    INDIRECT_CHANNELS,
+    LIGHT_CHANNELS,
+    LIGHT_KEY,
+    PLANE_CHANNELS,
+    checked_text,
+    fields_of_others,
+    scales_of,
+    stack_channels,
+    stored_channels,
+)
+from lightpaint.basis.file.file_planes import FilePlanes
+from lightpaint.basis.file.half_floats import EncodedPlanes, encoded_plane
+from lightpaint.basis.lights import BasisLight, Lights
+from lightpaint.basis.origin import Origin
+from lightpaint.basis.planes import Planes, as_planes
+from lightpaint.errors import BasisError, ImageError
+from lightpaint.file_reading import file_length
+from lightpaint.files import one_line
+from lightpaint.images.formats.exr import (
+    Channels,
+    ExrPart,
+    read_headers,
+    read_parts,
+)
+from lightpaint.images.formats.exr_rows import PartLayout, RowFile, RowsUnsupportedError
+from lightpaint.keywords import keywords
+from lightpaint.storage.json_records import read_record, strict_json
+
+#: Longest basis file that is read, in bytes.
+MAX_BYTES = 2**36
+
+#: What comes of a header that says something else than it should.
+_HEADER_ERRORS = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
+
+
+@keywords()
+def read_basis(path: str | Path) -> Basis:
+    """Read what `write_basis` wrote, also where another program has put its parts in another order.
+
+    Args:
+        path: What `write_basis` or the command line wrote.
+
+    Raises:
+        ImageError: If the file is damaged.
+        BasisError: If it is not a basis or not as it was written.
+
+    Examples:
+        >>> lp.read_basis("room.basis.exr")
+        Basis(2 lights, 16x16, 4 spp, of room.xml: panel, bulb)
+    """
+    path = Path(path)
+    file_length(path, "image file", ImageError, limit=MAX_BYTES)
+    try:
+        if (large := _read_large(path)) is not None:
+            return replace(large, source=str(path))
+        parts = read_parts(path)
+        head = _head(p.attributes for p in parts)
+        return replace(leave_indirect(_basis_of_parts(parts, head), path), source=str(path))
+    except BasisError as error:
+        raise BasisError(f"{path} {error}") from error
+    except _HEADER_ERRORS as error:
+        raise BasisError(f"{path} is damaged as a basis: {one_line(str(error))}") from error
+    except MemoryError:
+        raise ImageError(f"{path} takes more memory than there is") from None
+
+
+def leave_indirect(basis: Basis, path: Path) -> Basis:
+    """Return `basis` with indirect planes whose rows are read on demand, if it has many lights.
+
+    Only pictures need them, and memory holds no more of a light then than if it had none. path: of
+    a file that holds just this basis; if it does not, or is of another kind, nothing changes.
+    """
+    if basis.indirect is None or not is_encoded(len(basis.lights), basis.size):
+        return basis
+    try:
+        file = RowFile(path)
+        lit = {
+            strict_json(p.texts[LIGHT_KEY])["name"]: p for p in file.parts if LIGHT_KEY in p.texts
+        }
+        parts = [lit[name] for name in basis.names]
+        origin = read_record(Origin, strict_json(_head(p.texts for p in file.parts)[ORIGIN_KEY]))
+    except (RowsUnsupportedError, OSError, BasisError, *_HEADER_ERRORS):
+        return basis
+    if origin != basis.origin or any({p.size, p.display} != {basis.size} for p in parts):
+        return basis
+    scales = [scales_of(p.texts) for p in parts]
+    images, noise = (
+        FilePlanes(file, parts, PLANE_CHANNELS[k], [its[k] for its in scales]) for k in (2, 3)
+    )
+    return replace(basis, indirect=IndirectLight(images, noise))
+
+
+def _read_large(path: Path) -> Basis | None:
+    """Return a basis whose rows are read when they are asked for.
+
+    None of one that memory has room for, and where the file is not read so.
+    """
+    try:
+        file = RowFile(path)
+    except (RowsUnsupportedError, OSError):
+        return None
+    lit = [p for p in file.parts if LIGHT_KEY in p.texts]
+    if not lit or not is_large(len(lit), lit[0].size):
+        return None
+    return _basis_of_rows(file, _head(p.texts for p in file.parts))
+
+
+def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
+    """Return the attributes of the first part. Raises BasisError for another format."""
+    head: Mapping[str, str] = next((its for its in texts if FORMAT_KEY in its), {})
+    if head.get(FORMAT_KEY) not in (FORMAT, OLD_FORMAT):
+        found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
+        raise BasisError(
+            f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
+            "make one with lightpaint basis"
+        )
+    return head
+
+
+def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
+    """Return the basis of EXR parts. Raises BasisError or one of _DAMAGES."""
+    lit = [p.in_display_window() for p in parts if LIGHT_KEY in p.attributes]
+    others = [p for p in parts if LIGHT_KEY not in p.attributes]
+    scales = [scales_of(p.attributes) for p in lit]
+
+    def planes(order: Sequence[int], number: int) -> Planes:
+        its = [(lit[k], scales[k][number]) for k in order]
+        if is_encoded(len(lit), lit[0].size):
+            stored = stored_channels(its, PLANE_CHANNELS[number])
+            return EncodedPlanes(
+                [encoded_plane(*x) for x in zip(stored, (s for _, s in its), strict=True)]
+            )
+        return as_planes(stack_channels(its, PLANE_CHANNELS[number]))
+
+    stored = [partial(getattr, part, "channels") for part in lit]
+    has_indirect = all(p.channels.keys() >= INDIRECT_CHANNELS for p in lit)
+    texts = [p.attributes for p in lit]
+    return _checked_basis(texts, stored, others, head, planes, has_indirect=has_indirect)
+
+
+def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
+    """Return the basis whose planes stay in the file; None where its parts are not alike.
+
+    Raises as `_basis_of_parts` does.
+    """
+    lit = [p for p in file.parts if LIGHT_KEY in p.texts]
+    if any(
+        p.size != p.display or p.size != lit[0].size or not {*p.channels} >= LIGHT_CHANNELS
+        for p in lit
+    ):
+        return None
+    scales = [scales_of(p.texts) for p in lit]
+
+    def part(layout: PartLayout) -> ExrPart:
+        return ExrPart("", file.channels(layout), layout.texts, layout.display)
+
+    def planes(order: Sequence[int], number: int) -> Planes:
+        its = [scales[k][number] for k in order]
+        return FilePlanes(file, [lit[k] for k in order], PLANE_CHANNELS[number], its)
+
+    stored = [partial(file.channels, p) for p in lit]
+    others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
+    has_indirect = all({*p.channels} >= INDIRECT_CHANNELS for p in lit)
+    texts = [p.texts for p in lit]
+    return _checked_basis(texts, stored, others, head, planes, has_indirect=has_indirect)
+
+
+def _checked_basis(
+    texts: Sequence[Mapping[str, str]],
+    stored: Sequence[Callable[[], Channels]],
+    others: Sequence[ExrPart],
+    head: Mapping[str, str],
+    planes: Callable[[Sequence[int], int], Planes],
+    *,
+    has_indirect: bool,
+) -> Basis:
+    """Return the basis of a file, checked.
+
+    texts, stored: of the part of each light its attributes, and what reads its channels. planes:
+    makes planes of the parts in an order, those of a number among `PLANE_CHANNELS`. has_indirect:
+    whether the parts have planes of indirect light.
+    """
+    seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]
+    if not texts or not seen:
+        raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
+    try:
+        lights = [read_record(BasisLight, strict_json(its[LIGHT_KEY])) for its in texts]
+        origin = read_record(Origin, strict_json(head[ORIGIN_KEY]))
+        checksums = None
+        if CHECKSUMS_KEY in head:
+            checksums = Checksums.of_text(head[CHECKSUMS_KEY])
+    except (BasisError, ImageError) as error:
+        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
+    order = list(range(len(texts)))
+    if checksums is not None:
+        order = checksums.in_order([light.name for light in lights])
+        check(checksums.origin, "origin", head[ORIGIN_KEY], {})
+    try:
+        images, noise = planes(order, 0), planes(order, 1)
+        basis = Basis(
+            lights=Lights(tuple(lights[k] for k in order)),
+            planes=images,
+            noise=noise,
+            emitters_seen=seen[0] > 0,
+            origin=origin,
+            indirect=IndirectLight(planes(order, 2), planes(order, 3)) if has_indirect else None,
+            **fields_of_others(others, checksums, images.size),
+        )
+    except (BasisError, ImageError) as error:
+        raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
+    for light, its, read in zip(lights, texts, stored, strict=True):
+        channels = read()  # one light at a time: they may be larger than memory
+        names = LIGHT_CHANNELS | INDIRECT_CHANNELS if has_indirect else LIGHT_CHANNELS
+        if not all(np.isfinite(channels[name]).all() for name in names):
+            raise BasisError("holds values that are not finite: make it again")
+        if checksums is not None:
+            check(
+                checksums.lights[light.name], f"light {light.name!r}", checked_text(its), channels
+            )
+    if checksums is not None:
+        check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
+    return basis
+
+
+def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
+    """Return origin, (height, width) and light identities of the basis at `path`, no pixels."""
+    file_length(path, "basis", BasisError, limit=MAX_BYTES)
+    try:
+        headers, size = read_headers(path)
+        lit = [strict_json(header[LIGHT_KEY]) for header in headers if LIGHT_KEY in header]
+        identities = tuple(str(light.get("identity", "")) for light in lit)
+        text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
+        return read_record(Origin, strict_json(text)), size, identities
+    except (*_HEADER_ERRORS, BasisError, StopIteration) as error:
+        said = one_line(str(error)) or "it does not say where it comes from"
+        raise BasisError(f"{path} is no basis this version can read: {said}") from error
