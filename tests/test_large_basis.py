@@ -10,7 +10,6 @@ import pytest
 from PIL import Image
 
 import lightpaint as lp
-from lightpaint.basis.cache import denoised_planes
 from lightpaint.basis.file import basis_file, file_planes
 from lightpaint.images import bands, denoiser
 from lightpaint.images.formats.png import png_bytes
@@ -105,7 +104,7 @@ def test_memory_of_a_large_film_is_that_of_a_few_pictures(
     size = 360, 640
     files = written(tmp_path, make_basis, size)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(denoised_planes, "ON_DEMAND_MAX_PIXELS", 0)
+
     stay_in_the_file(monkeypatch, 2**15)
     tracemalloc.start()
     try:

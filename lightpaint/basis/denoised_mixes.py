@@ -6,12 +6,15 @@ only as far as its own noise asks for it. Where Open Image Denoise is not instal
 averaged along surfaces instead.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.images.denoiser import Quality, denoised, oidn_is_installed
 from lightpaint.images.estimate import box_mean
+from lightpaint.images.pixel_blocks import block_mean
 
 #: Pixels on either side over which noise and what a denoiser changed are averaged.
 RADIUS = 3
@@ -24,24 +27,19 @@ def denoise_mix(
     weights: Doubles,
     *,
     mixed: Floats | None = None,
+    factor: int = 1,
     quality: Quality = "fast",
 ) -> Floats:
     """Return Σ w_i Φ_i without its grain, (h, w, 3) float32.
 
-    weights: (n, 3). mixed: the sum, where somebody has it already.
+    weights: (n, 3). mixed: the sum, where somebody has it already. factor: side of the blocks of
+    pixels that become one.
     """
     total = basis.mix(weights) if mixed is None else mixed
-    if basis.indirect is None:
-        return denoised(total, basis.features, quality=quality)
-    parts = basis.indirect
-    return _denoise_parts(
-        basis,
-        total,
-        basis.noise.mix(weights),
-        parts.planes.mix(weights),
-        parts.noise.mix(weights),
-        quality,
-    )
+    pictures = [total]
+    if (parts := basis.indirect) is not None:
+        pictures += [planes.mix(weights) for planes in (basis.noise, parts.planes, parts.noise)]
+    return _denoise_pictures(basis, pictures, factor, quality)
 
 
 def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
@@ -52,37 +50,42 @@ def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
     return denoise_mix(basis, basis.present_weights, mixed=mixed, quality=quality)
 
 
-def denoise_plane(basis: Basis, k: int, *, quality: Quality = "fast") -> Floats:
-    """Return the image of light k at unit emission without its grain, (h, w, 3) float32."""
-    total = basis.planes.plane(k)
-    if basis.indirect is None:
-        return denoised(total, basis.features, quality=quality)
-    parts = basis.indirect
-    noise = basis.noise.plane(k)
-    return _denoise_parts(basis, total, noise, parts.planes.plane(k), parts.noise.plane(k), quality)
+def denoise_plane(basis: Basis, k: int, *, factor: int = 1, quality: Quality = "fast") -> Floats:
+    """Return the image of light k at unit emission without its grain, (h, w, 3) float32.
+
+    factor: as of `denoise_mix`.
+    """
+    pictures = [basis.planes.plane(k)]
+    if (parts := basis.indirect) is not None:
+        pictures += [planes.plane(k) for planes in (basis.noise, parts.planes, parts.noise)]
+    return _denoise_pictures(basis, pictures, factor, quality)
 
 
-def _denoise_parts(
-    basis: Basis,
-    total: Floats,
-    noise: Floats,
-    indirect: Floats,
-    indirect_noise: Floats,
-    quality: Quality,
+def _denoise_pictures(
+    basis: Basis, pictures: Sequence[Floats], factor: int, quality: Quality
 ) -> Floats:
-    """Return direct and indirect light, each denoised, as one picture; all (h, w, 3)."""
-    smooth = _without_grain(basis, indirect, quality)
-    direct = np.maximum(total - indirect, 0)
-    clean = _without_grain(basis, direct, quality)
+    """Return all light without its grain: direct and indirect light apart, where both are known.
+
+    pictures: (h, w, 3), of all light; then perhaps its noise, indirect light, the noise of that.
+    """
+    features = basis.features
+    if factor > 1:
+        pictures = [block_mean(picture, factor) for picture in pictures]
+        features = features and features.reduced(factor)
+
+    def without_grain(part: Floats) -> Floats:
+        if basis.surface_filter is not None and not oidn_is_installed() and factor == 1:
+            return basis.surface_filter(part)
+        return denoised(part, features, quality=quality)
+
+    if basis.indirect is None:
+        return denoised(pictures[0], features, quality=quality)
+    total, noise, indirect, indirect_noise = pictures
+    smooth, direct = without_grain(indirect), np.maximum(total - indirect, 0)
+    clean = without_grain(direct)
     if not basis.knows_noise:
         return smooth + blend_by_grain(direct, clean)
     return smooth + blend_by_noise(direct, noise - indirect_noise, clean)
-
-
-def _without_grain(basis: Basis, part: Floats, quality: Quality) -> Floats:
-    if basis.surface_filter is not None and not oidn_is_installed():
-        return basis.surface_filter(part)
-    return denoised(part, basis.features, quality=quality)
 
 
 def blend_by_noise(raw: Floats, half_difference: Floats, clean: Floats) -> Floats:

@@ -7,7 +7,6 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cache_folder import folder
 from lightpaint.basis.cache.cached_render import Render, obtain_basis
-from lightpaint.basis.cache.denoised_planes import MAX_PIXELS, obtain_denoised_planes
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.basis.render.render_origin import samples_for
 from lightpaint.pipeline.job.job import Job, PaintedView
@@ -71,10 +70,6 @@ def obtain(
         listen.say(
             f"the basis could not be saved in {folder()}, so the next run renders it again: "
             "is the disk full, or the folder not yours?"
-        )
-    elif settings.use_cache and is_rendered:
-        obtain_denoised_planes(
-            basis, most=MAX_PIXELS, progress=lambda k, n: listen("denoising", k, n, "planes")
         )
     _remark_on_samples(scene, basis, settings, spp, listen, is_rendered=is_rendered)
     return basis

@@ -10,9 +10,19 @@ from threading import Lock, Thread
 from typing import Any, TypeVar
 
 from lightpaint.basis.basis import Basis
-from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, obtain_denoised_planes
+from lightpaint.basis.cache.denoised_planes import (
+    DenoisedPlanes,
+    obtain_denoised_planes,
+    read_denoised_planes,
+)
 
 Result = TypeVar("Result")
+
+#: Rows that a long list shows unfolded, and how many more it shows rather than fold so few.
+ROWS_SHOWN, SPARE_ROWS = 10, 3
+
+#: Pixels of a plane in a page from left to right, and of all planes together, at most.
+MAX_WIDTH, MAX_PIXELS = 480, 1_000_000
 
 _lock = Lock()
 #: Results by the identity of a basis's planes, which its views share, and by key.
@@ -42,9 +52,29 @@ def make_once(basis: Basis, key: Hashable, make: Callable[[], Result]) -> Result
     return result
 
 
+def page_reduction(basis: Basis, count: int) -> int:
+    """Return the side of the blocks of pixels that become a pixel of a plane in a page.
+
+    count: planes in the page.
+    """
+    height, width = basis.size
+    factor = max(1, -(-width // MAX_WIDTH))
+    while count * (height // factor) * (width // factor) > MAX_PIXELS and factor < min(
+        height, width
+    ):
+        factor += 1
+    return min(factor, height, width)
+
+
 def cached_clean_planes(basis: Basis) -> DenoisedPlanes | None:
-    """Return `obtain_denoised_planes` of a basis, made once."""
-    return make_once(basis, "planes", lambda: obtain_denoised_planes(basis))
+    """Return denoised planes of a basis, made once: whole ones if they are kept, or those of a page
+    that shows all lights. None where it shows some, which are then denoised alone.
+    """
+    count = len(basis.lights)
+    if count > ROWS_SHOWN + SPARE_ROWS:
+        return make_once(basis, "planes", lambda: read_denoised_planes(basis))
+    factor = page_reduction(basis, count)
+    return make_once(basis, "planes", lambda: obtain_denoised_planes(basis, factor=factor))
 
 
 def make_ahead(basis: Basis, make: Callable[[Basis], object]) -> None:

@@ -76,13 +76,16 @@ class CleanLooks:
             verified = denoised(verified, larger or features)
         raw = "predicted.exr" + ("" if verified is None else ", verified.exr")
         texts = denoiser_text(features, raw=raw)
-        if (planes := cached_clean_planes(basis)) is None:
-            shown = denoise_present_look(basis), denoise_mix(basis, weights, mixed=predicted)
+        planes = cached_clean_planes(basis)
+        if planes is None or basis.former is not None:
+            now = denoise_present_look(basis)
         else:
-            former = basis.former is not None
-            now = denoise_present_look(basis) if former else planes.present
-            shown = now, planes.mix(weights)
-        return cls(*shown, verified, texts)
+            now = planes.present
+        if planes is None or not planes.is_whole:
+            answer = denoise_mix(basis, weights, mixed=predicted)
+        else:
+            answer = planes.mix(weights)
+        return cls(now, answer, verified, texts)
 
     @classmethod
     def raw(cls, basis: Basis, predicted: Floats, verified: Floats | None) -> "CleanLooks":

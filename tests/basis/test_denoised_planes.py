@@ -16,7 +16,10 @@ from lightpaint.basis.cache.denoised_planes import (
     read_denoised_planes,
     scale_of,
 )
+from lightpaint.basis.denoised_mixes import denoise_present_look
 from lightpaint.images.denoiser import denoised, oidn_is_installed
+from lightpaint.images.estimate import Estimate
+from lightpaint.images.pixel_blocks import block_mean
 
 pytestmark = pytest.mark.skipif(not oidn_is_installed(), reason="Open Image Denoise")
 
@@ -46,9 +49,9 @@ def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.Monk
     basis, made = make_basis(2, (24, 32)), []
     real = denoised_planes.denoise_plane
 
-    def counted(*given: Any) -> Any:
+    def counted(*given: Any, **how: Any) -> Any:
         made.append(given)
-        return real(*given)
+        return real(*given, **how)
 
     monkeypatch.setattr(denoised_planes, "denoise_plane", counted)
     first, again = obtain_denoised_planes(basis), obtain_denoised_planes(replace(basis))
@@ -64,15 +67,47 @@ def test_made_once_for_the_same_pixels(make_basis: Any, monkeypatch: pytest.Monk
     assert read_denoised_planes(basis) is not None
 
 
-def test_few_pixels_and_many_are_not_worth_it(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
+def test_few_pixels_are_not_worth_it(make_basis: Any, monkeypatch: pytest.MonkeyPatch):
     basis = make_basis(2, (24, 32))
     monkeypatch.setattr(denoised_planes, "MIN_PIXELS", basis.images[..., 0].size + 1)
     assert obtain_denoised_planes(basis) is None
     monkeypatch.setattr(denoised_planes, "MIN_PIXELS", 1)
-    assert obtain_denoised_planes(basis, most=basis.images[..., 0].size - 1) is None
-    assert obtain_denoised_planes(basis, most=basis.images[..., 0].size) is not None
-    # What is kept is taken however much it is.
-    assert obtain_denoised_planes(basis, most=1) is not None
+    assert obtain_denoised_planes(basis) is not None
+
+
+def test_means_over_blocks_are_denoised_and_kept_until_whole_planes_are(make_basis: Any):
+    basis = make_basis(2, (49, 66))
+    small = obtain_denoised_planes(basis, factor=2)
+    assert small is not None
+    assert not small.is_whole
+    assert small.halves.shape == (2, 24, 33, 3)
+    assert small.present.shape == (49, 66, 3)
+    features = basis.features and basis.features.reduced(2)
+    expected = denoised(block_mean(basis.planes.plane(1), 2), features)
+    np.testing.assert_allclose(
+        small.plane(1), expected, rtol=2**-11, atol=expected.max() * 2.0**-24
+    )
+    again = read_denoised_planes(basis, factor=2)
+    assert again is not None
+    np.testing.assert_array_equal(again.halves, small.halves)
+    assert read_denoised_planes(basis) is None
+    assert read_denoised_planes(basis, factor=3) is None
+    whole = obtain_denoised_planes(basis)
+    assert whole is not None
+    assert whole.is_whole
+    # Now these serve for either.
+    kept = obtain_denoised_planes(basis, factor=2)
+    assert kept is not None
+    np.testing.assert_array_equal(kept.halves, whole.halves)
+
+
+def test_the_look_before_lights_were_moved_is_not_kept_as_the_present_one(make_basis: Any):
+    basis = make_basis(2, (24, 32))
+    before = 9 * basis.present_look
+    moved = replace(basis, former=Estimate(before, np.zeros_like(before)))
+    planes = obtain_denoised_planes(moved, factor=2)
+    assert planes is not None
+    np.testing.assert_array_equal(planes.present, denoise_present_look(basis))
 
 
 def test_a_folder_that_takes_nothing_is_no_obstacle(make_basis: Any, cache: Path):

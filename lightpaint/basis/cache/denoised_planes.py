@@ -8,9 +8,8 @@ they were made of, and may be deleted at any time.
 
 import hashlib
 import zipfile
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,19 +20,19 @@ from lightpaint.arrays import Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache import cache
 from lightpaint.basis.cache.cache_folder import DENOISED_SUFFIX, is_own
-from lightpaint.basis.denoised_mixes import denoise_plane, share_of_clean
+from lightpaint.basis.denoised_mixes import denoise_plane, denoise_present_look, share_of_clean
 from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoiser_text, oidn_is_installed
+from lightpaint.images.pixel_blocks import blocks_in
 from lightpaint.images.resampling import resampled
 from lightpaint.threads import parallel_map
 
 FORMAT, ARRAY_NAMES = "lightpaint-clean 2", ("halves", "scales", "present")
 
-#: Pixels of all planes below which a sum is denoised as soon as planes are read, up to which they
-#: are made where they are wanted, and up to which a render is followed by them.
-MIN_PIXELS, ON_DEMAND_MAX_PIXELS, MAX_PIXELS = 2**18, 2**22, 2**24
+#: Pixels of all planes below which a sum is denoised as soon as planes are read.
+MIN_PIXELS = 2**18
 
 #: The brightest value of a plane as half floats, which leaves 24 stops below it to their full
 #: precision.
@@ -58,9 +57,10 @@ Halves = npt.NDArray[np.float16]
 class DenoisedPlanes:
     """Denoised planes, for display.
 
-    halves: (n, h, w, 3) float16, linear, at unit emission over `scales`. scales: (n,), powers of 2.
-    present: (h, w, 3) float32, the scene as it is: their sum, or the sum denoised where that came
-    first, so that who paints over it goes on from what was there.
+    halves: (n, h, w, 3) float16, linear, at unit emission over `scales`, or as many means over
+    blocks of pixels. scales: (n,), powers of 2. present: (h, w, 3) float32, the scene as it is:
+    their sum, or the sum denoised where that came first, so that who paints over it goes on from
+    what was there.
     """
 
     halves: Halves
@@ -71,6 +71,11 @@ class DenoisedPlanes:
     def of(cls, basis: Basis, halves: Halves, scales: Doubles) -> "DenoisedPlanes":
         """Return the planes with their sum for the present scene."""
         return cls(halves, scales, _mixed(halves, scales, basis.present_weights))
+
+    @property
+    def is_whole(self) -> bool:
+        """True for planes of all pixels, of which none are means over blocks."""
+        return self.halves.shape[1:] == self.present.shape
 
     def mix(self, weights: Doubles) -> Floats:
         """Return Σ w_i of the planes, (h, w, 3) float32. weights: (n, 3)."""
@@ -150,40 +155,40 @@ def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
     return np.asarray(np.clip(plane / np.float32(scale), 0, 65504), np.float16)
 
 
-def obtain_denoised_planes(
-    basis: Basis,
-    *,
-    most: int = ON_DEMAND_MAX_PIXELS,
-    progress: Callable[[int, int], None] | None = None,
-) -> DenoisedPlanes | None:
+def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | None:
     """Return the denoised planes, from the cache or computed and cached now.
 
-    most: pixels of all planes up to which they are made. progress: hears how many are, of how many.
-    None where there are none, and sums of so few pixels are denoised sooner.
+    factor: side of the blocks whose means are denoised, for the price of so many pixels; where
+    whole planes are kept, they are returned. None where Open Image Denoise is missing, and for so
+    few pixels that their sums are denoised sooner.
     """
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
         return None
-    planes = read_denoised_planes(basis)
-    if planes is None and pixels <= most:
-        halves, scales = np.empty(_shape(basis), np.float16), np.ones(len(basis.lights))
-        for k in range(len(basis.lights)):
-            halves[k], scales[k] = denoise_to_halves(basis, k)
-            if progress is not None:
-                progress(k + 1, len(basis.lights))
-        planes = DenoisedPlanes.of(basis, halves, scales)
+    planes = read_denoised_planes(basis, factor=factor)
+    if planes is None:
+        lights = range(len(basis.lights))
+        halves, scales = zip(*(denoise_to_halves(basis, k, factor) for k in lights), strict=True)
+        made = np.stack(halves), np.array(scales)
+        if factor == 1:
+            planes = DenoisedPlanes.of(basis, *made)
+        else:
+            planes = DenoisedPlanes(*made, denoise_present_look(replace(basis, former=None)))
         cache_denoised_planes(basis, planes)
     return planes
 
 
-def denoise_to_halves(basis: Basis, k: int) -> tuple[Halves, float]:
+def denoise_to_halves(basis: Basis, k: int, factor: int = 1) -> tuple[Halves, float]:
     """Return the denoised plane of light k as `DenoisedPlanes` holds it, and its scale."""
     scale = scale_of(basis.planes.plane(k))
-    return as_halves(denoise_plane(basis, k), scale), scale
+    return as_halves(denoise_plane(basis, k, factor=factor), scale), scale
 
 
-def read_denoised_planes(basis: Basis) -> DenoisedPlanes | None:
-    """Return the cached denoised planes of just these pixels; None if missing or damaged."""
+def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | None:
+    """Return the cached denoised planes of just these pixels; None if missing or damaged.
+
+    factor: side of blocks, of which planes serve as well as whole ones.
+    """
     with suppress(*_READ_ERRORS, LightpaintError):
         path = cache.companion_path(basis, DENOISED_SUFFIX)
         if not is_own(path):
@@ -193,9 +198,12 @@ def read_denoised_planes(basis: Basis) -> DenoisedPlanes | None:
                 return None
             planes = DenoisedPlanes(*(file_arrays[name] for name in ARRAY_NAMES))
         arrays = [getattr(planes, name) for name in ARRAY_NAMES]
-        shapes = [_shape(basis), (len(basis.lights),), _shape(basis)[1:]]
+        n, of_halves = len(basis.lights), [_shape(basis)]
+        if factor > 1:
+            of_halves.append((n, *blocks_in(basis.size, factor), 3))
+        shapes = [[its, (n,), _shape(basis)[1:]] for its in of_halves]
         types = ["float16", "float64", "float32"]
-        if [x.shape for x in arrays] == shapes and [x.dtype.name for x in arrays] == types:
+        if [x.shape for x in arrays] in shapes and [x.dtype.name for x in arrays] == types:
             path.touch()
             return planes
     return None

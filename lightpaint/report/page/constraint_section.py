@@ -9,10 +9,11 @@ from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.denoiser import denoised
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.solution import Solution
+from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.measures import relative_residual
 from lightpaint.report.page.figures import PagePicture, figure
-from lightpaint.report.page.html import ROWS_SHOWN, SPARE_ROWS, row, share_cell, table
+from lightpaint.report.page.html import row, share_cell, table
 from lightpaint.report.phrases import spoken_percent
 
 #: Least width in pixels of reduced pictures; a whole factor gives up to twice as much.

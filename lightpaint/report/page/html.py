@@ -5,14 +5,11 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
 
+from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
+
 
 class Html(str):
     """A text that is HTML already, and is not escaped."""
-
-
-#: Rows of a table, or names of a list, that are shown of many, and the most others that need no
-#: fold.
-ROWS_SHOWN, SPARE_ROWS = 10, 3
 
 
 def table(

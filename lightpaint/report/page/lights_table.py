@@ -19,11 +19,11 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.basis_memo import make_once
+from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS, make_once
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
-from lightpaint.report.page.html import ROWS_SHOWN, SPARE_ROWS, breakable_name, fold, share_cell
+from lightpaint.report.page.html import breakable_name, fold, share_cell
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.uncertainty_sentences import (
     UNTOLD,

@@ -15,6 +15,7 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.denoised_mixes import denoise_mix, denoise_plane
 from lightpaint.basis.lights import BasisLight
 from lightpaint.colour.color import kelvin_to_rgb
 from lightpaint.colour.display.transform_table import curve_of, lattice_of
@@ -22,20 +23,16 @@ from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.colour.photometry import photometry
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import in_turns
-from lightpaint.images.denoiser import denoised
 from lightpaint.images.packed_picture import PackedPicture, pack_picture
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.answer.light_setting import ALL_REACHED
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.answer.lighting_file import lighting_fields
-from lightpaint.report.basis_memo import cached_clean_planes, make_once
+from lightpaint.report.basis_memo import cached_clean_planes, make_once, page_reduction
 from lightpaint.report.page.figures import CLEAN_REDUCTION, data_uri
 from lightpaint.report.page.lights_table import most_visible_lights
 from lightpaint.threads import parallel_map
 from lightpaint.viewer.bundle import bundled, styles
-
-#: Pixels of a plane from left to right, and of all planes together, at most.
-MAX_WIDTH, MAX_PIXELS = 480, 1_000_000
 
 #: Colour temperatures of the sliders, in kelvin, evenly in mireds; and the distance from Planck's
 #: locus up to which a colour is one.
@@ -101,17 +98,6 @@ def mixer_assets() -> str:
     return f'<style>\n{style}</style><script type="module">\n{script}</script>'
 
 
-def _factor(basis: Basis, count: int) -> int:
-    """Return the side of the blocks of pixels that become one pixel of a plane."""
-    height, width = basis.size
-    factor = max(1, -(-width // MAX_WIDTH))
-    while count * (height // factor) * (width // factor) > MAX_PIXELS and factor < min(
-        height, width
-    ):
-        factor += 1
-    return min(factor, height, width)
-
-
 def _shown_planes(
     basis: Basis, lighting: Lighting, shown: Indices, *, is_clean: bool
 ) -> tuple[list[int], list[dict[str, Any]]]:
@@ -144,19 +130,29 @@ def _compact_planes(
 ) -> tuple[list[int], list[dict[str, Any]]]:
     """Return planes of some lights and mixes of others, (n, 3) each, compact for the page."""
     planes = cached_clean_planes(basis) if is_clean else None
-    factor = _factor(basis, len(lights) + len(mixes))
+    count = len(lights) + len(mixes)
+    factor = page_reduction(basis, count)
+    # Where many pixels make one, their mean has hardly any noise left to take out.
+    must_denoise = is_clean and planes is None and factor < CLEAN_REDUCTION
 
     def small(k: int) -> Floats:
-        if k >= len(lights):
-            mixed = (planes or basis).mix(mixes[k - len(lights)])
+        if must_denoise and k < len(lights):
+            return denoise_plane(basis, int(lights[k]), factor=factor)
+        if must_denoise:
+            return denoise_mix(basis, mixes[k - len(lights)], factor=factor)
+        if k < len(lights):
+            plane = planes.plane(lights[k]) if planes else basis.planes.plane(lights[k])
         else:
-            mixed = planes.plane(lights[k]) if planes else basis.planes.plane(lights[k])
-        return np.asarray(block_mean(mixed, factor), np.float32)
+            plane = (planes or basis).mix(mixes[k - len(lights)])
+        is_small = planes is not None and not planes.is_whole
+        return np.asarray(plane if is_small else block_mean(plane, factor), np.float32)
 
-    pictures = in_turns(small, range(len(lights) + len(mixes)), basis.size)
-    if is_clean and planes is None and factor < CLEAN_REDUCTION:
-        features = basis.features and basis.features.reduced(factor)
-        pictures = [denoised(picture, features) for picture in pictures]
+    # A denoiser uses all processors itself.
+    pictures = (
+        [small(k) for k in range(count)]
+        if must_denoise
+        else in_turns(small, range(count), basis.size)
+    )
     return list(pictures[0].shape[:2]), parallel_map(plane_data, pictures)
 
 
@@ -226,7 +222,7 @@ def transform_data(transform: ViewTransform) -> dict[str, Any]:
 
 
 def _painting(painting: Floats, basis: Basis, count: int) -> str:
-    small = block_mean(np.asarray(painting, np.float32), _factor(basis, count))
+    small = block_mean(np.asarray(painting, np.float32), page_reduction(basis, count))
     return data_uri(to_8_bit(np.clip(small, 0, 1)))
 
 

@@ -32,6 +32,7 @@ from lightpaint.report.answer_pictures import (
     report_transform,
     target_picture,
 )
+from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS, CleanLooks
 from lightpaint.report.influences import fit_sentence
 from lightpaint.report.page.color_section import colors_section
@@ -39,7 +40,6 @@ from lightpaint.report.page.constraint_section import constraints_section
 from lightpaint.report.page.diagnosis_section import missed_section, sure_section
 from lightpaint.report.page.figures import PagePicture, maps, wipe
 from lightpaint.report.page.fit_tables import fit_table, render_table, verification_table, versions
-from lightpaint.report.page.html import ROWS_SHOWN, SPARE_ROWS
 from lightpaint.report.page.lights_table import lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
 from lightpaint.report.page.suggestion_section import suggestion_section
