@@ -1,5 +1,6 @@
 """Lights that may move are placed by a solve, verified, and written into the user's text."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -147,3 +148,15 @@ def test_what_is_not_painted_is_held_at_the_look_before_the_move(
     if space == "linear":
         counted = np.broadcast_to(near.weight > 0, look.shape)
         np.testing.assert_allclose(near.image[counted], look[counted], rtol=1e-5)
+
+
+def test_the_report_says_what_moved(room: Scene, tmp_path: Path) -> None:
+    options = {"spp": 64, "space": "linear", "hold": 0, "verify": False}
+    rigging = lp.Rigging.of({"beam": {"aim": True}})
+    lp.paint_with_light(room, painted(room), tmp_path / "a", rigging=rigging, **options)
+    numbers = json.loads((tmp_path / "a" / "report.json").read_text())["placement"]
+    assert [change["name"] for change in numbers["changes"]] == ["beam"]
+    assert numbers["missed_after"] < numbers["missed_before"]
+    page = (tmp_path / "a" / "report.html").read_text()
+    assert numbers["changes"][0]["text"] in page
+    assert "Plan and elevation" in page

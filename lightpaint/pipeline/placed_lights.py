@@ -9,6 +9,7 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job_bases import obtain, view_listener
 from lightpaint.pipeline.needed_samples import problem_of, without_noise
+from lightpaint.pipeline.results.results import spoken_move
 from lightpaint.placement.place import Placement, place
 from lightpaint.placement.rigging.rigged_lights import freedoms_of
 from lightpaint.progress import Listener
@@ -34,7 +35,7 @@ def place_lights(
     )
     del solution
     for move in placement.moves:
-        listen.say(str(move))
+        listen.say(spoken_move(move))
     if not placement.moves:
         listen.say("no light is moved: no move is surely worth a hundredth of what is missed")
         return job, list(bases), placement

@@ -45,6 +45,7 @@ from lightpaint.report.measures import (
     relative_residual,
 )
 from lightpaint.report.page.diagnosis_section import maps_limit
+from lightpaint.report.rig.hung_lights import HungLights
 from lightpaint.report.uncertainty_sentences import UNTOLD_HERE
 from lightpaint.target.target import Target
 from lightpaint.version import __version__
@@ -64,6 +65,7 @@ def report_numbers(
     diagnosis: Diagnosis | None = None,
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
+    hung: HungLights | None = None,
     appearance: Appearance | None = None,
     color_choices: Choices = (),
     missed: Residual | None = None,
@@ -94,6 +96,7 @@ def report_numbers(
         "uncertainty": None if uncertainty is None else _uncertainty(basis, solution, uncertainty),
         "verification": None if verification is None else verification_numbers(verification),
         "suggestions": _suggestion_list(suggestions, solution.lighting.cd_per_unit),
+        "placement": None if hung is None else _placement(hung),
     }
     return json.dumps(finite(numbers), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -268,6 +271,16 @@ def verification_numbers(v: Verification) -> dict[str, Any]:
         "delta_e_mean": v.delta_e_mean,
         "delta_e_95": v.delta_e_95,
         "power": None if v.power is None else {"error": ERROR, "lights": dict(v.power)},
+    }
+
+
+def _placement(hung: HungLights) -> dict[str, Any]:
+    return {
+        "missed_before": hung.missed_before,
+        "missed_after": hung.missed_after,
+        "changes": [
+            {"name": change.name, "text": change.text, **change.numbers} for change in hung.changes
+        ],
     }
 
 

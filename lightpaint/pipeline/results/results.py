@@ -20,7 +20,7 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.place import Placement
+from lightpaint.placement.place import Move, Placement
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
@@ -32,6 +32,7 @@ from lightpaint.report.comparison import comparison_image
 from lightpaint.report.page.notebook_html import look_html
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
+from lightpaint.report.rig.hung_lights import HungLights, LightChange, hung_lights, spoken_fraction
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.scene.scene import Scene
@@ -243,9 +244,40 @@ def _report_arguments(look: Look, command: str) -> dict[str, Any]:
         "diagnosis": look.diagnosis,
         "unconstrained": look.analysis.unconstrained,
         "suggestions": look.suggestions,
+        "hung": None if look.placement is None else hung_of(look.placement, look.lighting),
         "appearance": look.analysis.appearance,
         "color_choices": look.analysis.color_choices,
     }
+
+
+def hung_of(placement: Placement, lighting: Lighting) -> HungLights:
+    """Return the lights of an answer, and what a placement changed of them."""
+    changes = tuple(_change_of(move) for move in placement.moves)
+    missed = placement.missed_before, placement.missed_after
+    return HungLights(hung_lights(lighting), changes, lighting.up, *missed)
+
+
+def _change_of(move: Move) -> LightChange:
+    numbers = {
+        "distance": move.distance,
+        "turn": move.turn,
+        "cutoff": move.new.cutoff,
+        "gain_share": move.gain_share,
+    }
+    return LightChange(move.name, spoken_move(move), numbers)
+
+
+def spoken_move(move: Move) -> str:
+    """Return what a light did and gained: `spot_knot turned by 12°, slid .6: a fifth …`."""
+    done = []
+    if move.turn >= 0.5:
+        done.append(f"turned by {move.turn:.0f}°")
+    if move.distance > 0:
+        done.append(f"slid {move.distance:.2g}")
+    if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
+        done.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
+    gain = spoken_fraction(move.gain_share)
+    return f"{move.name} {', '.join(done)}: {gain} of what was missed"
 
 
 def verify_result(

@@ -42,7 +42,9 @@ from lightpaint.report.page.figures import PagePicture, maps, wipe
 from lightpaint.report.page.fit_tables import fit_table, render_table, verification_table, versions
 from lightpaint.report.page.lights_table import lights_table, thumbnails_of
 from lightpaint.report.page.mixer import mixer_assets, mixer_html, planes_for_page
+from lightpaint.report.page.placement_section import placement_section
 from lightpaint.report.page.suggestion_section import suggestion_section
+from lightpaint.report.rig.hung_lights import HungLights
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.target.target import Target
@@ -60,6 +62,7 @@ def report_page(
     diagnosis: Diagnosis | None = None,
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
+    hung: HungLights | None = None,
     appearance: Appearance | None = None,
     looks: CleanLooks | None = None,
     color_choices: Choices = (),
@@ -69,7 +72,8 @@ def report_page(
 
     verification: None without a render that checks the prediction.
     command: the shell command that made the result.
-    uncertainty, diagnosis, unconstrained, suggestions: without them the page has no such section.
+    uncertainty, diagnosis, unconstrained, suggestions, hung: without them the page has no such
+    section.
     appearance: the result of `compare_appearance`, if known. looks: the pictures without their
     grain, which a switch then shows. color_choices: the answers of other colours, if known.
     missed: the result of `residual_of`.
@@ -112,6 +116,7 @@ def report_page(
         **parts,
         **_texts(basis, target, solution, predicted, verification, appearance),
         exposure=_exposure(transform, predicted.image, looks.denoiser),
+        places=placement_section(hung, to_8_bit(transform.encode(looks.predicted)), basis.features),
         suggestions=suggestion_section(
             suggestions,
             transform=transform,

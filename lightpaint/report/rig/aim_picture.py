@@ -1,0 +1,65 @@
+"""The picture with arrows: from where each moved light pointed or hung, to where it does now."""
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw, ImageFont
+
+from lightpaint.arrays import Position
+from lightpaint.images.denoiser import Features
+from lightpaint.report.rig.hung_lights import HungLight
+from lightpaint.report.rig.rig_drawing import CHANGED, FINER, GROUND, arrow, circle
+from lightpaint.report.rig.view_geometry import ViewGeometry
+from lightpaint.scene.properties.site import Site
+from lightpaint.screen import visible
+
+#: Width that narrower pictures are enlarged to.
+MIN_WIDTH = 640
+
+
+def aim_picture(
+    picture: npt.NDArray[np.uint8], features: Features | None, lights: tuple[HungLight, ...]
+) -> npt.NDArray[np.uint8] | None:
+    """Draw where changed lights point, or hang if they point nowhere, over an 8-bit picture.
+
+    None if none of that is in the picture.
+    """
+    geometry = ViewGeometry.of(features)
+    changed = [light for light in lights if light.is_changed]
+    if geometry is None or not changed:
+        return None
+    height, width = picture.shape[:2]
+    zoom = FINER * max(1.0, MIN_WIDTH / width)
+    size = round(zoom * width), round(zoom * height)
+    sheet = Image.fromarray(picture).resize(size, Image.Resampling.LANCZOS)
+    draw, text = ImageDraw.Draw(sheet), FINER * max(12, round(zoom * width / FINER / 60))
+    font, is_any = ImageFont.load_default(text), False
+    for light in changed:
+        old = light.place.moved_from
+        new = _shown_point(geometry, light.place.site)
+        before = None if old is None else _shown_point(geometry, old)
+        if new is None:
+            continue
+        is_any = True
+        here = zoom * np.array(new)
+        if before is not None:
+            there = zoom * np.array(before)
+            circle(draw, there, 0.35 * text, outline=CHANGED, width=max(2, text // 8))
+            if float(np.hypot(*(here - there))) > text:
+                arrow(draw, there, here, CHANGED, width=max(2, text // 8), head=0.8 * text)
+        circle(draw, here, 0.3 * text, outline=CHANGED, width=1, fill=CHANGED)
+        label = visible(light.place.name)
+        wide = font.getlength(label)
+        x = float(np.clip(here[0] + 0.6 * text, 0, max(size[0] - wide - 4, 0)))
+        y = float(np.clip(here[1], text, size[1] - text))
+        edge = {"stroke_width": text // 7, "stroke_fill": GROUND}
+        draw.text((x, y), label, CHANGED, font, anchor="lm", **edge)
+    if not is_any:
+        return None
+    small = (size[0] // FINER, size[1] // FINER)
+    return np.asarray(sheet.resize(small, Image.Resampling.LANCZOS))
+
+
+def _shown_point(geometry: ViewGeometry, site: Site) -> tuple[float, float] | None:
+    """Return where a light points in the picture or, if it points nowhere, where it hangs."""
+    point: Position | None = geometry.aim_of(site) if site.direction else site.position
+    return None if point is None else geometry.pixel(point)

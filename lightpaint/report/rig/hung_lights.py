@@ -1,0 +1,86 @@
+"""Lights with their places, and what was changed of them, for pictures and pages."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from lightpaint.arrays import RGB, Position
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.report.phrases import spoken_percent
+from lightpaint.scene.properties.site import EmitterPlace
+
+#: Shares that have a word of their own, and the farthest that one may be from it.
+FRACTIONS = {
+    1 / 10: "a tenth",
+    1 / 5: "a fifth",
+    1 / 4: "a quarter",
+    1 / 3: "a third",
+    1 / 2: "half",
+    2 / 3: "two thirds",
+    3 / 4: "three quarters",
+}
+NEAR = 0.02
+
+
+@dataclass(frozen=True)
+class HungLight:
+    """A light to draw. color: linear RGB of its light; black if it is off."""
+
+    place: EmitterPlace
+    color: RGB
+
+    @property
+    def is_changed(self) -> bool:
+        """True if it moved or is new."""
+        return self.place.moved_from is not None or bool(self.place.new)
+
+
+@dataclass(frozen=True)
+class LightChange:
+    """A light that moved or is new. text: what it did and gained. numbers: the same, for files."""
+
+    name: str
+    text: str
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class HungLights:
+    """All lights with a place, and the changes, those that gained most first.
+
+    up: the axis of the scene that is up. missed_before, missed_after: shares of the painting that
+    are missed without the changes, and with them, by the search.
+    """
+
+    lights: tuple[HungLight, ...]
+    changes: tuple[LightChange, ...]
+    up: Position
+    missed_before: float
+    missed_after: float
+
+    @property
+    def sentence(self) -> str:
+        """What the changes bring together."""
+        if not self.changes:
+            return "No light is moved: no move would surely bring a hundredth of what is missed."
+        share = 1 - self.missed_after / max(self.missed_before, 1e-300)
+        subject = "This change brings" if len(self.changes) == 1 else "These changes bring"
+        return (
+            f"{subject} {spoken_fraction(share)} of what was missed (in energy, by the search; "
+            "the picture above is solved and rendered anew)."
+        )
+
+
+def hung_lights(lighting: Lighting) -> tuple[HungLight, ...]:
+    """Return the lights of an answer whose places are known."""
+    colors = {member: light.emission for light in lighting.lights for member in light.members}
+    black = (0.0, 0.0, 0.0)
+    return tuple(HungLight(place, colors.get(place.name, black)) for place in lighting.places)
+
+
+def spoken_fraction(share: float) -> str:
+    """Return a share in words: `a fifth`, or `8 %` where none is near."""
+    near = min(FRACTIONS, key=lambda fraction: abs(fraction - share))
+    if abs(near - share) <= NEAR * max(near, 0.25) / 0.25:
+        return FRACTIONS[near]
+    return spoken_percent(share)

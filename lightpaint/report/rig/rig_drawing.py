@@ -1,0 +1,351 @@
+"""Drawings of where lights hang: a plan from above, and an elevation from the side.
+
+The room is what the camera sees of it: its pixels as points, in their own colours but dim. Lights
+that moved have a ring where they were and an arrow to where they are; spots have their beams.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw, ImageFont
+
+from lightpaint.arrays import RGB, Doubles, Position
+from lightpaint.images.denoiser import Features
+from lightpaint.report.rig.hung_lights import HungLight
+from lightpaint.report.rig.view_geometry import ViewGeometry
+from lightpaint.screen import visible
+
+#: The ground, texts on it, and what has changed.
+GROUND, TEXT, FAINT, EDGE = (24, 24, 26), (226, 226, 226), (142, 142, 146), (58, 58, 62)
+CHANGED = (255, 176, 66)
+
+#: Brightness of the room's points, and their largest side in pixels of the large drawing.
+ROOM, LARGEST = 0.45, 40
+
+#: Drawn this much larger than it is shown, so that lines are smooth.
+FINER = 2
+
+#: The room around what is seen, as a share; lights farther away than this are not drawn.
+MARGIN, FAR = 0.08, 1.5
+
+#: Most height of both drawings, relative to their width.
+TALLEST = 1.3
+
+#: Lengths of beams as a share of the panel, where they meet nothing that is seen.
+BEAM = 0.3
+
+#: Names are drawn of so many lights; of more only those that changed have theirs.
+MOST_NAMES = 24
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """A drawing along one axis. right, up: unit vectors; low, scale: from metres to pixels."""
+
+    title: str
+    right: Doubles
+    up: Doubles
+    low: Doubles
+    scale: float
+    size: tuple[int, int]
+
+    def at(self, points: Doubles | Position) -> Doubles:
+        """Return x and y in pixels, (..., 2)."""
+        places = np.asarray(points, dtype=float)
+        flat = np.stack([places @ self.right, places @ self.up], axis=-1)
+        x, y = np.moveaxis((flat - self.low) * self.scale, -1, 0)
+        return np.stack([x, self.size[1] - y], axis=-1)
+
+
+def rig_drawing(
+    features: Features | None,
+    lights: Sequence[HungLight],
+    *,
+    up: Position = (0.0, 1.0, 0.0),
+    width: int = 960,
+) -> npt.NDArray[np.uint8] | None:
+    """Draw a plan and an elevation below it, (h, w, 3) uint8 sRGB; the camera looks to the right.
+
+    features: of the picture. up: the axis of the scene that is up. None if the picture does not
+    tell where anything is, or no light has a place.
+    """
+    geometry = ViewGeometry.of(features)
+    lights = [light for light in lights if light.place.position is not None]
+    if geometry is None or features is None or not lights:
+        return None
+    is_whole = np.linalg.norm(features.normal, axis=-1) > 0
+    albedo = np.where(is_whole[..., None], features.albedo, 0)
+    colors = albedo[tuple((geometry.pixels[:, ::-1] - 0.5).astype(int).T)]
+    text = FINER * max(11, width // 72)
+    panels = _panels(geometry, lights, np.array(up), FINER * width)
+    sheet = Image.new("RGB", (FINER * width, sum(_height(x, text) for x in panels)), GROUND)
+    y = 0
+    for panel in panels:
+        sheet.paste(
+            _drawn(panel, geometry, colors, lights, text), ((FINER * width - panel.size[0]) // 2, y)
+        )
+        y += _height(panel, text)
+    small = sheet.resize((width, sheet.height // FINER), Image.Resampling.LANCZOS)
+    return np.asarray(small)
+
+
+def _height(panel: _Panel, text: int) -> int:
+    """Return the height of a panel with its title."""
+    return panel.size[1] + round(2.4 * text)
+
+
+def _panels(
+    geometry: ViewGeometry, lights: Sequence[HungLight], up: Doubles, width: int
+) -> list[_Panel]:
+    """Return plan and elevation on one scale, `width` pixels wide or less."""
+    ahead = _ahead(geometry, up)
+    left = np.cross(up, ahead)
+    places = _places_near(geometry, lights)
+    low, high = np.percentile(geometry.points, [0.5, 99.5], axis=0)
+    points = np.concatenate([places, [low, high]])
+    views = [
+        ("plan: from above, the camera looks to the right", left),
+        ("elevation: from the side", up),
+    ]
+    flat = np.stack([points @ ahead, points @ left, points @ up], axis=1)
+    least, most = flat.min(axis=0), flat.max(axis=0)
+    room = MARGIN * float((most - least).max())
+    least, extent = least - room, most - least + 2 * room
+    scale = min(width / extent[0], TALLEST * width / (extent[1] + extent[2]))
+    return [
+        _Panel(
+            title,
+            ahead,
+            along,
+            least[[0, k]],
+            scale,
+            (int(extent[0] * scale), int(extent[k] * scale)),
+        )
+        for k, (title, along) in enumerate(views, 1)
+    ]
+
+
+def _ahead(geometry: ViewGeometry, up: Doubles) -> Doubles:
+    """Return the axis of the scene across `up` that leads away from the camera."""
+    camera = geometry.camera
+    way = np.ptp(geometry.points, axis=0)
+    if camera is not None:
+        way = np.median(geometry.points, axis=0) - np.array(camera)
+    way = np.where(np.abs(up) > 0.5, 0, way)
+    axis = np.zeros(3)
+    k = int(np.argmax(np.abs(way)))
+    axis[k] = 1.0 if way[k] >= 0 else -1.0
+    return axis
+
+
+def _places_near(geometry: ViewGeometry, lights: Sequence[HungLight]) -> Doubles:
+    """Return the places of lights, old and new, that are near what is seen."""
+    sites = [light.place.site for light in lights]
+    sites += [light.place.moved_from for light in lights if light.place.moved_from is not None]
+    places = [site.position for site in sites if site.position is not None]
+    low, high = np.percentile(geometry.points, [0.5, 99.5], axis=0)
+    reach = FAR * float((high - low).max())
+    listed = np.array(places, dtype=float).reshape(-1, 3)
+    near = ((listed > low - reach) & (listed < high + reach)).all(axis=1)
+    return np.asarray(listed[near])
+
+
+def _drawn(
+    panel: _Panel, geometry: ViewGeometry, colors: Doubles, lights: Sequence[HungLight], text: int
+) -> Image.Image:
+    """Draw one panel, with its title below it."""
+    width, height = panel.size
+    picture = Image.fromarray(_room(panel, geometry, colors))
+    draw = ImageDraw.Draw(picture, "RGBA")
+    if geometry.camera is not None:
+        _draw_camera(draw, panel, geometry, text)
+    ordered = sorted(lights, key=lambda light: light.is_changed)
+    for light in ordered:
+        _draw_beam(draw, panel, geometry, light)
+    for light in ordered:
+        _draw_light(draw, panel, light, text)
+    names = {light.place.name: light for light in lights}
+    if len(lights) > MOST_NAMES:
+        names = {name: light for name, light in names.items() if light.is_changed}
+    _draw_names(draw, panel, names, text)
+    whole = Image.new("RGB", (width, _height(panel, text)), GROUND)
+    whole.paste(picture, (0, 0))
+    below = ImageDraw.Draw(whole)
+    font = ImageFont.load_default(text)
+    y = height + round(1.2 * text)
+    below.text((text, y), panel.title, FAINT, font, anchor="lm")
+    length = _round_length(0.25 * width / panel.scale)
+    end = width - text
+    below.line([(end - length * panel.scale, y), (end, y)], FAINT, max(2, text // 8))
+    label = f"{length:g}"
+    below.text((end - length * panel.scale - text / 2, y), label, FAINT, font, anchor="rm")
+    return whole
+
+
+def _room(panel: _Panel, geometry: ViewGeometry, colors: Doubles) -> npt.NDArray[np.uint8]:
+    """Draw what the camera sees as points, those that hide the rest left out."""
+    towards = np.cross(panel.right, panel.up)
+    # Ceilings from above, the near wall from the side.
+    faces = geometry.normals @ towards > -0.3
+    width, height = panel.size
+    image = np.full((height, width, 3), GROUND, np.uint8)
+    display = np.clip(colors, 0, 1) ** (1 / 2.2)
+    shade = (np.array(GROUND) + ROOM * display * (255 - np.array(GROUND))).astype(np.uint8)
+    x, y = panel.at(geometry.points).T.astype(int)
+    sides = np.clip(geometry.spacing * panel.scale, 1, LARGEST).astype(int)
+    depth = geometry.points @ towards
+    # Coarse points first, so that they only fill gaps between others.
+    for side in sorted({*sides[faces].tolist()}, reverse=True):
+        here = np.flatnonzero(faces & (sides == side))
+        here = here[np.argsort(depth[here])]
+        for i in range(side):
+            for j in range(side):
+                across, down = x[here] + i - side // 2, y[here] + j - side // 2
+                inside = (across >= 0) & (across < width) & (down >= 0) & (down < height)
+                image[down[inside], across[inside]] = shade[here[inside]]
+    return image
+
+
+def _draw_camera(
+    draw: ImageDraw.ImageDraw, panel: _Panel, geometry: ViewGeometry, text: int
+) -> None:
+    assert geometry.camera is not None
+    inside = np.array([1.5 * text, 1.5 * text]), np.array(panel.size) - 1.5 * text
+    there = panel.at(geometry.camera)
+    way = panel.at(np.median(geometry.points, axis=0)) - there
+    way = way / max(float(np.hypot(*way)), 1e-9)
+    # One that stands farther away is drawn at the edge.
+    x, y = np.clip(there, *inside)
+    side = np.array([-way[1], way[0]])
+    size = 0.8 * text
+    corners = [(x, y), *(tuple((x, y) + size * (1.6 * way + s * side)) for s in (0.7, -0.7))]
+    draw.polygon(corners, outline=(*FAINT, 255), width=max(2, text // 10))
+
+
+def _draw_beam(
+    draw: ImageDraw.ImageDraw,
+    panel: _Panel,
+    geometry: ViewGeometry,
+    light: HungLight,
+) -> None:
+    """Draw the cone of a spot, or where a panel points, as far as what it lights."""
+    site = light.place.site
+    if site.direction is None or site.position is None:
+        return
+    if site.cutoff is None and not light.is_changed:
+        return
+    aim = geometry.aim_of(site)
+    length = BEAM * panel.size[0] / panel.scale
+    if aim is not None:
+        length = math.dist(aim, site.position)
+    spread = math.radians(site.cutoff or 12.0)
+    way = np.array(site.direction) * length
+    start, end = panel.at(site.position), panel.at(np.array(site.position) + way)
+    along = end - start
+    side = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-9)
+    half = math.tan(min(spread, 1.2)) * length * panel.scale
+    corners = [tuple(start), tuple(end + half * side), tuple(end - half * side)]
+    r, g, b = _shown(light.color)
+    draw.polygon(corners, fill=(r, g, b, 60 if light.is_changed else 26))
+    if light.is_changed:
+        draw.line(
+            [tuple(start), tuple(end)], (*CHANGED, 200), max(1, round(0.0015 * panel.size[0]))
+        )
+
+
+def _draw_light(draw: ImageDraw.ImageDraw, panel: _Panel, light: HungLight, text: int) -> None:
+    """Draw where a light hangs and, if it moved, where it hung before."""
+    assert light.place.position is not None
+    here, radius = panel.at(light.place.position), 0.42 * text
+    thin = max(2, text // 9)
+    old = light.place.moved_from
+    if old is not None and old.position is not None:
+        there = panel.at(old.position)
+        circle(draw, there, 0.8 * radius, outline=CHANGED, width=thin)
+        if float(np.hypot(*(here - there))) > 2.2 * radius:
+            arrow(draw, there, here, CHANGED, width=thin, head=0.8 * text)
+    edge = CHANGED if light.is_changed else TEXT
+    circle(draw, here, radius, fill=_shown(light.color), outline=edge, width=thin)
+
+
+def _draw_names(
+    draw: ImageDraw.ImageDraw, panel: _Panel, names: Mapping[str, HungLight], text: int
+) -> None:
+    """Draw names beside lights, moved down where one would cover another."""
+    font, taken = ImageFont.load_default(round(0.9 * text)), list[tuple[float, ...]]()
+    for name, light in sorted(names.items(), key=lambda item: not item[1].is_changed):
+        assert light.place.position is not None
+        x, y = panel.at(light.place.position)
+        label = visible(name)
+        wide = font.getlength(label)
+        left = x + 0.7 * text
+        if left + wide > panel.size[0]:
+            left = x - 0.7 * text - wide
+        top = y - 0.5 * text
+        for _ in range(len(names)):
+            box = (left, top, left + wide, top + 1.05 * text)
+            over = [b for b in taken if _overlap(box, b)]
+            if not over:
+                break
+            top = max(b[3] for b in over)
+        if top + text > panel.size[1]:
+            continue  # a plan of a hundred lamps has no room for their names
+        taken.append((left, top, left + wide, top + 1.05 * text))
+        color = CHANGED if light.is_changed else (190, 190, 194)
+        draw.text((left, top), label, color, font, stroke_width=text // 8, stroke_fill=GROUND)
+
+
+def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def circle(
+    draw: ImageDraw.ImageDraw,
+    middle: Doubles,
+    radius: float,
+    *,
+    outline: tuple[int, ...],
+    width: int,
+    fill: tuple[int, ...] | None = None,
+) -> None:
+    """Draw a circle."""
+    x, y = middle
+    draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill, outline, width)
+
+
+def arrow(
+    draw: ImageDraw.ImageDraw,
+    start: Doubles,
+    end: Doubles,
+    color: tuple[int, ...],
+    *,
+    width: int,
+    head: float,
+) -> None:
+    """Draw an arrow from `start` to `end`, in pixels."""
+    along = (np.asarray(end) - start) / max(float(np.hypot(*(np.asarray(end) - start))), 1e-9)
+    side = np.array([-along[1], along[0]])
+    neck = np.asarray(end) - head * along
+    draw.line([tuple(start), tuple(neck)], color, width)
+    corners = [tuple(end), tuple(neck + 0.4 * head * side), tuple(neck - 0.4 * head * side)]
+    draw.polygon(corners, fill=color)
+
+
+def _shown(color: RGB) -> tuple[int, int, int]:
+    """Return the hue of a light for display, with its brightest channel at full."""
+    brightest = max(color)
+    if brightest <= 0:
+        return (70, 70, 74)
+    r, g, b = (round(255 * max(v / brightest, 0) ** (1 / 2.2)) for v in color)
+    return r, g, b
+
+
+def _round_length(length: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, at most `length`."""
+    if not length > 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(length))
+    return max(step * power for step in (1, 2, 5) if step * power <= length)

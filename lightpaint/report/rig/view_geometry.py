@@ -1,0 +1,154 @@
+"""The geometry of a picture: where its camera stands and where points of the scene are in it.
+
+A basis knows the position of what each pixel shows, and not its camera. The projection follows from
+these pairs of pixels and points (direct linear transform, Hartley & Zisserman 2004, §7.1).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats, Position
+from lightpaint.images.denoiser import Features
+from lightpaint.scene.properties.site import Site
+
+#: Pixels that a projection is fitted to, and the least that it takes.
+FITTED, LEAST = 4000, 12
+
+#: Least length of a pixel's mean normal: at edges it is shorter, and the position between two.
+WHOLE = 0.999
+
+#: Passes of the fit, each without the pixels that the last one misses by most.
+PASSES, KEPT = 3, 0.9
+
+#: Median error in pixels beyond which a camera has no such projection.
+MOST_ERROR = 1.5
+
+#: Degrees from the axis of a light within which a visible point counts as what it points at.
+NEAR_AXIS = 2.5
+
+
+@dataclass(frozen=True)
+class ViewGeometry:
+    """What a picture shows, in space.
+
+    points, normals: (p, 3), of pixels that show a surface. pixels: (p, 2), their x and y. size:
+    (height, width). projection: (3, 4), from points to pixels; None if there is none.
+    """
+
+    points: Doubles
+    normals: Doubles
+    pixels: Doubles
+    size: tuple[int, int]
+    projection: Doubles | None
+
+    @classmethod
+    def of(cls, features: Features | None) -> "ViewGeometry | None":
+        """Return that of a picture with these features; None if they have no positions."""
+        if features is None or features.position is None:
+            return None
+        height, width = features.size
+        y, x = np.mgrid[:height, :width] + 0.5
+        whole = np.linalg.norm(features.normal, axis=-1) > WHOLE
+        whole &= np.isfinite(features.position).all(axis=-1)
+        if int(whole.sum()) < LEAST:
+            return None
+        points = features.position[whole].astype(np.float64)
+        pixels = np.stack([x[whole], y[whole]], axis=1)
+        normals = features.normal[whole].astype(np.float64)
+        return cls(points, normals, pixels, (height, width), _projection(points, pixels))
+
+    @property
+    def camera(self) -> Position | None:
+        """Where the camera stands; None if that is unknown, or infinitely far away."""
+        if self.projection is None:
+            return None
+        centre = np.linalg.svd(self.projection)[2][-1]
+        if abs(centre[3]) < 1e-9:
+            return None
+        x, y, z = (float(v) for v in centre[:3] / centre[3])
+        return x, y, z
+
+    @property
+    def spacing(self) -> Doubles:
+        """About the distance between points of neighbouring pixels, (p,), seen from the front."""
+        if self.projection is None or (camera := self.camera) is None:
+            extent = float(np.ptp(self.points, axis=0).max())
+            return np.full(len(self.points), extent / max(self.size))
+        # The third row is of unit length in front of the camera, the first has the focal length.
+        rows = self.projection[:, :3] / np.linalg.norm(self.projection[2, :3])
+        middle = float(rows[0] @ rows[2])
+        focal = math.sqrt(max(float(rows[0] @ rows[0]) - middle**2, 1e-12))
+        away = self.points - np.array(camera)
+        distance = np.linalg.norm(away, axis=1)
+        cosine = np.abs((away * self.normals).sum(axis=1)) / np.maximum(distance, 1e-12)
+        return np.asarray(1.3 * distance / focal / np.maximum(cosine, 0.06))
+
+    def pixel(self, point: Position) -> tuple[float, float] | None:
+        """Return x and y of a point in the picture, in pixels; None if it is not in it."""
+        if self.projection is None:
+            return None
+        seen = self.projection @ np.array([*point, 1.0])
+        if seen[2] <= 0:
+            return None
+        x, y = (float(v) for v in seen[:2] / seen[2])
+        return (x, y) if 0 <= x <= self.size[1] and 0 <= y <= self.size[0] else None
+
+    def aim_of(self, site: Site) -> Position | None:
+        """Return the visible point that a light at `site` points at; None if there is none."""
+        if site.position is None or site.direction is None:
+            return None
+        away = self.points - np.array(site.position)
+        length = np.linalg.norm(away, axis=1)
+        cosine = away @ np.array(site.direction) / np.maximum(length, 1e-12)
+        near = np.flatnonzero(cosine > np.cos(np.radians(NEAR_AXIS)))
+        # Of what the beam passes it lights the first.
+        near = near[length[near] < 1.1 * length[near].min()] if len(near) else near
+        if not len(near):
+            return None
+        x, y, z = (float(v) for v in self.points[near[np.argmax(cosine[near])]])
+        return x, y, z
+
+
+def _projection(points: Doubles, pixels: Doubles) -> Doubles | None:
+    """Return the projection that maps points to pixels, positive in front of the camera."""
+    step = max(1, len(points) // FITTED)
+    points, pixels = points[::step], pixels[::step]
+    # Numbers of equal size keep the equations well conditioned.
+    to_unit, from_unit = _to_unit(points), np.linalg.inv(_to_unit(pixels))
+    here, there = (_moved(_to_unit(x), x) for x in (points, pixels))
+    kept = np.arange(len(points))
+    matrix = np.zeros((3, 4))
+    for _ in range(PASSES):
+        matrix = _linear_fit(here[kept], there[kept])
+        seen = np.c_[here, np.ones(len(here))] @ matrix.T
+        if np.median(seen[:, 2]) < 0:
+            matrix, seen = -matrix, -seen
+        error = np.linalg.norm(seen[:, :2] / seen[:, 2:] - there, axis=1)
+        kept = np.argsort(error)[: max(LEAST, int(KEPT * len(error)))]
+    whole = from_unit @ matrix @ to_unit
+    seen = np.c_[points, np.ones(len(points))] @ whole.T
+    errors = np.linalg.norm(seen[:, :2] / seen[:, 2:] - pixels, axis=1)
+    return whole if np.median(errors) < MOST_ERROR else None
+
+
+def _linear_fit(points: Doubles, pixels: Doubles) -> Doubles:
+    rows = np.c_[points, np.ones(len(points))]
+    zero = np.zeros_like(rows)
+    x, y = pixels.T[..., None]
+    equations = np.vstack([np.c_[rows, zero, -x * rows], np.c_[zero, rows, -y * rows]])
+    return np.asarray(np.linalg.svd(equations, full_matrices=False)[2][-1].reshape(3, 4))
+
+
+def _to_unit(values: Doubles) -> Doubles:
+    """Return the matrix that brings points to a mean of 0 and a spread of about 1."""
+    middle, spread = values.mean(axis=0), values.std() or 1.0
+    n = values.shape[1]
+    matrix = np.eye(n + 1) / spread
+    matrix[:n, n], matrix[n, n] = -middle / spread, 1.0
+    return matrix
+
+
+def _moved(matrix: Doubles, values: Floats) -> Doubles:
+    return np.asarray((np.c_[values, np.ones(len(values))] @ matrix.T)[:, :-1])
