@@ -60,7 +60,7 @@ class HungLights:
 
     @property
     def sentence(self) -> str:
-        """What the changes bring together."""
+        """The sentence on what the changes bring together."""
         if not self.changes:
             return "No light is moved: no move would surely bring a hundredth of what is missed."
         share = 1 - self.missed_after / max(self.missed_before, 1e-300)

@@ -31,7 +31,7 @@ NEAR_AXIS = 2.5
 
 @dataclass(frozen=True)
 class ViewGeometry:
-    """What a picture shows, in space.
+    """The surfaces that a picture shows, in space.
 
     points, normals: (p, 3), of pixels that show a surface. pixels: (p, 2), their x and y. size:
     (height, width). projection: (3, 4), from points to pixels; None if there is none.
@@ -61,7 +61,7 @@ class ViewGeometry:
 
     @property
     def camera(self) -> Position | None:
-        """Where the camera stands; None if that is unknown, or infinitely far away."""
+        """The place of the camera; None if that is unknown, or infinitely far away."""
         if self.projection is None:
             return None
         centre = np.linalg.svd(self.projection)[2][-1]
