@@ -54,13 +54,15 @@ def render_features(scene: Scene, *, seed: int = 0) -> Features:
     return scene.while_loaded(lambda loaded: _features(scene, loaded, seed))
 
 
-def render_first_hits(scene: Scene, *, seed: int = 0) -> tuple[Features, Objects]:
-    """Return features, and the objects that are seen."""
+def render_first_hits(
+    scene: Scene, *, seed: int = 0, loaded: Any = None
+) -> tuple[Features, Objects]:
+    """Return features, and the objects that are seen. loaded: `scene`, where it is loaded."""
 
     def both(loaded: Any) -> tuple[Features, Objects]:
         return _features(scene, loaded, seed), _objects(scene, loaded, seed)
 
-    return scene.while_loaded(both)
+    return scene.while_loaded(both) if loaded is None else both(loaded)
 
 
 def _features(scene: Scene, loaded: Any, seed: int) -> Features:

@@ -3,6 +3,7 @@
 import gc
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.planes import as_planes
@@ -95,10 +96,14 @@ def render_basis(
             "the lights of the basis to go on from have unequal numbers of samples, and one pass "
             "adds as many to each: render the others first, with scene.only([...])"
         )
-    render_all = _render_together if method == ONE_PASS else _render_one_by_one
+    has_first_hits = start is not None and not (start.features is None or start.objects is None)
+    how = scene, budget, seed, start, Keeper(keep), progress
     with render_errors(scene.path):
-        made = render_all(scene, budget, seed, start, Keeper(keep), progress, is_final=is_final)
-    if start is not None:
+        if method == ONE_PASS:
+            made = _render_together(*how, is_final=is_final, needs_first_hits=not has_first_hits)
+        else:
+            made = _render_one_by_one(*how, is_final=is_final)
+    if start is not None and has_first_hits:
         made = replace(made, features=start.features, objects=start.objects)
     return with_first_hits(made, scene, seed)
 
@@ -111,11 +116,14 @@ def render_planes_only(scene: Scene, *, spp: int, seed: int) -> Basis:
         return render_all(scene, Budget(spp, None), seed, None, Keeper(None), silent)
 
 
-def with_first_hits(basis: Basis, scene: Scene, seed: int) -> Basis:
-    """Return `basis` with its features: one from an earlier version may lack them."""
+def with_first_hits(basis: Basis, scene: Scene, seed: int, *, loaded: Any = None) -> Basis:
+    """Return `basis` with its features: one from an earlier version may lack them.
+
+    loaded: `scene`, where it is loaded.
+    """
     if basis.features is not None and basis.objects is not None:
         return basis
-    features, objects = render_first_hits(scene, seed=seed)
+    features, objects = render_first_hits(scene, seed=seed, loaded=loaded)
     return replace(basis, features=features, objects=objects)
 
 
@@ -129,8 +137,12 @@ def _render_together(
     progress: Progress,
     *,
     is_final: bool = True,
+    needs_first_hits: bool = False,
 ) -> Basis:
-    """Render all lights by one path tracer (see one_pass.py), step by step."""
+    """Render all lights by one path tracer (see one_pass.py), step by step.
+
+    needs_first_hits: whether features and objects are rendered, while the scene is loaded.
+    """
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
     begun = done = 0 if start is None else start.origin.halves[0]
@@ -163,7 +175,7 @@ def _render_together(
                 film.add(done, spp, let_others_through)
                 done += spp
                 keeper.now_and_then(basis)
-        return basis(is_last=True, is_finished=is_final)
+        made = basis(is_last=True, is_finished=is_final)
     except KeyboardInterrupt:
         if keeper.keep is None:
             raise
@@ -179,6 +191,10 @@ def _render_together(
         raise Interrupted(
             f"{2 * done}{of} samples per pixel are kept; the same command goes on"
         ) from None
+    else:
+        return (
+            with_first_hits(made, scene, seed, loaded=tracer.loaded) if needs_first_hits else made
+        )
     finally:
         tracer.close()
         gc.collect()
