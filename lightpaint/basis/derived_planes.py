@@ -13,11 +13,14 @@ import numpy.typing as npt
 from lightpaint.arrays import Doubles, Floats, Indices
 from lightpaint.basis.file import file_planes
 from lightpaint.basis.file.file_planes import RowPlanes
-from lightpaint.basis.planes import MemoryPlanes, Planes
+from lightpaint.basis.planes import BLOCK_PIXELS, MemoryPlanes, Planes
 from lightpaint.images.pixel_blocks import block_sums
 
 #: Rows of pixels that are averaged at a time: those of a chunk of a file that is compressed.
 READ_ROWS = 16
+
+#: Blocks of which less than one in so many is asked for are made of their own pixels.
+SPARSE = 8
 
 #: A plane by its number among others; None for a black one.
 PlaneReference = tuple[Planes, int] | None
@@ -115,6 +118,34 @@ class BlockPlanes(RowPlanes):
             for means, its in zip(made, lit, strict=True):
                 means[first - top : end - top] = self._means(its, first, end)
         return made
+
+    def pixels(self, where: slice | Indices) -> Floats:
+        """Return some blocks of all planes, (n, p, 3): of a few, from their own pixels alone."""
+        if isinstance(where, slice) or SPARSE * len(where) > np.ptp(where) + 1:
+            return super().pixels(where)
+        made = np.empty((self.count, len(where), 3), np.float32)
+        step = max(1, BLOCK_PIXELS // self._side**2)
+        for first in range(0, len(where), step):
+            part = slice(first, first + step)
+            made[:, part] = self._picked_means(where[part])
+        return made
+
+    def _picked_means(self, blocks: Indices) -> npt.NDArray[np.float32]:
+        """Return the means of some blocks, (n, p, 3)."""
+        side, (height, width) = self._side, self._weight.shape
+        rows, columns = np.divmod(blocks, self.size[1])
+        # One block beside the other: (side, p * side) places in the picture.
+        along = np.arange(side)
+        y, x = np.broadcast_arrays(
+            side * rows[:, None] + along[:, None, None], side * columns[:, None] + along
+        )
+        is_inside = ((y < height) & (x < width)).reshape(side, -1)
+        y, x = (np.minimum(its, n - 1).reshape(side, -1) for its, n in ((y, height), (x, width)))
+        weight = (self._weight[y, x] * is_inside)[..., None]
+        lit = self._whole.pixels((y * self._whole.size[1] + x).ravel())
+        total = self._total.reshape(-1, 1)[blocks]
+        sums = (block_sums(its.reshape(side, -1, 3) * weight, side)[0] for its in lit)
+        return np.array([its / total for its in sums], np.float32)
 
     def _means(self, lit: Floats, top: int, bottom: int) -> npt.NDArray[np.float32]:
         """Return some rows of means of a plane's pixels, which begin with the first of them."""

@@ -1,6 +1,8 @@
 """Planes: the same numbers wherever they are kept, and nobody else indexes them."""
 
 import ast
+import errno
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from lightpaint.basis.derived_planes import BlockPlanes, JoinedRow, block_means,
 from lightpaint.basis.file import basis_file, file_planes
 from lightpaint.basis.file.file_planes import FilePlanes
 from lightpaint.basis.file.half_floats import EncodedPlanes
+from lightpaint.basis.file.spooled_planes import SpooledPlanes, spooled
 from lightpaint.basis.planes import MemoryPlanes, Planes, as_planes, joined_planes
 from lightpaint.errors import BasisError, ImageError
 from lightpaint.images.formats import exr_rows
@@ -196,6 +199,10 @@ def test_means_over_blocks_are_the_same_wherever_planes_lie(
     on_request = block_means(CountedPlanes(images), weight, side)
     assert isinstance(on_request, BlockPlanes)
     check_alike(on_request, in_memory.array())
+    few = np.array([0, columns - 1, (rows - 1) * columns, rows * columns - 1])
+    monkeypatch.setattr(BlockPlanes, "rows", None)  # which a few blocks do not take
+    expected_few = in_memory.pixels(few)
+    assert on_request.pixels(few).tobytes() == expected_few.tobytes()
 
 
 def test_no_more_rows_are_averaged_at_a_time_than_a_chunk_has(
@@ -233,6 +240,27 @@ def test_a_fit_of_blocks_reads_strips_of_noisy_planes(
     for mine, expected in zip(*found, strict=True):
         np.testing.assert_allclose(mine, expected, rtol=1e-12)
     assert 0 < max(planes.largest for planes in counted) <= images[:, :16].nbytes
+
+
+def test_spooled_planes_are_made_once_and_those_in_memory_stay(images: np.ndarray) -> None:
+    planes = CountedPlanes(images)
+    made = spooled(planes)
+    assert isinstance(made, SpooledPlanes)
+    planes.rows = None  # type: ignore[method-assign, assignment]
+    check_alike(made, images)
+    in_memory = MemoryPlanes(images)
+    assert spooled(in_memory) is in_memory
+
+
+def test_planes_are_made_again_where_a_disk_is_full(
+    images: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    planes = CountedPlanes(images)
+    assert spooled(planes) is planes
 
 
 def test_several_pictures_in_one_row(monkeypatch: pytest.MonkeyPatch, images: np.ndarray) -> None:

@@ -39,17 +39,21 @@ class RowPlanes(PlanesBase):
         return 1
 
     @cached_property
-    def _strips(self) -> "_Strips":
-        height, width = self.size
-        step = max(1, STRIP_CACHE_BYTES // (STRIP_CACHE_COUNT * 12 * self.count * width))
+    def strip_rows(self) -> int:
+        """Rows of a strip, of which some are kept."""
+        step = max(1, STRIP_CACHE_BYTES // (STRIP_CACHE_COUNT * 12 * self.count * self.size[1]))
         # Whole chunks of the file, which would else be unpacked for two strips each.
-        step = max(step // self.chunk_rows, 1) * self.chunk_rows
+        return max(step // self.chunk_rows, 1) * self.chunk_rows
+
+    @cached_property
+    def _strips(self) -> "_Strips":
+        height, step = self.size[0], self.strip_rows
         return _Strips(step, lambda k: self.rows(k * step, min((k + 1) * step, height)))
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
         height, width = self.size
-        length = self._strips.step * width
+        length = self.strip_rows * width
         if isinstance(where, slice):
             start, stop, step = where.indices(height * width)
             if step != 1:
@@ -81,7 +85,7 @@ class RowPlanes(PlanesBase):
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (h, w, 3)."""
-        (height, width), step = self.size, self._strips.step
+        (height, width), step = self.size, self.strip_rows
         made = np.empty((height, width, 3), np.float32)
 
         def fill(top: int) -> None:

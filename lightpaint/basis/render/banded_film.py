@@ -5,8 +5,6 @@ bands has the bits of one that is traced whole. Its sums lie in a file without a
 memory holds a band, and its planes are made of them when they are asked for.
 """
 
-import mmap
-import os
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -16,6 +14,7 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.basis.file.temporary_array import TemporaryArray
 from lightpaint.basis.render.half_sums import mean_and_half_difference
 from lightpaint.basis.render.integrators import plane_count
 from lightpaint.errors import SceneError
@@ -151,40 +150,37 @@ class FileSums:
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
-        needed = 4 * int(np.prod(shape))
         try:
-            with tempfile.TemporaryFile() as file:
-                if hasattr(os, "posix_fallocate"):  # else a full disk ends the process later
-                    os.posix_fallocate(file.fileno(), 0, needed)
-                self.array = np.memmap(file, np.float32, "r+", shape=shape)  # keeps it open
+            self._file = TemporaryArray(shape)
         except OSError as error:
+            needed = 4 * int(np.prod(shape))
             raise SceneError(
                 f"rendering needs {needed / 1e9:.1f} GB in {tempfile.gettempdir()} "
                 f"({error.strerror or error}): set TMPDIR to a folder with more room, or use "
                 "resolution=... or fewer lights"
             ) from error
 
+    @property
+    def array(self) -> Floats:
+        """All sums, in their file."""
+        return self._file.array
+
     def read(self, half: int, rows: range) -> Floats:
         """Return a copy of some rows of a half, (planes, rows, w, 3)."""
         made = np.array(self.array[half, :, rows.start : rows.stop])
-        self._release()
+        self._file.release()
         return made
 
     def write(self, half: int, rows: range, sums: Floats) -> None:
         """Write some rows of a half."""
         self.array[half, :, rows.start : rows.stop] = sums
-        self._release()
+        self._file.release()
 
     def halves(self, planes: slice, rows: slice) -> list[Floats]:
         """Return a copy of the sums of both halves of some planes and rows."""
         made = [np.array(half[planes, rows]) for half in self.array]
-        self._release()
+        self._file.release()
         return made
-
-    def _release(self) -> None:
-        """Release the memory of what was read or written, which stays in the file."""
-        if hasattr(mmap, "MADV_DONTNEED"):
-            self.array._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
 
 
 class SumSets:

@@ -16,6 +16,7 @@ import numpy as np
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.derived_planes import block_means, in_one_row
+from lightpaint.basis.file.spooled_planes import spooled
 from lightpaint.basis.planes import BLOCK_PIXELS, Planes, as_planes
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.images.estimate import Estimate
@@ -146,7 +147,8 @@ def bin_pixels(views: Views, loss: Loss, side: int) -> BinnedPixels | None:
         glows = basis.emitters_seen & view_loss.exceeds(np.inf).all(axis=-1)
         weights = enlarged(block_sums(np.where(glows, 0, counts), side), side)
         counts[glows & (weights[: counts.shape[0], : counts.shape[1]] > 0)] = 0
-        images.append(block_means(basis.planes, counts, side))
+        # Each step of the solve asks for images again, but only some sums for their noise.
+        images.append(spooled(block_means(basis.planes, counts, side)))
         halves.append(block_means(basis.noise, counts, side))
         if basis.former is not None:
             looks.append(

@@ -1,0 +1,58 @@
+"""Planes that are costly to make and asked for again and again, in a temporary file."""
+
+from contextlib import suppress
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.file.file_planes import RowPlanes
+from lightpaint.basis.file.temporary_array import TemporaryArray
+from lightpaint.basis.planes import Planes
+
+
+def spooled(planes: Planes) -> Planes:
+    """Return planes as they are in memory, or from a temporary file if they are made on request.
+
+    Where that file has no room, they are made again on each request.
+    """
+    if isinstance(planes, RowPlanes):
+        with suppress(OSError):
+            return SpooledPlanes(planes)
+    return planes
+
+
+class SpooledPlanes(RowPlanes):
+    """A copy of planes in a temporary file. Raises OSError if there is no room for it."""
+
+    def __init__(self, planes: RowPlanes) -> None:
+        height, width = planes.size
+        # Channel by channel, as sums go over them.
+        self._file = TemporaryArray((planes.count, 3, height, width))
+        step = planes.strip_rows
+        for top in range(0, height, step):
+            rows = planes.rows(top, min(top + step, height))
+            self._file.array[:, :, top : top + step] = rows.transpose(0, 3, 1, 2)
+            self._file.release()
+
+    @property
+    def count(self) -> int:
+        """n."""
+        return int(self._file.array.shape[0])
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) in pixels."""
+        height, width = self._file.array.shape[2:]
+        return height, width
+
+    def plane(self, i: int) -> Floats:
+        """Return the plane of light i, (h, w, 3)."""
+        made = np.ascontiguousarray(self._file.array[i].transpose(1, 2, 0))
+        self._file.release()
+        return made
+
+    def rows(self, top: int, bottom: int) -> Floats:
+        """Return some rows of all planes, (n, bottom - top, w, 3)."""
+        made = np.array(self._file.array[:, :, max(top, 0) : max(bottom, 0)])
+        self._file.release()
+        return made.transpose(0, 2, 3, 1)
