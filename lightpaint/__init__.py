@@ -82,9 +82,12 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis
     from lightpaint.placement.freedom import Freedom as Freedom
     from lightpaint.placement.light_search import suggest_lights as suggest_lights
-    from lightpaint.placement.place import Move as Move
-    from lightpaint.placement.place import Placement as Placement
+    from lightpaint.placement.new_lights import MirroredPair as MirroredPair
+    from lightpaint.placement.new_lights import NewLights as NewLights
     from lightpaint.placement.place import place as place
+    from lightpaint.placement.placement import AddedLight as AddedLight
+    from lightpaint.placement.placement import Move as Move
+    from lightpaint.placement.placement import Placement as Placement
     from lightpaint.placement.rigging.rigging import Rigging as Rigging
     from lightpaint.placement.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
@@ -102,6 +105,7 @@ if TYPE_CHECKING:
 
 #: Public name → its module, below this package: what type checkers read above, for Python.
 _HOMES = {
+    "AddedLight": "placement.placement",
     "Analysis": "lighting.analysis.analysis",
     "Basis": "basis.basis",
     "Certificate": "lighting.answer.certificate",
@@ -116,11 +120,13 @@ _HOMES = {
     "Lighting": "lighting.answer.lighting",
     "LightpaintError": "errors",
     "Look": "pipeline.results.results",
-    "Move": "placement.place",
+    "MirroredPair": "placement.new_lights",
+    "Move": "placement.placement",
     "NewEmitter": "scene.lights.new_emitter",
+    "NewLights": "placement.new_lights",
     "Objects": "images.object_map",
     "Painting": "pipeline.job.sources",
-    "Placement": "placement.place",
+    "Placement": "placement.placement",
     "Pose": "scene.properties.pose",
     "Problem": "lighting.problem",
     "Rigging": "placement.rigging.rigging",

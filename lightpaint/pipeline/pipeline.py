@@ -22,7 +22,7 @@ from lightpaint.pipeline.results.answer_folder import (
 )
 from lightpaint.pipeline.results.results import Look, write_predicted, write_report
 from lightpaint.placement.light_search import suggest_lights
-from lightpaint.placement.place import Placement
+from lightpaint.placement.placement import Placement
 from lightpaint.progress import Listener, Progress, listener, silent
 from lightpaint.relit.detection_power import LightShares, with_light_tests
 from lightpaint.relit.render_rounds import refine_by_rendering

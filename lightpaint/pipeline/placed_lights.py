@@ -10,7 +10,8 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job_bases import obtain, view_listener
 from lightpaint.pipeline.needed_samples import problem_of, without_noise
 from lightpaint.pipeline.results.results import spoken_move
-from lightpaint.placement.place import Placement, place
+from lightpaint.placement.place import place
+from lightpaint.placement.placement import Placement
 from lightpaint.placement.rigging.rigged_lights import freedoms_of
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene

@@ -17,6 +17,7 @@ from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.placement.placement_fit import pull_with_more, reduced_goal
 from lightpaint.threads import one_thread
 
 
@@ -53,7 +54,7 @@ class Candidates:
                 f"candidates of {size[1]}x{size[0]} for a basis of {basis.size[1]}x"
                 f"{basis.size[0]}: render them on blocks of its pixels"
             )
-        image, importance = reduced_goal(solution, factor)
+        image, importance = reduced_goal(solution.problem, factor)
         free = ~added.is_fixed
         count = int(free.sum())
         pictures, noise = (
@@ -108,28 +109,6 @@ def _with_free_lights(reduction: Reduction, count: int) -> Reduction:
         (*reduction.labels, *[""] * count),
         (*reduction.knobs, *more),
     )
-
-
-def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
-    """Return the pull of the lights to their present emission, and none of `count` more."""
-    if (pull := solution.problem.pull) is None:
-        return None
-    return NormalEquations(
-        np.pad(pull.M, ((0, 0), (0, count), (0, count))),
-        np.pad(pull.b, ((0, 0), (0, count))),
-        pull.target_norm2,
-    )
-
-
-def reduced_goal(solution: Solution, factor: int) -> tuple[Floats, Floats]:
-    """Return the goal and its importance on a film with a pixel for each block of pixels.
-
-    Goals are means weighted with importance; importance is that of whole blocks.
-    """
-    importance = solution.weight.astype(np.float64)
-    weight = block_mean(importance, factor)
-    weighted = block_mean(solution.image * importance, factor)
-    return weighted / np.where(weight > 0, weight, 1), weight * factor**2
 
 
 def _shares(basis: Basis, count: int) -> Doubles:

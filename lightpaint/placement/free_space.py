@@ -6,13 +6,13 @@ places are chosen along these: inside a room, out through its windows, behind th
 such places a few remain that are far apart.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Floats, Position
+from lightpaint.arrays import Bools, Floats, Position
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
@@ -35,24 +35,56 @@ class FreeSpace:
     """Places with a free view of visible points.
 
     places: (k, 3), units of the scene. spread: median distance of visible points from their
-    middle, the unit of near and far.
+    middle, the unit of near and far. points, normals: (m, 3), some visible ones, and the sides that
+    are seen of them.
     """
 
     places: Floats
     spread: float
+    points: Floats
+    normals: Floats
+
+    @classmethod
+    def none(cls) -> "FreeSpace":
+        """Return the free space of a camera that sees nothing."""
+        nothing = np.zeros((0, 3))
+        return cls(nothing, 0.0, nothing, nothing)
+
+    @classmethod
+    def of_views(cls, spaces: Sequence["FreeSpace"]) -> "FreeSpace":
+        """Join the free space of several views."""
+        seen = [space for space in spaces if len(space.points)] or list(spaces)
+        return cls(
+            np.concatenate([space.places for space in seen]),
+            float(np.mean([space.spread for space in seen])),
+            np.concatenate([space.points for space in seen]),
+            np.concatenate([space.normals for space in seen]),
+        )
+
+    def usable(self, loaded: Any, places: Floats, clear: float | None = None) -> Bools:
+        """Return which places, (k,), are clear of surfaces and see something of the picture.
+
+        clear: the distance from surfaces; None for CLEARANCE.
+        """
+        distance = CLEARANCE * self.spread if clear is None else clear
+        if not len(places) or not len(self.points):
+            return np.zeros(len(places), dtype=bool)
+        clears = is_clear(loaded, places, distance)
+        share = _seen_share(loaded, places, self.points, self.normals)
+        return np.asarray(clears & (share >= LEAST_SEEN))
 
 
 def free_space(scene: Scene, loaded: Any, *, seed: int = 0) -> FreeSpace:
-    """Search for places in `loaded`, the loaded `scene`. None if the camera hits nothing."""
+    """Search for places in `loaded`, the loaded `scene`. None are there if it hits nothing."""
     rng = np.random.default_rng(pass_seed(seed, Stream.CANDIDATES, 0))
     points, normals = _visible(scene, loaded, rng)
     if not len(points):
-        return FreeSpace(np.zeros((0, 3)), 0.0)
+        return FreeSpace.none()
     middle = np.median(points, axis=0)
     away = np.linalg.norm(points - middle, axis=1)
     spread = float(np.median(away))
     if not spread > 0:
-        return FreeSpace(np.zeros((0, 3)), 0.0)
+        return FreeSpace.none()
     near = away <= FAR * spread
     # The normal first: straight up from a floor, straight out of a wall.
     origin = np.repeat(points[near], RAYS, axis=0)
@@ -63,9 +95,11 @@ def free_space(scene: Scene, loaded: Any, *, seed: int = 0) -> FreeSpace:
     length = np.minimum(_distance(loaded, origin, direction, normal), REACH * spread)
     places = origin + (rng.uniform(0.05, 0.95, len(origin)) * length)[:, None] * direction
     places = rng.permutation(places)
-    places = places[_is_clear(loaded, places, CLEARANCE * spread)]
-    asked = rng.permutation(points[near])[:ASKED]
-    return FreeSpace(places[_seen_share(loaded, places, asked) >= LEAST_SEEN], spread)
+    places = places[is_clear(loaded, places, CLEARANCE * spread)]
+    chosen = rng.permutation(np.flatnonzero(near))[:ASKED]
+    asked, fronts = points[chosen], normals[chosen]
+    is_seen = _seen_share(loaded, places, asked, fronts) >= LEAST_SEEN
+    return FreeSpace(places[is_seen], spread, asked, fronts)
 
 
 def far_apart(places: Floats, count: int, *, start: Floats | None = None) -> Floats:
@@ -115,6 +149,19 @@ def pixels_of(scene: Scene, loaded: Any, places: Floats) -> list[tuple[float, fl
     ]
 
 
+def seen_by_camera(scene: Scene, loaded: Any, places: Floats) -> Bools:
+    """Return which of some places, (k,), the camera sees: in its picture, with nothing between."""
+    import mitsuba as mi
+
+    at = [k is not None for k in pixels_of(scene, loaded, places)]
+    eye = np.array(scene.eye(loaded), dtype=float).ravel()
+    way = 0.999 * (places - eye)
+    start = mi.Point3f(np.repeat(eye[None], len(places), axis=0).T.astype(np.float32))
+    ray = mi.Ray3f(start, mi.Vector3f(way.T.astype(np.float32)))
+    ray.maxt = 1.0
+    return np.asarray(np.array(at) & ~np.array(loaded.ray_test(ray)))
+
+
 def as_position(place: Iterable[Any]) -> Position:
     """Return a row of `places` as a position."""
     x, y, z = (float(v) for v in place)
@@ -152,26 +199,29 @@ def _distance(loaded: Any, origin: Floats, direction: Floats, normal: Floats) ->
     return np.array(loaded.ray_intersect_preliminary(ray).t, dtype=np.float64)
 
 
-def _is_clear(loaded: Any, places: Floats, distance: float) -> Floats:
+def is_clear(loaded: Any, places: Floats, distance: float) -> Bools:
     """Return, (k,), whether nothing is nearer to a place than `distance`, in some directions
     around.
     """
     import mitsuba as mi
 
-    clear = np.ones(len(places), dtype=bool)
     # Points of a spiral on the sphere, which cover it evenly.
     k = np.arange(AROUND) + 0.5
     z, angle = 1 - 2 * k / AROUND, np.pi * (1 + np.sqrt(5)) * k
     ring = np.sqrt(1 - z * z)
-    for towards in np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1):
-        ray = mi.Ray3f(mi.Point3f(places.T.astype(np.float32)), mi.Vector3f(*towards.tolist()))
-        ray.maxt = distance
-        clear &= ~np.array(loaded.ray_test(ray))
-    return clear
+    around = np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1)
+    start = np.repeat(places, AROUND, axis=0)
+    towards = np.tile(around, (len(places), 1))
+    ray = mi.Ray3f(
+        mi.Point3f(start.T.astype(np.float32)), mi.Vector3f(towards.T.astype(np.float32))
+    )
+    ray.maxt = distance
+    hits = np.array(loaded.ray_test(ray)).reshape(len(places), AROUND)
+    return np.asarray(~hits.any(axis=1))
 
 
-def _seen_share(loaded: Any, places: Floats, points: Floats) -> Floats:
-    """Return the share of `points` (m, 3) that each place sees, (k,)."""
+def _seen_share(loaded: Any, places: Floats, points: Floats, normals: Floats) -> Floats:
+    """Return the share of `points` (m, 3) whose fronts each place sees, (k,)."""
     import mitsuba as mi
 
     start = np.repeat(places, len(points), axis=0)
@@ -180,6 +230,7 @@ def _seen_share(loaded: Any, places: Floats, points: Floats) -> Floats:
     ray = mi.Ray3f(mi.Point3f(start.T.astype(np.float32)), mi.Vector3f(way.T.astype(np.float32)))
     ray.maxt = 1.0
     hidden = np.array(loaded.ray_test(ray)).reshape(len(places), len(points))
+    hidden |= (way * np.tile(normals, (len(places), 1))).sum(axis=1).reshape(hidden.shape) >= 0
     return np.asarray(1 - hidden.mean(axis=1))
 
 

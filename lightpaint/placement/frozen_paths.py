@@ -12,19 +12,25 @@ surface_filter.py).
 """
 
 import math
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.errors import SceneError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.surface_filter import SurfaceFilter
-from lightpaint.scene.properties.pose import DEFAULT_CUTOFF, Site
+from lightpaint.placement.camera_paths import (
+    Vertices,
+    first_hits_of,
+    later_vertices_of,
+    longest_path,
+)
+from lightpaint.scene.properties.pose import Site, across
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
@@ -32,36 +38,49 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 #: Shadow rays of one launch; more hold no more cores and more memory.
 LANES = 2**20
 
-#: Longest paths, in vertices, of integrators without a limit of their own; their light is frozen
-#: without Russian roulette, and what is beyond is a thousandth of a bright room's.
-MOST_VERTICES = 16
+#: Values at the vertices that are kept for the next question, of as many origins as that makes.
+KEPT_VALUES = 2**24
 
 #: A light ends this much before it would meet what it hangs on, relative to its distance.
 SHADOW_EPSILON = 1e-3
 
-#: Values of a light that a launch reads: position, direction, cutoff and beam in radians, kind.
-_ROW = 9
-_POINT, _SPOT, _SUN = 0.0, 1.0, 2.0
+#: Values of an origin that a launch reads: position, axis, two half sides of a panel, kind.
+_ROW = 13
+_POINT, _SUN, _PANEL = 0.0, 1.0, 2.0
+
+#: Steps of the sequence that spreads points over a panel: the reciprocals of the plastic number.
+_SPREAD = np.array([0.7548776662466927, 0.5698402909980532])
 
 
 @dataclass(frozen=True)
-class Vertices:
-    """Vertices of paths: interactions and throughputs as Dr.Jit arrays of one width.
+class PanelSite(Site):
+    """The place of a square panel, which shines to its front. side: in units of the scene."""
 
-    pixels: (v,), the index of each one's pixel, ascending.
-    """
+    side: float = 0.0
 
-    interaction: Any
-    throughput: Any
-    pixels: npt.NDArray[np.int64]
 
-    def __len__(self) -> int:
-        return len(self.pixels)
+@dataclass(frozen=True)
+class _Origin:
+    """Where light comes from, without the cone of a spot: what a shadow ray depends on."""
 
-    @cached_property
-    def first_of_pixel(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.intp]]:
-        """Pixels that have vertices, and the index of the first vertex of each."""
-        return np.unique(self.pixels, return_index=True)
+    position: tuple[float, ...]
+    axis: tuple[float, ...]
+    side: float
+    kind: float
+
+    @classmethod
+    def of(cls, site: Site) -> "_Origin":
+        if site.position is None:
+            return cls((0, 0, 0), site.direction or (0, 0, 1), 0, _SUN)
+        if isinstance(site, PanelSite):
+            return cls(site.position, site.direction or (0, 0, 1), site.side, _PANEL)
+        return cls(site.position, (0, 0, 1), 0, _POINT)
+
+    @property
+    def row(self) -> Floats:
+        """Its values for a launch."""
+        sides = across(self.axis) * self.side / 2
+        return np.array([*self.position, *self.axis, *sides.ravel(), self.kind], np.float32)
 
 
 class FrozenPaths:
@@ -87,16 +106,18 @@ class FrozenPaths:
         side = math.isqrt(first_hits)
         if side**2 != first_hits:
             raise SceneError(f"first_hits is {first_hits}: expected a square number, like 16")
-        camera, longest = scene.camera(loaded), _longest(scene)
+        camera, longest = scene.camera(loaded), longest_path(scene)
         rng = np.random.default_rng(pass_seed(seed, Stream.FROZEN_PATHS, 0))
         with tracing():
-            self.direct = _first_hits(loaded, camera, self.size, side, rng)
+            self.direct = first_hits_of(loaded, camera, self.size, side, rng)
             self.indirect = (
-                _later_vertices(loaded, camera, self.size, bounces, longest, rng)
+                later_vertices_of(loaded, camera, self.size, bounces, longest, rng)
                 if bounces and longest > 1
                 else None
             )
+        self._shift = rng.random(2)
         self._filter: SurfaceFilter | None = None
+        self._kept: OrderedDict[tuple[int, _Origin], _Shone] = OrderedDict()
 
     def filtered_along(self, features: Features) -> "FrozenPaths":
         """Make `columns` average indirect light along surfaces. features: of the film's pixels."""
@@ -106,29 +127,12 @@ class FrozenPaths:
     def columns(self, sites: Sequence[Site]) -> Floats:
         """Return the images of lights at unit intensity, (k, h, w, 3) float32 linear Rec.709.
 
-        sites: of points and spots at intensity 1 W/sr and, without a position, of suns at 1 W/m².
+        sites: of points and spots at intensity 1 W/sr, of panels at radiance 1 W/(m² sr) and,
+        without a position, of suns at 1 W/m².
         """
-        height, width = self.size
-        made = self._sums(self.direct, sites).reshape(-1, height, width, 3)
+        made = self.direct_images(sites).reshape(-1, *self.size, 3)
         if self.indirect is not None:
             made += self.indirect_images(sites)
-        return made
-
-    def contributions(self, vertices: Vertices, site: Site) -> Floats:
-        """Return what `site` adds at each vertex, (v, 3); of a spot, as if it shone all around."""
-        row = _row(Site(site.position, None if site.position else site.direction))
-        with tracing():
-            return np.asarray(self._launch(vertices, row[None])[0], np.float32)
-
-    def image_of(self, vertices: Vertices, contributions: Floats) -> Floats:
-        """Return sums of contributions (…, v, c) over pixels, (…, h · w, c) float32."""
-        made = np.zeros(
-            (*contributions.shape[:-2], self.size[0] * self.size[1], contributions.shape[-1]),
-            np.float32,
-        )
-        pixels, starts = vertices.first_of_pixel
-        if len(pixels):
-            made[..., pixels, :] = np.add.reduceat(contributions, starts, axis=-2)
         return made
 
     def direct_images(self, sites: Sequence[Site]) -> Floats:
@@ -145,42 +149,116 @@ class FrozenPaths:
             image[...] = raw if self._filter is None else self._filter(raw)
         return made
 
+    def contributions(self, vertices: Vertices, site: Site) -> Floats:
+        """Return what `site` adds at each vertex, (v, 3); of a spot, as if it shone all around."""
+        return self._shone(vertices, [_Origin.of(site)])[0].light.T
+
+    def image_of(self, vertices: Vertices, contributions: Floats) -> Floats:
+        """Return sums of contributions (…, v, c) over pixels, (…, h · w, c) float32."""
+        return np.moveaxis(self._pixel_sums(vertices, np.moveaxis(contributions, -1, -2)), -2, -1)
+
     def points(self, vertices: Vertices) -> Floats:
         """Return the places of vertices, (v, 3)."""
-        return np.array(vertices.interaction.p, dtype=np.float32).reshape(3, -1).T
+        return vertices.points
 
     def _sums(self, vertices: Vertices, sites: Sequence[Site]) -> Floats:
+        """Return the images of what lights add at vertices, (k, h · w, 3)."""
         made = np.empty((len(sites), self.size[0] * self.size[1], 3), np.float32)
-        rows = np.array([_row(site) for site in sites], np.float32).reshape(-1, _ROW)
-        at_once = max(1, min(LANES // max(len(vertices), 1), len(rows)))
-        with tracing() as let_others_through:
-            for start in range(0, len(rows), at_once):
-                here = rows[start : start + at_once]
-                padded = np.concatenate([here, np.repeat(here[-1:], at_once - len(here), axis=0)])
-                its = self._launch(vertices, padded)[: len(here)]
-                made[start : start + len(here)] = self.image_of(vertices, its)
-                let_others_through()
+        origins = [_Origin.of(site) for site in sites]
+        # Sites of one origin, like the directions of a spot, share its shadow rays.
+        by_origin: dict[_Origin, list[int]] = {}
+        for k, origin in enumerate(origins):
+            by_origin.setdefault(origin, []).append(k)
+        distinct = [*by_origin]
+        at_once = max(1, LANES // max(len(vertices), 1))
+        for start in range(0, len(distinct), at_once):
+            here = distinct[start : start + at_once]
+            for origin, shone in zip(here, self._shone(vertices, here), strict=True):
+                for k in by_origin[origin]:
+                    made[k] = self._pixel_sums(vertices, shone.towards(sites[k])).T
         return made
 
+    def _pixel_sums(self, vertices: Vertices, light: Floats) -> Floats:
+        """Return sums over the vertices of each pixel, (…, h · w). light: (…, v)."""
+        pixels, starts = vertices.first_of_pixel
+        made = np.zeros((*light.shape[:-1], self.size[0] * self.size[1]), np.float32)
+        if len(pixels):
+            made[..., pixels] = np.add.reduceat(light, starts, axis=-1)
+        return made
+
+    def _shone(self, vertices: Vertices, origins: Sequence[_Origin]) -> "list[_Shone]":
+        """Return what origins add at vertices; what was asked for lately is kept."""
+        number = 0 if vertices is self.direct else 1
+        found = {x: self._kept[number, x] for x in origins if (number, x) in self._kept}
+        missing = [x for x in dict.fromkeys(origins) if x not in found]
+        if missing:
+            light = self._launch(vertices, np.stack([x.row for x in missing]))
+            for origin, its in zip(missing, light, strict=True):
+                found[origin] = _Shone(its, vertices, origin)
+        most = max(2, KEPT_VALUES // (6 * max(len(vertices), 1)))
+        for origin in [*found][-most:]:
+            self._kept[number, origin] = found[origin]
+            self._kept.move_to_end((number, origin))
+        while len(self._kept) > 2 * most:
+            self._kept.popitem(last=False)
+        return [found[origin] for origin in origins]
+
     def _launch(self, vertices: Vertices, rows: Floats) -> Floats:
-        """Return the contributions of lights to vertices, (k, v, 3). rows: (k, 9)."""
+        """Return the light of origins at vertices, (k, 3, v). rows: (k, _ROW)."""
         import drjit as dr
         import mitsuba as mi
 
         count, lights = len(vertices), len(rows)
         if not count:
-            return np.zeros((lights, 0, 3), np.float32)
-        lane = dr.arange(mi.UInt32, count * lights)
-        width = dr.opaque(mi.UInt32, count)
-        light = lane // width
-        vertex = lane - light * width
-        table = mi.Float(np.ascontiguousarray(rows, np.float32).ravel())
-        row = [dr.gather(mi.Float, table, light * _ROW + k) for k in range(_ROW)]
-        si = dr.gather(mi.SurfaceInteraction3f, vertices.interaction, vertex)
-        throughput = dr.gather(mi.Color3f, vertices.throughput, vertex)
-        added = _added(self._scene, si, throughput, row)
-        values: Floats = np.array(added, dtype=np.float32).reshape(3, lights, count)
-        return values.transpose(1, 2, 0)
+            return np.zeros((lights, 3, 0), np.float32)
+        start = np.arange(count)[:, None] * _SPREAD + self._shift
+        with tracing():
+            u, v = (mi.Float(x) for x in (2 * (start % 1) - 1).astype(np.float32).T)
+            table = mi.Float(np.ascontiguousarray(rows, np.float32).ravel())
+            made = dr.zeros(mi.Float, 3 * count * lights)
+            dr.make_opaque(made, table, u, v)
+            lane, width = dr.arange(mi.UInt32, count), dr.opaque(mi.UInt32, count)
+            last = dr.opaque(mi.UInt32, lights)
+
+            def add(light: Any) -> tuple[Any]:
+                row = [dr.gather(mi.Float, table, light * _ROW + k) for k in range(_ROW)]
+                added = _added(self._scene, vertices, row, (u, v))
+                for channel in range(3):
+                    dr.scatter(made, added[channel], (light * 3 + channel) * width + lane)
+                return (light + 1,)
+
+            dr.while_loop((mi.UInt32(0),), lambda light: light < last, add)
+            values: Floats = np.array(made, dtype=np.float32).reshape(lights, 3, count)
+        return values
+
+
+@dataclass(frozen=True)
+class _Shone:
+    """The light of an origin at vertices. light: (3, v)."""
+
+    light: Floats
+    vertices: Vertices
+    origin: _Origin
+
+    def towards(self, site: Site) -> Floats:
+        """Return the part of it within the cone of a spot, (3, v); all of it for other lights."""
+        if site.position is None or site.cutoff is None:
+            return self.light
+        beam = site.cutoff if site.beam is None else site.beam
+        direction = np.asarray(site.direction or (0.0, 0.0, 1.0), np.float32)
+        share = _share_in_cone(self._away @ direction, site.cutoff, min(beam, site.cutoff))
+        return np.asarray(self.light * share)
+
+    @cached_property
+    def _away(self) -> Floats:
+        return away_from(self.origin.position, self.vertices.points)
+
+
+def away_from(place: Sequence[float], points: Floats) -> Floats:
+    """Return the directions from a place to points, (v, 3) float32 unit vectors."""
+    away = points - np.asarray(place, np.float32)
+    away /= np.maximum(np.sqrt(np.einsum("vk,vk->v", away, away))[:, None], 1e-30)
+    return np.asarray(away)
 
 
 def falloff(points: Floats, site: Site, directions: Floats, cones: Floats) -> Floats:
@@ -189,151 +267,43 @@ def falloff(points: Floats, site: Site, directions: Floats, cones: Floats) -> Fl
     points: (v, 3). directions: (d, 3) unit vectors; cones: (c, 2), cutoff and beam in degrees. As
     Mitsuba's spot has it: 1 within the beam, linear in the angle to 0 at the cutoff.
     """
-    away = points - np.asarray(site.position, np.float32)
-    away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-30)
+    away = away_from(site.position or (0.0, 0.0, 0.0), points)
     cosine = np.clip(np.asarray(directions, np.float32) @ away.T, -1, 1)
     angle = np.degrees(np.arccos(cosine))[:, None]
     cutoff, beam = (np.asarray(cones, np.float32)[None, :, k, None] for k in range(2))
     return np.asarray(np.clip((cutoff - angle) / np.maximum(cutoff - beam, 1e-6), 0, 1))
 
 
-def _row(site: Site) -> Floats:
-    """Return the values of a light that a launch reads."""
-    direction = site.direction or (0.0, 0.0, 1.0)
-    if site.position is None:
-        return np.array([0, 0, 0, *direction, 0, 0, _SUN], np.float32)
-    kind = _POINT if site.cutoff is None else _SPOT
-    cutoff = DEFAULT_CUTOFF if site.cutoff is None else site.cutoff
-    beam = cutoff if site.beam is None else site.beam
-    cone = (math.radians(cutoff), math.radians(min(beam, cutoff)))
-    return np.array([*site.position, *direction, *cone, kind], np.float32)
+def _share_in_cone(cosine: Floats, cutoff: float, beam: float) -> Floats:
+    """Return the share of a spot's light at cosines to its axis; see `falloff`. Angles: degrees."""
+    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    share = (np.float32(cutoff) - angle) / np.float32(max(cutoff - beam, 1e-6))
+    return np.asarray(np.clip(share, 0, 1))
 
 
-def _added(loaded: Any, si: Any, throughput: Any, values: Sequence[Any]) -> Any:
-    """Return what lights add at interactions, as a color of Mitsuba. values: a row of each."""
+def _added(loaded: Any, vertices: Vertices, row: Sequence[Any], at: tuple[Any, Any]) -> Any:
+    """Return what origins add at vertices, as a color of Mitsuba. row: the values of one.
+
+    Each vertex looks at a point of its own of a panel. at: that point, from -1 to 1 twice.
+    """
     import drjit as dr
     import mitsuba as mi
 
-    place, axis = mi.Point3f(*values[:3]), mi.Vector3f(*values[3:6])
-    cutoff, beam, kind = values[6:]
-    is_sun = kind > (_SPOT + _SUN) / 2
+    si, kind = vertices.interaction, row[12]
+    is_sun, is_panel = (kind > _POINT) & (kind < _PANEL), kind > _SUN
+    axis = mi.Vector3f(*row[3:6])
+    place = mi.Point3f(*row[:3])
+    sides = mi.Vector3f(*row[6:9]), mi.Vector3f(*row[9:12])
+    place += at[0] * sides[0] + at[1] * sides[1]
     between = place - si.p
     squared = dr.squared_norm(between)
     towards = dr.select(is_sun, -axis, between * dr.rsqrt(squared))
-    angle = dr.safe_acos(dr.dot(-towards, axis))
-    share = dr.clip((cutoff - angle) / dr.maximum(cutoff - beam, 1e-6), 0, 1)
-    share = dr.select(kind > (_POINT + _SPOT) / 2, share, 1.0)
-    power = dr.select(is_sun, 1.0, share / squared)
+    area = 4 * dr.norm(sides[0]) * dr.norm(sides[1])
+    power = dr.select(is_panel, area * dr.maximum(dr.dot(-towards, axis), 0), 1) / squared
+    power = dr.select(is_sun, 1.0, power)
     reflected = si.bsdf().eval(mi.BSDFContext(), si, si.to_local(towards))
     is_lit = (power > 0) & (dr.max(reflected) > 0)
     ray = si.spawn_ray(towards)
     ray.maxt = dr.select(is_sun, dr.inf, dr.sqrt(squared) * (1 - SHADOW_EPSILON))
     is_lit &= ~loaded.ray_test(ray, is_lit)
-    return dr.select(is_lit, throughput * reflected * power, 0.0)
-
-
-def _longest(scene: Scene) -> int:
-    """Return the most vertices of a path that lights are asked at."""
-    depth = scene.integrator.max_depth
-    return MOST_VERTICES if depth < 0 else min(max(depth - 1, 0), MOST_VERTICES)
-
-
-def _first_hits(
-    loaded: Any, camera: Any, size: tuple[int, int], side: int, rng: np.random.Generator
-) -> Vertices:
-    """Return first hits in a grid of side x side cells in each pixel, one in each cell."""
-    rays, weight, pixels = _camera_rays(camera, size, side, rng)
-    return _compressed(loaded.ray_intersect(rays), weight, pixels)
-
-
-def _later_vertices(
-    loaded: Any,
-    camera: Any,
-    size: tuple[int, int],
-    paths: int,
-    longest: int,
-    rng: np.random.Generator,
-) -> Vertices | None:
-    """Return the vertices behind the first of paths, ordered by pixel."""
-    import drjit as dr
-    import mitsuba as mi
-
-    side = max(1, math.isqrt(paths))
-    kept = []
-    for _ in range(max(1, round(paths / side**2))):
-        rays, weight, pixels = _camera_rays(camera, size, side, rng)
-        weight *= side**2 / paths
-        for depth in range(longest):
-            its = _compressed(loaded.ray_intersect(rays), weight, pixels)
-            if not len(its):
-                break
-            if depth:
-                kept.append(its)
-            numbers = rng.random((3, len(its)), dtype=np.float32)
-            bsdf_sample, bsdf_weight = its.interaction.bsdf().sample(
-                mi.BSDFContext(),
-                its.interaction,
-                mi.Float(numbers[0]),
-                mi.Point2f(mi.Float(numbers[1]), mi.Float(numbers[2])),
-            )
-            si = its.interaction
-            rays, weight = si.spawn_ray(si.to_world(bsdf_sample.wo)), its.throughput * bsdf_weight
-            pixels = its.pixels
-            dr.eval(rays, weight)
-    return _joined(kept)
-
-
-def _camera_rays(
-    camera: Any, size: tuple[int, int], side: int, rng: np.random.Generator
-) -> tuple[Any, Any, npt.NDArray[np.int64]]:
-    """Return rays, their weights for a pixel's mean, and their pixels, ascending."""
-    import mitsuba as mi
-
-    height, width = size
-    pixels = np.repeat(np.arange(height * width), side**2)
-    cell = np.tile(np.arange(side**2), height * width)
-    jitter = rng.random((2, len(pixels)))
-    x = (pixels % width + (cell % side + jitter[0]) / side) / width
-    y = (pixels // width + (cell // side + jitter[1]) / side) / height
-    position = mi.Point2f(mi.Float(x.astype(np.float32)), mi.Float(y.astype(np.float32)))
-    aperture = rng.random((2, len(pixels)), dtype=np.float32)
-    lens = mi.Point2f(mi.Float(aperture[0]), mi.Float(aperture[1]))
-    rays, weight = camera.sample_ray(camera.shutter_open(), 0.5, position, lens)
-    return mi.Ray3f(rays), mi.Color3f(weight) / side**2, pixels
-
-
-def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices:
-    """Return the interactions that are some, in their order."""
-    import drjit as dr
-    import mitsuba as mi
-
-    kept = dr.compress(si.is_valid() & (dr.max(weight) > 0))
-    if not dr.width(kept):
-        return Vertices(si, weight, pixels[:0])
-    si = dr.gather(mi.SurfaceInteraction3f, si, kept)
-    weight = dr.gather(mi.Color3f, weight, kept)
-    dr.eval(si, weight)
-    return Vertices(si, weight, pixels[np.array(kept, dtype=np.int64)])
-
-
-def _joined(parts: Sequence[Vertices]) -> Vertices | None:
-    """Return all vertices of several, ordered by pixel; None if there are none."""
-    import drjit as dr
-    import mitsuba as mi
-
-    if not parts:
-        return None
-    pixels = np.concatenate([part.pixels for part in parts])
-    order = np.argsort(pixels, kind="stable")
-    place = np.empty(len(order), np.uint32)
-    place[order] = np.arange(len(order))
-    si = dr.zeros(mi.SurfaceInteraction3f, len(order))
-    throughput = dr.zeros(mi.Color3f, len(order))
-    start = 0
-    for part in parts:
-        here = mi.UInt32(place[start : start + len(part)])
-        dr.scatter(si, part.interaction, here)
-        dr.scatter(throughput, part.throughput, here)
-        dr.eval(si, throughput)
-        start += len(part)
-    return Vertices(si, throughput, pixels[order])
+    return dr.select(is_lit, vertices.throughput * reflected * power, 0.0)

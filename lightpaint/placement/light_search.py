@@ -16,17 +16,16 @@ from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_planes_only
 from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.errors import SceneError
-from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.additions import Addition, find_additions
 from lightpaint.placement.candidates import Candidates
 from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, free_space, pixels_of
+from lightpaint.placement.place import on_small_film
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.light import free_names
-from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
@@ -124,21 +123,6 @@ def suggest_lights(
         best = places[[addition.candidate for addition in additions]]
         radius = _spacing(places) if k == 0 else radius / 2
     return _suggestions(scene, additions, best, total) if additions else ()
-
-
-def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
-    """Return `scene` on a film whose pixels are blocks of those of `basis`, `pixels` or fewer.
-
-    Raises SceneError if the basis is of another film.
-    """
-    (height, width), (mine_h, mine_w) = scene.size, basis.size
-    if whole_factor(scene.size, basis.size) is None:
-        raise SceneError(
-            f"the basis is {mine_w}x{mine_h}, whose pixels are no blocks of those of the film "
-            f"of {scene.path}, {width}x{height}: make it again"
-        )
-    on_its_film = scene.reduced(f"{mine_w}x{mine_h}")
-    return on_its_film.reduced(f"1/{reduction_to(on_its_film.film, pixels)}")
 
 
 def _most(small: Scene, tried: int) -> int:

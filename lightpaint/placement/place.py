@@ -1,158 +1,89 @@
-"""Lights that move to where the painting wants them."""
+"""Lights that move to where the painting wants them, and new ones that it asks for."""
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import as_rgb
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import SceneError
-from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.candidates import pull_with_more, reduced_goal
-from lightpaint.placement.free_space import as_position, free_space
-from lightpaint.placement.freedom import Freedom, FreeLight
-from lightpaint.placement.frozen_paths import FrozenPaths
-from lightpaint.placement.light_search import on_small_film
-from lightpaint.placement.placement_fit import PlacementFit
-from lightpaint.placement.pose_search import Found, PoseSearch, SearchPaths
+from lightpaint.placement.free_space import as_position, pixels_of
+from lightpaint.placement.freedom import Freedom
+from lightpaint.placement.frozen_paths import PanelSite
+from lightpaint.placement.lights_to_place import (
+    NewLight,
+    free_light,
+    movables_of,
+    new_lights_of,
+    new_movables_of,
+)
+from lightpaint.placement.movable import Arrangement, Movable
+from lightpaint.placement.new_lights import MirroredPair, NewLights
+from lightpaint.placement.placement import AddedLight, Move, Placement
+from lightpaint.placement.placement_fit import fit_of
+from lightpaint.placement.search.judgement import Found, Judgement, PoseError
+from lightpaint.placement.search.new_light_search import NewLightSearch
+from lightpaint.placement.search.pose_rules import PoseRules
+from lightpaint.placement.search.pose_search import TURNS, PoseSearch
+from lightpaint.placement.view_paths import SearchPaths
 from lightpaint.progress import Progress, silent
-from lightpaint.scene.lights.light import Light
-from lightpaint.scene.properties.emission import MULTIPLE
+from lightpaint.scene.lights.new_emitter import NewEmitter
+from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_render import Stream, pass_seed
-from lightpaint.scene.surfaces import render_features
 
-#: Pixels of the film that is searched on, if possible.
+#: Pixels of the films that are searched on, all together, if possible.
 PIXELS = 2**12
 
-#: First hits of a pixel, and paths that go on: to rank, compare, refine and judge candidates.
-SAMPLES = ((4, 0), (9, 2), (36, 8), (36, 8))
+#: Steps of all lights together along many paths.
+STEPS = 12
 
-#: Plugins whose light can be computed along frozen paths.
-SEARCHED = ("point", "spot", "directional")
-
-
-@keywords()
-@dataclass(frozen=True)
-class Move:
-    """A move of a light that is worth it.
-
-    Attributes:
-        name: The light.
-        old: Its place, direction and cone before.
-        new: The same after the move.
-        gain_share: The share of what was missed that it gives, beside the other moves.
-
-    Examples:
-        >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
-        >>> placement = lp.place(scene, basis, solution, {"bulb": lp.Freedom(within=0.5)})
-        >>> all(move.gain_share > 0 for move in placement.moves)
-        True
-    """
-
-    name: str
-    old: Site
-    new: Site
-    gain_share: float
-
-    @property
-    def distance(self) -> float:
-        """Distance that it slid, in units of the scene."""
-        if self.old.position is None or self.new.position is None:
-            return 0.0
-        return math.dist(self.old.position, self.new.position)
-
-    @property
-    def turn(self) -> float:
-        """Degrees that it turned."""
-        if self.old.direction is None or self.new.direction is None:
-            return 0.0
-        cosine = float(np.dot(self.old.direction, self.new.direction))
-        return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
-
-    @property
-    def pose(self) -> Pose:
-        """The change as a pose."""
-        new, slid = self.new, self.distance > 0
-        place = np.array(new.position or (0.0, 0.0, 0.0))
-        turned = self.turn > 0 or slid
-        target = None if new.direction is None else as_position(place + np.array(new.direction))
-        return Pose(
-            position=new.position if slid else None,
-            target=target if turned else None,
-            cutoff=new.cutoff if new.cutoff != self.old.cutoff else None,
-            beam=new.beam if new.beam != self.old.beam else None,
-        )
-
-    def __str__(self) -> str:
-        done = []
-        if self.turn >= 0.5:
-            done.append(f"turned by {self.turn:.0f}°")
-        if self.distance > 0:
-            done.append(f"slid by {self.distance:.2g}")
-        if self.new.cutoff is not None and self.new.cutoff != self.old.cutoff:
-            done.append(f"cone {self.old.cutoff:.0f}° to {self.new.cutoff:.0f}°")
-        return f"{self.name}: {', '.join(done)}: {self.gain_share:.0%} of what was missed"
-
-
-@keywords()
-@dataclass(frozen=True)
-class Placement:
-    """Better places of lights.
-
-    Attributes:
-        scene: The scene with these, for a basis and a solve of its own.
-        moves: Those worth it, the one that gives most first; none if no move surely gives a
-            hundredth of what is missed.
-        missed_before: The share of ‖Ψ‖² that the solve misses, estimated on paths that no place was
-            fitted to.
-        missed_after: The same with the moves.
-
-    Examples:
-        >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
-        >>> placement = lp.place(scene, basis, solution, {"bulb": lp.Freedom(within=0.5)})
-        >>> placement.missed_after <= placement.missed_before
-        True
-    """
-
-    scene: Scene
-    moves: tuple[Move, ...]
-    missed_before: float
-    missed_after: float
+#: Errors of a place, relative to the spread of visible points, and of a direction, in degrees, from
+#: which on a picture hardly tells where a light is.
+LONG_ERROR, WIDE_ERROR = 0.06, 6.0
 
 
 @keywords()
 def place(
-    scene: Scene,
-    basis: Basis,
+    scenes: Scene | Sequence[Scene],
+    bases: Basis | Sequence[Basis],
     solution: Solution,
-    freedoms: Mapping[str, Freedom],
+    freedoms: Mapping[str, Freedom] | None = None,
     *,
+    new: Sequence[NewLights] = (),
+    pairs: Sequence[MirroredPair] = (),
+    constraints: Constraints | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Placement:
     """Find places, directions and cones of lights that bring `solution` closest to its painting.
 
-    Light along frozen paths decides (placement/frozen_paths.py); render a basis of the scene that
-    is returned and solve again for exact images and weights. Constraints of the solution hold
+    Light along frozen paths decides (placement/frozen_paths.py); render bases of the scenes that
+    are returned and solve again for exact images and weights. Constraints of the solution hold
     throughout.
 
     Args:
-        scene: The scene of `basis`, on the same film or a larger one.
-        basis: The basis of the solution, of that one view.
+        scenes: The scene of `bases`, on the same film or a larger one; through the sensor of each
+            view if there are several.
+        bases: The basis of each view of the solution.
         solution: The solution to improve.
         freedoms: Freedom of lights by name: points, spots and suns of one emitter each.
+        new: Lights that may be added.
+        pairs: Lights that stay mirror images of each other.
+        constraints: Constraints on the new lights, by the names that they get; those of the
+            solution hold for the others.
         seed: Of the paths and the places that are tried.
         progress: Hears how far the work has come.
 
     Raises:
-        SceneError: For lights that are not there or cannot move so, and scenes with fog.
+        SceneError: For lights that are not there or cannot move so, freedoms without a free place,
+            and scenes with fog.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
@@ -160,82 +91,153 @@ def place(
         >>> {move.name for move in placement.moves} <= {"bulb"}
         True
     """
-    lights = [free_light(scene, name, freedom) for name, freedom in freedoms.items()]
+    views = _views(scenes, bases)
+    scene, basis = views[0]
+    freedoms = freedoms or {}
+    for name, freedom in freedoms.items():
+        free_light(scene, name, freedom)
+    lights = new_lights_of(scene, new)
+    small = [on_small_film(x, its, PIXELS // len(views)) for x, its in views]
     names = [light.name for light in basis.lights]
-    free = [(light, names.index(light.name)) for light in lights if not light.freedom.is_still]
-    small = on_small_film(scene, basis, PIXELS)
-    features = render_features(small, seed=seed)
 
-    def search(loaded: Any) -> Found:
-        paths = SearchPaths(
-            *(
-                FrozenPaths(
-                    small,
-                    loaded,
-                    first_hits=first_hits,
-                    bounces=bounces,
-                    seed=pass_seed(seed, Stream.FROZEN_PATHS, k),
-                ).filtered_along(features)
-                for k, (first_hits, bounces) in enumerate(SAMPLES)
-            )
+    def search(loaded: Any) -> _Result:
+        paths = SearchPaths(small, loaded, seed=seed)
+        if not len(paths.space.points):
+            raise SceneError(f"the camera of {scene.path} sees nothing that light falls on")
+        movables = movables_of(scene, names, freedoms, pairs, paths, seed=seed)
+        slots = new_movables_of(scene, lights, len(names), paths, seed=seed)
+        fit = fit_of(
+            [its for _, its in views],
+            solution,
+            [x.size for x in small],
+            [light.as_basis_light for light in lights],
+            constraints,
         )
-        spread = free_space(small, loaded, seed=seed).spread
-        fit = _fit(basis, solution, small.size)
-        return PoseSearch(fit, free, paths, spread=spread or 1.0, seed=seed).run(
-            lambda done, total: progress("poses", done, total)
-        )
+        poses = PoseSearch(fit, paths, PoseRules(paths), seed=seed)
+        found = _searched(poses, movables, slots, progress)
+        errors = Judgement(fit, poses.steps, paths).errors(found.arrangement)
+        places = [x.position or (0.0, 0.0, 0.0) for x in found.arrangement.sites]
+        seen = pixels_of(small[0], loaded, np.array(places, dtype=float).reshape(-1, 3))
+        return _Result(found, errors, seen, paths.space.spread or 1.0)
 
-    found = small.while_loaded(search)
-    moves = [
-        Move(light.name, light.site, site, gain)
-        for (light, _), site, gain in zip(free, found.sites, found.gains, strict=True)
-        if site != light.site
-    ]
+    result = small[0].while_loaded(search, views=small[1:])
+    return _placement([x for x, _ in views], result, lights, len(names))
+
+
+@dataclass(frozen=True)
+class _Result:
+    """What a search found. errors, seen: of each movable; its place in the first picture."""
+
+    found: Found
+    errors: list[PoseError]
+    seen: Sequence[tuple[float, float] | None]
+    spread: float
+
+    def is_hardly_visible(self, k: int) -> bool:
+        """Return whether the picture hardly tells where movable `k` is."""
+        its = self.errors[k]
+        is_long = its.place is not None and its.place > LONG_ERROR * self.spread
+        return is_long or (its.turn is not None and its.turn > WIDE_ERROR)
+
+
+def _searched(
+    poses: PoseSearch, movables: list[Movable], slots: list[Movable], progress: Progress
+) -> Found:
+    """Return what is worth it of all moves and new lights."""
+    total = TURNS * len(movables) + len(slots) + STEPS
+    done = 0
+
+    def count() -> None:
+        nonlocal done
+        done = min(done + 1, total)
+        progress("poses", done, total)
+
+    progress("poses", 0, total)
+    paths, steps, sites = poses.paths, poses.steps, tuple(x.light.site for x in movables)
+    start = Arrangement(tuple(movables), sites, steps.fitted(movables, sites, paths.compare))
+    found = poses.by_blocks(start, count)
+    if slots:
+        found = NewLightSearch(poses, slots).run(found, count)
+    found = steps.refitted(found, paths.refine)
+    found = steps.descend(found, paths.refine, STEPS, is_central=True, progress=count)
+    progress("poses", total, total)
+    return Judgement(poses.fit, steps, paths).judged(start, found)
+
+
+def _placement(
+    scenes: Sequence[Scene], result: _Result, lights: Sequence[NewLight], first: int
+) -> Placement:
+    """Return the placement of what was found. first: the index of the first new light's column."""
+    found, moves, additions, poses = result.found, [], [], {}
+    arrangement = found.arrangement
+    for k, (movable, site) in enumerate(zip(arrangement.movables, arrangement.sites, strict=True)):
+        about: dict[str, Any] = {
+            "gain_share": found.gains[k],
+            "place_error": result.errors[k].place,
+            "turn_error": result.errors[k].turn,
+            "is_hardly_visible": result.is_hardly_visible(k),
+        }
+        if movable.group is not None:
+            weight = arrangement.fitted.weights[movable.columns[0]]
+            emitter = _emitter(lights[movable.columns[0] - first], site, weight)
+            additions.append(AddedLight(emitter, **about, seen_at=result.seen[k]))
+        elif site != movable.light.site:
+            names = [movable.light.name]
+            if movable.mirror is not None:
+                names.append(scenes[0].lights[movable.columns[1]].name)
+            for name, its in zip(names, movable.sites(site), strict=True):
+                move = Move(name, scenes[0].light(name).members[0].site, its, **about)
+                moves.append(move)
+                poses[name] = move.pose
     moves.sort(key=lambda move: -move.gain_share)
-    return Placement(
-        scene.moved({move.name: move.pose for move in moves}) if moves else scene,
-        tuple(moves),
-        found.before,
-        found.after,
-    )
+    additions.sort(key=lambda light: -light.gain_share)
+    placed = [
+        scene.moved(poses).with_new_emitters([x.emitter for x in additions])
+        if poses or additions
+        else scene
+        for scene in scenes
+    ]
+    return Placement(tuple(placed), tuple(moves), tuple(additions), found.before, found.after)
 
 
-def free_light(scene: Scene, name: str, freedom: Freedom) -> FreeLight:
-    """Return a light of `scene` with its freedom. Raises SceneError for one that has none."""
-    light = scene.light(name)
-    if reason := _why_not_searched(light):
-        raise SceneError(f"light {name!r} {reason}: no better place can be found for it")
-    return FreeLight(name, light.members[0].site, freedom)
+def _emitter(light: NewLight, site: Site, weight: Any) -> NewEmitter:
+    """Return a new light where it was found."""
+    place = np.array(site.position, dtype=float)
+    target = None if site.direction is None else as_position(place + np.array(site.direction))
+    pose = Pose(position=as_position(place), target=target, cutoff=site.cutoff, beam=site.beam)
+    size = (site.side, site.side) if isinstance(site, PanelSite) else None
+    return NewEmitter(light.name, light.kind, pose, size, as_rgb(weight))
 
 
-def _why_not_searched(light: Light) -> str:
-    """Return why a light cannot be searched for, in words that follow its name; "" if it can."""
-    if light.is_fixed:
-        return "is kept as it is"
-    if len(light.members) > 1:
-        return f"is {len(light.members)} emitters"
-    if light.plugin not in SEARCHED:
-        return f"is of the kind {light.plugin}, and only {', '.join(SEARCHED)} are searched"
-    if light.unit == MULTIPLE:
-        return "has a picture in its beam"
-    return ""
+def _views(
+    scenes: Scene | Sequence[Scene], bases: Basis | Sequence[Basis]
+) -> list[tuple[Scene, Basis]]:
+    """Return the views, checked. Raises SceneError unless they are of one scene."""
+    all_scenes = [scenes] if isinstance(scenes, Scene) else list(scenes)
+    all_bases = [bases] if isinstance(bases, Basis) else list(bases)
+    if not all_scenes or len(all_scenes) != len(all_bases):
+        raise SceneError(
+            f"{len(all_scenes)} scenes and {len(all_bases)} bases: give one of each for every view"
+        )
+    first = all_scenes[0]
+    for other in all_scenes[1:]:
+        if (other.path, other.parameters) != (first.path, first.parameters):
+            raise SceneError(
+                f"{first.path} and {other.path} are two scenes: views differ in the sensor alone"
+            )
+    return list(zip(all_scenes, all_bases, strict=True))
 
 
-def _fit(basis: Basis, solution: Solution, size: tuple[int, int]) -> PlacementFit:
-    """Return the fit of the solution's last linear problem on a film of `size`."""
-    factor = basis.size[0] // size[0]
-    goal, importance = reduced_goal(solution, factor)
-    columns = np.stack([block_mean(plane, factor) for plane in basis.planes])
-    pixels = size[0] * size[1]
+def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
+    """Return `scene` on a film whose pixels are blocks of those of `basis`, `pixels` or fewer.
 
-    def flat(image: Floats) -> Floats:
-        whole = np.broadcast_to(image, (*image.shape[:-1], 3))
-        return whole.reshape(*whole.shape[:-3], pixels, 3)
-
-    return PlacementFit(
-        flat(columns),
-        flat(goal),
-        flat(importance),
-        solution.problem.local_reduction,
-        pull_with_more(solution, 0),
-    )
+    Raises SceneError if the basis is of another film.
+    """
+    (height, width), (mine_h, mine_w) = scene.size, basis.size
+    if whole_factor(scene.size, basis.size) is None:
+        raise SceneError(
+            f"the basis is {mine_w}x{mine_h}, whose pixels are no blocks of those of the film "
+            f"of {scene.path}, {width}x{height}: make it again"
+        )
+    on_its_film = scene.reduced(f"{mine_w}x{mine_h}")
+    return on_its_film.reduced(f"1/{reduction_to(on_its_film.film, pixels)}")

@@ -379,23 +379,30 @@ class Scene(Shown):
         return replace(self, path=parsed.path, files=parsed.files, _parsed=parsed)
 
     @MITSUBA.taken()
-    def load(self, emission: Mapping[str, RGB] | None = None) -> Any:
+    def load(
+        self, emission: Mapping[str, RGB] | None = None, *, views: Sequence["Scene"] = ()
+    ) -> Any:
         """Load the `mi.Scene`, its lights set to `emission` (those not named stay as they are).
 
         The film is replaced by a box-filtered RGB float32 one of the same size, for basis
         and verification alike. A light set to black is never sampled. Drop the scene, and
         all that came from it, before loading another. Lights that are images, and what is
         kept, can only be black or as authored here: other multiples take files (see relight).
+        views: this scene through other sensors, whose films are replaced, too.
         """
         settings = settings_for(self.lights, self.emitters, emission or {}, scene=str(self.path))
-        return self._parsed.instantiate(settings, self.film)
+        return self._parsed.instantiate(settings, self.film, *(view.film for view in views))
 
     @MITSUBA.taken()
     def while_loaded(
-        self, work: Callable[[Any], _Made], emission: Mapping[str, RGB] | None = None
+        self,
+        work: Callable[[Any], _Made],
+        emission: Mapping[str, RGB] | None = None,
+        *,
+        views: Sequence["Scene"] = (),
     ) -> _Made:
         """Return the result of `work` on the loaded scene, which is released afterwards."""
-        loaded = self.load(emission)
+        loaded = self.load(emission, views=views)
         try:
             with render_errors(self.path):
                 return work(loaded)

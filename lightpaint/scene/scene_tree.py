@@ -133,10 +133,10 @@ class ParsedScene:
             names[node] = name
         return names
 
-    def instantiate(self, settings: Mapping[int, EmitterSetting], film: Film | None = None) -> Any:
+    def instantiate(self, settings: Mapping[int, EmitterSetting], *films: Film) -> Any:
         """Make a `mi.Scene`, its emitters set by node.
 
-        film: put in the place of its sensor's own; None leaves all as they are.
+        films: put in the places of their sensors' own; the others stay as they are.
         """
         import mitsuba as mi
 
@@ -148,7 +148,7 @@ class ParsedScene:
             state.nodes[node].props.set_id(name)
         for node, setting in settings.items():
             set_emission(state, node, setting, on_shape=node in self.shape_of)
-        if film is not None:
+        for film in films:
             props = state.nodes[self.sensor_nodes[film.sensor]].props
             for key in list(props):
                 reference = mi.Properties.Type.ResolvedReference

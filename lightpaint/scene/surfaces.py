@@ -51,7 +51,7 @@ def render_surfaces(scene: Scene, *, seed: int = 0, progress: Progress = silent)
 
 def render_features(scene: Scene, *, seed: int = 0) -> Features:
     """Return albedo, normals and positions of `scene`; the first two rounded to half floats."""
-    return scene.while_loaded(lambda loaded: _features(scene, loaded, seed))
+    return scene.while_loaded(lambda loaded: loaded_features(scene, loaded, seed))
 
 
 def render_first_hits(
@@ -60,12 +60,13 @@ def render_first_hits(
     """Return features, and the objects that are seen. loaded: `scene`, where it is loaded."""
 
     def both(loaded: Any) -> tuple[Features, Objects]:
-        return _features(scene, loaded, seed), _objects(scene, loaded, seed)
+        return loaded_features(scene, loaded, seed), _objects(scene, loaded, seed)
 
     return scene.while_loaded(both) if loaded is None else both(loaded)
 
 
-def _features(scene: Scene, loaded: Any, seed: int) -> Features:
+def loaded_features(scene: Scene, loaded: Any, seed: int) -> Features:
+    """Return the features of `scene`, which is loaded; see `render_features`."""
     import mitsuba as mi
 
     film = scene.film

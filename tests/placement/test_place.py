@@ -10,7 +10,7 @@ from renderer import write_room
 
 import lightpaint as lp
 from lightpaint.errors import SceneError
-from lightpaint.placement.freedom import FreeLight
+from lightpaint.placement.free_light import FreeLight
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -119,7 +119,7 @@ def test_steps_stay_within_the_freedom(freedom: lp.Freedom) -> None:
     rng = np.random.default_rng(5)
     site = start
     for _ in range(200):
-        site = light.stepped(site, rng.normal(size=sum(light.dimensions)))
+        site = light.stepped(site, rng.normal(size=sum(light.dimensions(site))))
         again = light.permitted(site)
         assert again.position == pytest.approx(site.position, abs=1e-9)
         assert again.direction == pytest.approx(site.direction, abs=1e-9)

@@ -12,7 +12,7 @@ from lightpaint.errors import ConstraintError, SceneError
 from lightpaint.lighting.constraints.constraints import is_pattern
 from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.place import free_light
+from lightpaint.placement.lights_to_place import free_light
 from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.placement.rigging.rigging_values import names_of
 from lightpaint.scene.lights.light import Light

@@ -1,0 +1,149 @@
+"""Paths of a camera, traced once: the points on surfaces where a light may add to the picture."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.scene.scene import Scene
+
+#: Longest paths, in vertices, of integrators without a limit of their own; their light is frozen
+#: without Russian roulette, and what is beyond is a thousandth of a bright room's.
+MOST_VERTICES = 16
+
+
+@dataclass(frozen=True)
+class Vertices:
+    """Vertices of paths: interactions and throughputs as Dr.Jit arrays of one width.
+
+    pixels: (v,), the index of each one's pixel, ascending.
+    """
+
+    interaction: Any
+    throughput: Any
+    pixels: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+    @cached_property
+    def first_of_pixel(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.intp]]:
+        """Pixels that have vertices, and the index of the first vertex of each."""
+        return np.unique(self.pixels, return_index=True)
+
+    @cached_property
+    def points(self) -> Floats:
+        """Their places, (v, 3) float32."""
+        return np.array(self.interaction.p, dtype=np.float32).reshape(3, -1).T.copy()
+
+
+def longest_path(scene: Scene) -> int:
+    """Return the most vertices of a path that lights are asked at."""
+    depth = scene.integrator.max_depth
+    return MOST_VERTICES if depth < 0 else min(max(depth - 1, 0), MOST_VERTICES)
+
+
+def first_hits_of(
+    loaded: Any, camera: Any, size: tuple[int, int], side: int, rng: np.random.Generator
+) -> Vertices:
+    """Return first hits in a grid of side x side cells in each pixel, one in each cell."""
+    rays, weight, pixels = _camera_rays(camera, size, side, rng)
+    return _compressed(loaded.ray_intersect(rays), weight, pixels)
+
+
+def later_vertices_of(
+    loaded: Any,
+    camera: Any,
+    size: tuple[int, int],
+    paths: int,
+    longest: int,
+    rng: np.random.Generator,
+) -> Vertices | None:
+    """Return the vertices behind the first of paths, ordered by pixel."""
+    import drjit as dr
+    import mitsuba as mi
+
+    side = max(1, math.isqrt(paths))
+    kept = []
+    for _ in range(max(1, round(paths / side**2))):
+        rays, weight, pixels = _camera_rays(camera, size, side, rng)
+        weight *= side**2 / paths
+        for depth in range(longest):
+            its = _compressed(loaded.ray_intersect(rays), weight, pixels)
+            if not len(its):
+                break
+            if depth:
+                kept.append(its)
+            numbers = rng.random((3, len(its)), dtype=np.float32)
+            bsdf_sample, bsdf_weight = its.interaction.bsdf().sample(
+                mi.BSDFContext(),
+                its.interaction,
+                mi.Float(numbers[0]),
+                mi.Point2f(mi.Float(numbers[1]), mi.Float(numbers[2])),
+            )
+            si = its.interaction
+            rays, weight = si.spawn_ray(si.to_world(bsdf_sample.wo)), its.throughput * bsdf_weight
+            pixels = its.pixels
+            dr.eval(rays, weight)
+    return _joined(kept)
+
+
+def _camera_rays(
+    camera: Any, size: tuple[int, int], side: int, rng: np.random.Generator
+) -> tuple[Any, Any, npt.NDArray[np.int64]]:
+    """Return rays, their weights for a pixel's mean, and their pixels, ascending."""
+    import mitsuba as mi
+
+    height, width = size
+    pixels = np.repeat(np.arange(height * width), side**2)
+    cell = np.tile(np.arange(side**2), height * width)
+    jitter = rng.random((2, len(pixels)))
+    x = (pixels % width + (cell % side + jitter[0]) / side) / width
+    y = (pixels // width + (cell // side + jitter[1]) / side) / height
+    position = mi.Point2f(mi.Float(x.astype(np.float32)), mi.Float(y.astype(np.float32)))
+    aperture = rng.random((2, len(pixels)), dtype=np.float32)
+    lens = mi.Point2f(mi.Float(aperture[0]), mi.Float(aperture[1]))
+    rays, weight = camera.sample_ray(camera.shutter_open(), 0.5, position, lens)
+    return mi.Ray3f(rays), mi.Color3f(weight) / side**2, pixels
+
+
+def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices:
+    """Return the interactions that are some, in their order."""
+    import drjit as dr
+    import mitsuba as mi
+
+    kept = dr.compress(si.is_valid() & (dr.max(weight) > 0))
+    if not dr.width(kept):
+        return Vertices(si, weight, pixels[:0])
+    si = dr.gather(mi.SurfaceInteraction3f, si, kept)
+    weight = dr.gather(mi.Color3f, weight, kept)
+    dr.eval(si, weight)
+    return Vertices(si, weight, pixels[np.array(kept, dtype=np.int64)])
+
+
+def _joined(parts: Sequence[Vertices]) -> Vertices | None:
+    """Return all vertices of several, ordered by pixel; None if there are none."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if not parts:
+        return None
+    pixels = np.concatenate([part.pixels for part in parts])
+    order = np.argsort(pixels, kind="stable")
+    place = np.empty(len(order), np.uint32)
+    place[order] = np.arange(len(order))
+    si = dr.zeros(mi.SurfaceInteraction3f, len(order))
+    throughput = dr.zeros(mi.Color3f, len(order))
+    start = 0
+    for part in parts:
+        here = mi.UInt32(place[start : start + len(part)])
+        dr.scatter(si, part.interaction, here)
+        dr.scatter(throughput, part.throughput, here)
+        dr.eval(si, throughput)
+        start += len(part)
+    return Vertices(si, throughput, pixels[order])

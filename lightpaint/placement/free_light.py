@@ -1,0 +1,188 @@
+"""A light with its freedom: its pose as a few numbers, and the permitted poses.
+
+These numbers are coordinates of its place along what it can slide on, of its direction across its
+axis, of its cone or its size. A search changes them and asks for the nearest permitted pose.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats, Position
+from lightpaint.errors import SceneError
+from lightpaint.placement.free_space import as_position, far_apart
+from lightpaint.placement.freedom import EDGE, Freedom
+from lightpaint.placement.frozen_paths import PanelSite
+from lightpaint.placement.permitted_places import (
+    OVERSAMPLING,
+    BallOfPlaces,
+    BoxOfPlaces,
+    EitherPlaces,
+    OnePlace,
+    Places,
+    Rails,
+)
+from lightpaint.scene.properties.pose import Site, across, rotation_between
+
+#: Degrees that count like a metre of sliding, for one step of a search: of the axis, of the cone;
+#: and the steps of a beam's share of its cone, and of the logarithm of a side.
+AIM_UNIT, CONE_UNIT, BEAM_UNIT, SIDE_UNIT = 20.0, 10.0, 0.3, 0.7
+
+#: Least share of a cone that its beam has, if the beam is free.
+LEAST_BEAM = 0.05
+
+
+@dataclass(frozen=True)
+class FreeLight:
+    """A light, where it is now, and its freedom.
+
+    places: where it may hang; those of `freedom` if that has no surfaces. sides: smallest and
+    largest side of a panel. has_free_beam: whether its beam changes by itself; else it keeps its
+    share of the cone.
+    """
+
+    name: str
+    site: Site
+    freedom: Freedom
+    places: Places | None = None
+    sides: tuple[float, float] | None = None
+    has_free_beam: bool = False
+
+    def __post_init__(self) -> None:
+        its, site = self.freedom, self.site
+        for is_asked, has_it, what in (
+            (its.slides, site.position is not None, "a place that could change"),
+            (its.turn > 0, site.direction is not None, "a direction that could change"),
+            (its.cone is not None, site.cutoff is not None, "a cone"),
+        ):
+            if is_asked and not has_it:
+                raise SceneError(f"light {self.name!r} has not {what}: leave that freedom out")
+        if self.places is None and site.position is not None:
+            here = np.array(site.position, dtype=float)
+            object.__setattr__(self, "places", places_of(its, here))
+
+    def dimensions(self, site: Site) -> tuple[int, int, int]:
+        """Return the numbers of coordinates of place, direction, and cone or size at a pose."""
+        cone = 2 if self.has_free_beam else 1
+        return (
+            len(self._tangents(site)),
+            2 if self.freedom.turn else 0,
+            cone if self.freedom.cone is not None else 1 if self.sides is not None else 0,
+        )
+
+    def stepped(self, site: Site, step: Doubles) -> Site:
+        """Return the permitted pose nearest to `site` changed by `step`, (sum of dimensions,).
+
+        Units are those of the scene, AIM_UNIT, CONE_UNIT and BEAM_UNIT, or SIDE_UNIT.
+        """
+        place, turn, cone = np.split(step, np.cumsum(self.dimensions(site))[:2])
+        if len(place) and site.position is not None:
+            way = place @ self._tangents(site)
+            site = replace(site, position=as_position(np.array(site.position) + way))
+        if len(turn) and site.direction is not None:
+            sideways = across(site.direction)
+            direction = np.array(site.direction) + math.radians(AIM_UNIT) * turn @ sideways
+            site = replace(site, direction=as_position(direction / np.linalg.norm(direction)))
+        if isinstance(site, PanelSite):
+            if len(cone):
+                site = replace(site, side=site.side * math.exp(SIDE_UNIT * float(cone[0])))
+        elif len(cone) and site.cutoff is not None:
+            share = (site.beam or 0.0) / site.cutoff
+            if self.has_free_beam:
+                share += BEAM_UNIT * float(cone[1])
+            site = self._opened(site, site.cutoff + CONE_UNIT * float(cone[0]), share)
+        return self.permitted(site)
+
+    def permitted(self, site: Site) -> Site:
+        """Return the permitted pose nearest to `site`."""
+        if site.position is not None and self.freedom.slides and self.places is not None:
+            place = self.places.nearest(np.array(site.position, dtype=float))
+            site = replace(site, position=as_position(place))
+        start, turn = self.site.direction, self.freedom.turn
+        if site.direction is not None and start is not None and turn < 180:
+            turned = _turned(start, site.direction, turn) if turn else start
+            site = replace(site, direction=turned)
+        if isinstance(site, PanelSite) and self.sides is not None:
+            return replace(site, side=float(np.clip(site.side, *self.sides)))
+        if self.freedom.cone is not None and site.cutoff is not None:
+            site = self._opened(site, site.cutoff, (site.beam or 0.0) / site.cutoff)
+        return site
+
+    def some_places(self, count: int, rng: np.random.Generator) -> Floats:
+        """Return about `count` permitted places that are far apart, the present one first."""
+        here = np.array(self.site.position, dtype=float)[None]
+        if not self.freedom.slides or count < 2:
+            return here
+        assert self.places is not None
+        many = self.places.random(OVERSAMPLING * count, rng)
+        return np.concatenate([here, far_apart(many, count - 1, start=here)])
+
+    def directions(self, apart: float) -> Floats:
+        """Return permitted directions, about `apart` degrees from each other, the present first."""
+        if self.site.direction is None or not self.freedom.turn:
+            return np.array(self.site.direction or (0.0, 0.0, 1.0))[None]
+        count = max(8, round(4 * math.pi / math.radians(apart) ** 2))
+        k = np.arange(count) + 0.5
+        z, turn = 1 - 2 * k / count, math.pi * (1 + math.sqrt(5)) * k
+        flat = np.sqrt(1 - z**2)
+        sphere = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+        # The spiral's pole is the present direction, so that few directions are well placed, too.
+        sphere = sphere @ rotation_between((0.0, 0.0, 1.0), self.site.direction).T
+        near = sphere @ np.array(self.site.direction) >= math.cos(math.radians(self.freedom.turn))
+        return np.concatenate([np.array(self.site.direction)[None], sphere[near]])
+
+    def cones(self, count: int = 4) -> Floats:
+        """Return permitted cones, (c, 2): cutoff and beam in degrees, the present one first."""
+        now = (self.site.cutoff or 0.0, self.site.beam or 0.0)
+        if self.freedom.cone is None:
+            return np.array([now])
+        share = now[1] / (now[0] or 1.0)
+        sizes = np.geomspace(*self.freedom.cone, count)
+        opened = [self._opened(self.site, float(cutoff), share) for cutoff in sizes]
+        return np.array([now, *((x.cutoff, x.beam) for x in opened)], dtype=float)
+
+    def _tangents(self, site: Site) -> Doubles:
+        if not self.freedom.slides or self.places is None or site.position is None:
+            return np.zeros((0, 3))
+        return self.places.tangents(np.array(site.position, dtype=float))
+
+    @cached_property
+    def _share(self) -> float:
+        """The share of its cone that its beam is wide now."""
+        return (self.site.beam or 0.0) / (self.site.cutoff or 1.0)
+
+    def _opened(self, site: Site, cutoff: float, share: float) -> Site:
+        """Return `site` with a permitted cone nearest to `cutoff`, and that share of beam."""
+        assert self.freedom.cone is not None
+        cutoff = float(np.clip(cutoff, *self.freedom.cone))
+        share = max(share, LEAST_BEAM) if self.has_free_beam else self._share
+        beam = max(min(share * cutoff, cutoff - EDGE), EDGE)
+        return replace(site, cutoff=cutoff, beam=beam)
+
+
+def places_of(freedom: Freedom, here: Doubles, surfaces: Places | None = None) -> Places:
+    """Return the places of a freedom. here: (3,), the present one. surfaces: of its shapes."""
+    parts: list[Places] = [] if surfaces is None else [surfaces]
+    if freedom.all_rails:
+        parts.append(Rails(np.array(freedom.all_rails, dtype=float)))
+    if parts:
+        return parts[0] if len(parts) == 1 else EitherPlaces(parts)
+    if freedom.box is not None:
+        return BoxOfPlaces(np.min(freedom.box, axis=0), np.max(freedom.box, axis=0))
+    if freedom.within is not None:
+        return BallOfPlaces(here, freedom.within)
+    return OnePlace(here)
+
+
+def _turned(start: Position, direction: Position, degrees: float) -> Position:
+    """Return the direction nearest to `direction` within some degrees of `start`."""
+    a, b = np.array(start), np.array(direction)
+    angle, most = math.acos(float(np.clip(a @ b, -1, 1))), math.radians(degrees)
+    if angle <= most:
+        return direction
+    side = b - (a @ b) * a
+    length = float(np.linalg.norm(side))
+    side = side / length if length > 1e-9 else across(start)[0]
+    return as_position(math.cos(most) * a + math.sin(most) * side)

@@ -1,0 +1,236 @@
+"""Lights that a search moves or adds, with their freedoms resolved against the loaded scene."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpaint.basis.lights import BasisLight
+from lightpaint.errors import SceneError
+from lightpaint.placement.free_light import FreeLight, places_of
+from lightpaint.placement.free_space import as_position
+from lightpaint.placement.freedom import Freedom
+from lightpaint.placement.frozen_paths import PanelSite
+from lightpaint.placement.movable import Movable
+from lightpaint.placement.new_lights import NEW_CONE, MirroredPair, NewLights
+from lightpaint.placement.permitted_places import BoxOfPlaces, Places
+from lightpaint.placement.surface_places import places_on
+from lightpaint.placement.view_paths import SearchPaths
+from lightpaint.scene.lights.light import Light, free_names
+from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewKind
+from lightpaint.scene.properties.emission import MULTIPLE, PLUGINS
+from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.scene import Scene
+
+#: Plugins whose light can be computed along frozen paths.
+SEARCHED = ("point", "spot", "directional")
+
+#: Smallest and largest side of new panels, relative to the spread of visible points.
+SIDES = (0.06, 0.5)
+
+#: Share of the cone that the beam of a new spot has at first.
+FIRST_BEAM = 0.7
+
+#: Random places of a freedom that are tested for being free at all.
+TESTED = 200
+
+
+@dataclass(frozen=True)
+class NewLight:
+    """A light that may be added. kind: of emitter."""
+
+    name: str
+    kind: NewKind
+    group: NewLights
+
+    @property
+    def as_basis_light(self) -> BasisLight:
+        """What constraints know of it."""
+        plugin = PLUGIN_OF[self.kind]
+        parameter, unit = PLUGINS[plugin]
+        return BasisLight(self.name, plugin, parameter, unit, (0.0, 0.0, 0.0))
+
+
+def new_lights_of(scene: Scene, groups: Sequence[NewLights]) -> list[NewLight]:
+    """Return the lights that may be added, with names that no light of the scene has."""
+    taken = {*(x.name for x in scene.emitters), *(x.name for x in scene.lights)}
+    made: list[NewLight] = []
+    for group in groups:
+        kind = group.kind if group.like is None else _kind_like(scene, group.like)
+        group.check_kind(kind)
+        names = [group.name]
+        if group.count > 1 or group.name in taken:
+            names = free_names(group.name, group.count, taken)
+        taken |= {*names}
+        made += [NewLight(name, kind, group) for name in names]
+    return made
+
+
+def movables_of(
+    scene: Scene,
+    names: Sequence[str],
+    freedoms: Mapping[str, Freedom],
+    pairs: Sequence[MirroredPair],
+    paths: SearchPaths,
+    *,
+    seed: int,
+) -> list[Movable]:
+    """Return the lights of `scene` that may move. names: of the lights, in the basis's order."""
+    followers = _followers(scene, freedoms, pairs)
+    made = []
+    for name, freedom in freedoms.items():
+        if freedom.is_still or name in {x.lights[1] for x in pairs}:
+            continue
+        site = _site(scene, name)
+        light = FreeLight(name, site, freedom, _places(scene, site, freedom, paths, seed))
+        follower = followers.get(name)
+        columns = [names.index(name)]
+        if follower is not None:
+            columns.append(names.index(follower.lights[1]))
+        mirror = None if follower is None else follower.plane
+        made.append(Movable(light, tuple(columns), mirror))
+    return made
+
+
+def new_movables_of(
+    scene: Scene, lights: Sequence[NewLight], first: int, paths: SearchPaths, *, seed: int
+) -> list[Movable]:
+    """Return the lights that may be added. first: the index of the first one's column.
+
+    Raises SceneError for those that no place of their freedom is free for.
+    """
+    made = []
+    templates: dict[int, FreeLight] = {}
+    for k, light in enumerate(lights):
+        if id(light.group) not in templates:
+            templates[id(light.group)] = _template(scene, light, paths, seed)
+        free = replace(templates[id(light.group)], name=light.name)
+        made.append(Movable(free, (first + k,), None, light.group))
+    return made
+
+
+def free_light(scene: Scene, name: str, freedom: Freedom) -> FreeLight:
+    """Return a light of `scene` with its freedom, its surfaces not resolved.
+
+    Raises SceneError for one that is not there, or cannot move so.
+    """
+    return FreeLight(name, _site(scene, name), freedom)
+
+
+def why_not_searched(light: Light) -> str:
+    """Return why a light cannot be searched for, in words that follow its name; "" if it can."""
+    if light.is_fixed:
+        return "is kept as it is"
+    if len(light.members) > 1:
+        return f"is {len(light.members)} emitters"
+    if light.plugin not in SEARCHED:
+        return f"is of the kind {light.plugin}, and only {', '.join(SEARCHED)} are searched"
+    if light.unit == MULTIPLE:
+        return "has a picture in its beam"
+    return ""
+
+
+def _site(scene: Scene, name: str) -> Site:
+    light = scene.light(name)
+    if reason := why_not_searched(light):
+        raise SceneError(f"light {name!r} {reason}: no better place can be found for it")
+    return light.members[0].site
+
+
+def _places(
+    scene: Scene, site: Site, freedom: Freedom, paths: SearchPaths, seed: int
+) -> Places | None:
+    if site.position is None:
+        return None
+    surfaces = None
+    if freedom.surfaces is not None:
+        surfaces = places_on(
+            scene, paths.loaded, freedom.surfaces, paths.space, clear=freedom.clear, seed=seed
+        )
+    return places_of(freedom, np.array(site.position, dtype=float), surfaces)
+
+
+def _followers(
+    scene: Scene, freedoms: Mapping[str, Freedom], pairs: Sequence[MirroredPair]
+) -> dict[str, MirroredPair]:
+    """Return pairs by the names of their first lights. Raises SceneError for impossible ones."""
+    made: dict[str, MirroredPair] = {}
+    named: set[str] = set()
+    for pair in pairs:
+        first, second = pair.lights
+        one, other = (_site(scene, name) for name in pair.lights)
+        if scene.light(first).plugin != scene.light(second).plugin:
+            raise SceneError(f"{first!r} and {second!r} are of two kinds: they are no pair")
+        if again := named & {first, second}:
+            raise SceneError(f"light {min(again)!r} is in two pairs: it has one mirror image")
+        named |= {first, second}
+        if first not in freedoms:
+            raise SceneError(f"{first!r} leads a pair and has no freedom: give it one")
+        if freedoms[first].cone is None and (one.cutoff, one.beam) != (other.cutoff, other.beam):
+            raise SceneError(f"{first!r} and {second!r} have two cones: free the cone of the first")
+        made[first] = pair
+    return made
+
+
+def _kind_like(scene: Scene, name: str) -> NewKind:
+    """Return the kind of new lights that are like one of the scene."""
+    light = scene.light(name)
+    kinds = {plugin: kind for kind, plugin in PLUGIN_OF.items()}
+    if len(light.members) > 1 or light.plugin not in kinds or light.is_scalar:
+        raise SceneError(f"new lights are like a point, a spot or a panel, and {name!r} is not one")
+    return kinds[light.plugin]
+
+
+def _template(scene: Scene, light: NewLight, paths: SearchPaths, seed: int) -> FreeLight:
+    """Return a light of a group, at some place of its freedom."""
+    group, space = light.group, paths.space
+    rng = np.random.default_rng(seed)
+    freedom = group.freedom
+    if not freedom.slides:
+        if not len(space.places):
+            raise SceneError(f"{scene.path} has no free place that sees anything of the picture")
+        low, high = space.places.min(axis=0), space.places.max(axis=0)
+        freedom = replace(freedom, box=(as_position(low), as_position(high)))
+        places: Places = BoxOfPlaces(low, high, space.places)
+    else:
+        surfaces = None
+        if freedom.surfaces is not None:
+            surfaces = places_on(
+                scene, paths.loaded, freedom.surfaces, space, clear=freedom.clear, seed=seed
+            )
+        places = places_of(freedom, np.zeros(3), surfaces)
+    tested = places.random(TESTED, rng)
+    is_free = paths.usable(tested, None if freedom.clear is None else 0.9 * freedom.clear)
+    if not group.in_view:
+        is_free &= ~paths.in_view(tested)
+    if not is_free.any():
+        raise SceneError(
+            f"new light {light.name!r} has no free place that sees anything of the picture: give "
+            "it more freedom"
+        )
+    site = Site(as_position(tested[int(np.argmax(is_free))]))
+    if light.kind == "point":
+        return FreeLight(light.name, site, freedom, places)
+    like = None if group.like is None else scene.light(group.like).members[0]
+    down = (0.0, -1.0, 0.0)
+    direction = down if like is None or like.site.direction is None else like.site.direction
+    freedom = replace(freedom, aim=freedom.aim or True)
+    if light.kind == "panel":
+        low_side, high_side = group.size or (SIDES[0] * space.spread, SIDES[1] * space.spread)
+        if group.size is None and like is not None and like.unit_flux is not None:
+            low_side = high_side = math.sqrt(like.unit_flux / math.pi)
+        side = math.sqrt(low_side * high_side)
+        panel = PanelSite(site.position, direction, side=side)
+        sides = (low_side, high_side) if high_side > low_side else None
+        return FreeLight(light.name, panel, freedom, places, sides)
+    if like is not None:
+        cutoff, beam = like.site.cutoff or 0.0, like.site.beam or 0.0
+    else:
+        freedom = replace(freedom, cone=freedom.cone or NEW_CONE)
+        assert freedom.cone is not None
+        cutoff = math.sqrt(freedom.cone[0] * freedom.cone[1])
+        beam = FIRST_BEAM * cutoff
+    site = replace(site, direction=direction, cutoff=cutoff, beam=beam)
+    has_free_beam = like is None and freedom.cone is not None
+    return FreeLight(light.name, site, freedom, places, has_free_beam=has_free_beam)

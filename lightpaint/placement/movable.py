@@ -1,0 +1,71 @@
+"""What a search moves, and where it has it at present."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from lightpaint.arrays import Floats
+from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.new_lights import Mirror, NewLights
+from lightpaint.placement.placement_fit import Fitted
+from lightpaint.scene.properties.pose import Site
+
+
+@dataclass(frozen=True)
+class Movable:
+    """What moves as one: a light, or a mirrored pair of lights.
+
+    columns: their indices among the columns of the fit. mirror: of the second; None for one light.
+    group: what it was added for; None for a light that is there.
+    """
+
+    light: FreeLight
+    columns: tuple[int, ...]
+    mirror: Mirror | None = None
+    group: NewLights | None = None
+
+    def sites(self, site: Site) -> list[Site]:
+        """Return the place of each of its lights. site: of the first."""
+        return [site] if self.mirror is None else [site, self.mirror.site(site)]
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """Movables, the pose of each, and the best lighting with these."""
+
+    movables: tuple[Movable, ...]
+    sites: tuple[Site, ...]
+    fitted: Fitted
+
+    @property
+    def missed(self) -> float:
+        """What the best lighting misses, and the pull of the constraints."""
+        return self.fitted.missed
+
+    def with_site(self, k: int, site: Site, fitted: Fitted) -> "Arrangement":
+        """Return the arrangement with another pose of movable `k`."""
+        return replace(self, sites=(*self.sites[:k], site, *self.sites[k + 1 :]), fitted=fitted)
+
+    def with_movable(self, movable: Movable, site: Site, fitted: Fitted) -> "Arrangement":
+        """Return the arrangement with one movable more, the last."""
+        return Arrangement((*self.movables, movable), (*self.sites, site), fitted)
+
+    def without(self, k: int, fitted: Fitted) -> "Arrangement":
+        """Return the arrangement without movable `k`."""
+        return Arrangement(
+            (*self.movables[:k], *self.movables[k + 1 :]),
+            (*self.sites[:k], *self.sites[k + 1 :]),
+            fitted,
+        )
+
+
+def all_sites(movables: Sequence[Movable], sites: Sequence[Site]) -> list[Site]:
+    """Return the places of all lights of movables, in their order."""
+    return [
+        site for movable, its in zip(movables, sites, strict=True) for site in movable.sites(its)
+    ]
+
+
+def by_column(movables: Sequence[Movable], columns: Floats) -> Mapping[int, Floats]:
+    """Return columns of all lights of movables, in their order, by their indices in the fit."""
+    numbers = [k for movable in movables for k in movable.columns]
+    return dict(zip(numbers, columns, strict=True))

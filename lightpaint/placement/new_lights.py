@@ -1,0 +1,179 @@
+"""Lights that a search may add, and pairs that it moves as mirror images."""
+
+import math
+import re
+from dataclasses import dataclass, field, replace
+from typing import Any, get_args
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Position
+from lightpaint.errors import SceneError
+from lightpaint.keywords import keywords
+from lightpaint.placement.free_space import as_position
+from lightpaint.placement.freedom import Freedom
+from lightpaint.scene.lights.new_emitter import NewKind
+from lightpaint.scene.properties.pose import FARTHEST, Site
+from lightpaint.validation import MAX_NAME
+
+#: The most lights that one search adds.
+MAX_COUNT = 32
+
+#: Cones of new spots without a freedom of their own, in degrees.
+NEW_CONE = (8.0, 50.0)
+
+#: How a mirror is written, like "x = 0".
+_MIRROR = re.compile(r"\s*([xyz])\s*=\s*([-+.\deE]+)\s*")
+
+
+@keywords()
+@dataclass(frozen=True)
+class NewLights:
+    """Lights that a search may add: as many of them as are worth it.
+
+    Attributes:
+        kind: `point`, `spot` or `panel`, a square that shines to its front.
+        like: A light of the scene whose kind and cone or size they have, instead of `kind`.
+        count: The most that are added.
+        freedom: Where they may hang; without a place, in all free space. Spots and panels point
+            anywhere unless `aim` says otherwise, as degrees from straight ahead of `like`.
+        apart: Least distance from each other, in units of the scene.
+        in_view: False for places that the camera does not see.
+        name: Their name; several have `_1`, `_2` … behind it.
+        size: Smallest and largest side of panels; None for sides that suit the room.
+
+    Raises:
+        SceneError: For values that mean nothing.
+
+    Examples:
+        >>> lp.NewLights("spot", count=2, freedom=lp.Freedom(surfaces=("ceiling",))).count
+        2
+    """
+
+    kind: NewKind = "point"
+    like: str | None = None
+    count: int = 3
+    freedom: Freedom = field(default_factory=Freedom)
+    apart: float = 0.0
+    in_view: bool = True
+    name: str = "new"
+    size: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(NewKind):
+            raise SceneError(
+                f"new lights are of the kind {self.kind!r}: expected point, spot or panel"
+            )
+        if isinstance(self.count, bool) or not isinstance(self.count, int):
+            raise SceneError(f"count is {self.count!r}: expected a whole number of lights")
+        if not 1 <= self.count <= MAX_COUNT:
+            raise SceneError(f"count is {self.count}: expected 1 to {MAX_COUNT} new lights")
+        if not isinstance(self.name, str) or not 0 < len(self.name) <= MAX_NAME - 4:
+            raise SceneError(f"name is {self.name!r}: expected 1 to {MAX_NAME - 4} characters")
+        if not (isinstance(self.apart, int | float) and 0 <= self.apart <= FARTHEST):
+            raise SceneError(f"apart is {self.apart!r}: expected a distance, 0 or more")
+        if self.freedom.within is not None:
+            raise SceneError("new lights have no place yet that they could be within a distance of")
+        if self.size is not None:
+            object.__setattr__(self, "size", _sides(self.size))
+        if self.like is None:
+            self.check_kind(self.kind)
+            if not isinstance(self.freedom.aim, bool):
+                raise SceneError("aim of new lights is True or left out, unless they are like one")
+
+    def check_kind(self, kind: NewKind) -> None:
+        """Raise SceneError for a freedom that lights of this kind do not have."""
+        if self.freedom.cone is not None and kind != "spot":
+            raise SceneError(f"a new {kind} has not a cone: leave that freedom out")
+        if self.freedom.aim and kind == "point":
+            raise SceneError("a new point has not a direction: leave aim out")
+        if self.size is not None and kind != "panel":
+            raise SceneError(f"a new {kind} has no size: leave it out")
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """A plane across an axis. axis: 0, 1 or 2; at: its coordinate there."""
+
+    axis: int
+    at: float
+
+    @classmethod
+    def of(cls, text: Any) -> "Mirror":
+        """Read a plane like "x = 0". Raises SceneError for others."""
+        match = _MIRROR.fullmatch(text) if isinstance(text, str) else None
+        try:
+            at = math.nan if match is None else float(match[2])
+        except ValueError:
+            at = math.nan
+        if match is None or not abs(at) <= FARTHEST:
+            raise SceneError(f'mirror is {text!r}: expected a plane like "x = 0"')
+        return cls("xyz".index(match[1]), at)
+
+    def __str__(self) -> str:
+        return f"{'xyz'[self.axis]} = {self.at:g}"
+
+    def place(self, place: Position | Doubles) -> Doubles:
+        """Return the mirror image of a place, (3,)."""
+        made = np.array(place, dtype=float)
+        made[self.axis] = 2 * self.at - made[self.axis]
+        return made
+
+    def direction(self, direction: Position | Doubles) -> Doubles:
+        """Return the mirror image of a direction, (3,)."""
+        made = np.array(direction, dtype=float)
+        made[self.axis] *= -1
+        return made
+
+    def site(self, site: Site) -> Site:
+        """Return the mirror image of a light's place and direction, with its cone."""
+        return replace(
+            site,
+            position=None if site.position is None else as_position(self.place(site.position)),
+            direction=(
+                None if site.direction is None else as_position(self.direction(site.direction))
+            ),
+        )
+
+
+@keywords()
+@dataclass(frozen=True)
+class MirroredPair:
+    """Two lights that hang and point as mirror images of each other.
+
+    Attributes:
+        lights: Their names. The first has the freedom, the second follows.
+        mirror: The plane, like "x = 0".
+
+    Raises:
+        SceneError: For values that mean nothing.
+
+    Examples:
+        >>> lp.MirroredPair(("left", "right"), "x = 0").mirror
+        'x = 0'
+    """
+
+    lights: tuple[str, str]
+    mirror: str = "x = 0"
+
+    def __post_init__(self) -> None:
+        names = self.lights
+        if isinstance(names, str) or len(tuple(names)) != 2 or len({*names}) != 2:
+            raise SceneError(f"a pair is of {names!r}: expected the names of two lights")
+        object.__setattr__(self, "lights", tuple(names))
+        Mirror.of(self.mirror)
+
+    @property
+    def plane(self) -> Mirror:
+        """The mirror as a plane."""
+        return Mirror.of(self.mirror)
+
+
+def _sides(value: Any) -> tuple[float, float]:
+    try:
+        low, high = (float(v) for v in value)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if not 0 < low <= high <= FARTHEST:
+        raise SceneError(f"size is {value!r}: expected the smallest and the largest side of panels")
+    return low, high

@@ -1,0 +1,213 @@
+"""The places that a light may hang at: a ball, a box, rails, surfaces, or all free space.
+
+A search asks three things: the nearest permitted place, the directions in which a light there can
+slide, and places all over.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats, Indices
+
+#: Random places from which those far apart are chosen, for each place that is asked for.
+OVERSAMPLING = 20
+
+
+class Places(Protocol):
+    """Permitted places."""
+
+    def nearest(self, place: Doubles) -> Doubles:
+        """Return the permitted place nearest to `place`, (3,)."""
+        ...
+
+    def tangents(self, place: Doubles) -> Doubles:
+        """Return unit vectors that a light at a permitted place can slide along, (d, 3)."""
+        ...
+
+    def random(self, count: int, rng: np.random.Generator) -> Doubles:
+        """Return random places, (k, 3)."""
+        ...
+
+
+@dataclass(frozen=True)
+class OnePlace:
+    """The place of a light that does not slide."""
+
+    place: Doubles
+
+    def nearest(self, place: Doubles) -> Doubles:
+        """Return that place."""
+        return self.place
+
+    def tangents(self, place: Doubles) -> Doubles:
+        """Return no vectors."""
+        return np.zeros((0, 3))
+
+    def random(self, count: int, rng: np.random.Generator) -> Doubles:
+        """Return that place alone."""
+        return self.place[None]
+
+
+@dataclass(frozen=True)
+class BallOfPlaces:
+    """All places within a distance of one."""
+
+    middle: Doubles
+    radius: float
+
+    def nearest(self, place: Doubles) -> Doubles:
+        """Return the place, or the one of the surface towards it."""
+        away = place - self.middle
+        length = float(np.linalg.norm(away))
+        return np.asarray(self.middle + away * min(1, self.radius / max(length, 1e-300)))
+
+    def tangents(self, place: Doubles) -> Doubles:
+        """Return the three axes."""
+        return np.eye(3)
+
+    def random(self, count: int, rng: np.random.Generator) -> Doubles:
+        """Return places inside, even in volume."""
+        many = rng.uniform(-1, 1, (2 * count, 3))
+        many = many[np.linalg.norm(many, axis=1) <= 1][:count]
+        return np.asarray(self.middle + self.radius * many)
+
+
+@dataclass(frozen=True)
+class BoxOfPlaces:
+    """All places in a box. chosen: those that `random` picks from, (k, 3); None for all of it."""
+
+    low: Doubles
+    high: Doubles
+    chosen: Floats | None = None
+
+    def nearest(self, place: Doubles) -> Doubles:
+        """Return the place, moved into the box."""
+        return np.clip(place, self.low, self.high)
+
+    def tangents(self, place: Doubles) -> Doubles:
+        """Return the three axes, without those along which the box is flat."""
+        return np.eye(3)[self.high > self.low]
+
+    def random(self, count: int, rng: np.random.Generator) -> Doubles:
+        """Return places inside."""
+        if self.chosen is None:
+            return np.asarray(rng.uniform(self.low, self.high, (count, 3)))
+        return np.asarray(self.chosen[rng.permutation(len(self.chosen))[:count]], np.float64)
+
+
+@dataclass(frozen=True)
+class Rails:
+    """Places on line segments. ends: (r, 2, 3)."""
+
+    ends: Doubles
+
+    def nearest(self, place: Doubles) -> Doubles:
+        """Return the nearest place on any of them."""
+        return np.asarray(self._nearest(place)[1])
+
+    def tangents(self, place: Doubles) -> Doubles:
+        """Return the direction of the rail that the place is on, (1, 3)."""
+        way = np.diff(self.ends[self._nearest(place)[0]], axis=0)
+        return np.asarray(way / np.linalg.norm(way))
+
+    def random(self, count: int, rng: np.random.Generator) -> Doubles:
+        """Return places, even in length."""
+        length = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
+        rail = rng.choice(len(length), count, p=length / length.sum())
+        share = rng.random((count, 1))
+        return np.asarray(self.ends[rail, 0] * (1 - share) + self.ends[rail, 1] * share)
+
+    def _nearest(self, place: Doubles) -> tuple[int, Doubles]:
+        start, way = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
+        share = ((place - start) * way).sum(axis=1) / np.square(way).sum(axis=1)
+        there = start + np.clip(share, 0, 1)[:, None] * way
+        k = int(np.argmin(np.square(there - place).sum(axis=1)))
+        return k, there[k]
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """Places on triangles. corners: (t, 3, 3)."""
+
+    corners: Doubles
+
+    def nearest(self, place: Doubles) -> Doubles:
+        """Return the nearest place on any of them."""
+        return np.asarray(self._nearest(place)[1])
+
+    def tangents(self, place: Doubles) -> Doubles:
+        """Return two directions in the triangle that the place is on, (2, 3)."""
+        corners = self.corners[self._nearest(place)[0]]
+        one = corners[1] - corners[0]
+        one /= np.linalg.norm(one)
+        other = np.cross(np.cross(one, corners[2] - corners[0]), one)
+        return np.stack([one, other / np.linalg.norm(other)])
+
+    def random(self, count: int, rng: np.random.Generator) -> Doubles:
+        """Return places, even in area."""
+        return self.scattered(count, rng)[1]
+
+    def scattered(self, count: int, rng: np.random.Generator) -> tuple[Indices, Doubles]:
+        """Return the triangles of random places, (k,), and these, (k, 3), even in area."""
+        area = np.linalg.norm(self.normals, axis=1)
+        triangle = rng.choice(len(area), count, p=area / area.sum())
+        u, v = rng.random((2, count, 1))
+        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+        a, b, c = np.moveaxis(self.corners[triangle], 1, 0)
+        return triangle, np.asarray(a + u * (b - a) + v * (c - a))
+
+    @cached_property
+    def normals(self) -> Doubles:
+        """Normals as long as twice the areas, (t, 3)."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        return np.cross(b - a, c - a)
+
+    def _nearest(self, place: Doubles) -> tuple[int, Doubles]:
+        """Return the nearest triangle, and the nearest place on it.
+
+        That is the foot of the perpendicular if it lies inside, else the nearest on an edge.
+        """
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        normal = self.normals
+        squares = np.maximum(np.square(normal).sum(axis=1, keepdims=True), 1e-300)
+        foot = place - ((place - a) * normal).sum(axis=1, keepdims=True) / squares * normal
+        is_inside = np.ones(len(a), dtype=bool)
+        found = [foot]
+        for start, end in ((a, b), (b, c), (c, a)):
+            edge = end - start
+            is_inside &= (np.cross(edge, foot - start) * normal).sum(axis=1) >= 0
+            length = np.maximum(np.square(edge).sum(axis=1, keepdims=True), 1e-300)
+            share = ((place - start) * edge).sum(axis=1, keepdims=True) / length
+            found.append(start + np.clip(share, 0, 1) * edge)
+        away = np.square(np.stack(found) - place).sum(axis=2)
+        away[0, ~is_inside] = np.inf
+        kind, k = np.unravel_index(int(np.argmin(away)), away.shape)
+        return int(k), found[int(kind)][k]
+
+
+@dataclass(frozen=True)
+class EitherPlaces:
+    """Places of several kinds: on rails, or on surfaces."""
+
+    parts: Sequence[Places]
+
+    def nearest(self, place: Doubles) -> Doubles:
+        """Return the nearest place of any kind."""
+        return self._part(place)[1]
+
+    def tangents(self, place: Doubles) -> Doubles:
+        """Return what the nearest kind says."""
+        return self._part(place)[0].tangents(place)
+
+    def random(self, count: int, rng: np.random.Generator) -> Doubles:
+        """Return as many places of each kind."""
+        each = -(-count // len(self.parts))
+        return np.concatenate([part.random(each, rng) for part in self.parts])
+
+    def _part(self, place: Doubles) -> tuple[Places, Doubles]:
+        found = [(part, part.nearest(place)) for part in self.parts]
+        return min(found, key=lambda its: float(np.linalg.norm(its[1] - place)))

@@ -1,0 +1,187 @@
+"""Better places of lights: what was moved, what was added, and what it gives."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import RGB
+from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
+from lightpaint.keywords import keywords
+from lightpaint.placement.free_space import as_position
+from lightpaint.scene.lights.new_emitter import NewEmitter
+from lightpaint.scene.properties.pose import Pose, Site
+from lightpaint.scene.scene import Scene
+
+#: What a painter can do about a place that the picture hardly tells.
+HARDLY_VISIBLE = "hardly visible from here: paint a second view"
+
+
+@keywords()
+@dataclass(frozen=True)
+class Move:
+    """A move of a light that is worth it.
+
+    Attributes:
+        name: The light.
+        old: Its place, direction and cone before.
+        new: The same after the move.
+        gain_share: The share of what was missed that it gives, beside the other changes.
+        place_error: Standard error of its place, in units of the scene; None if it did not slide.
+        turn_error: The same of its direction, in degrees; None if it has none.
+        is_hardly_visible: Whether the picture hardly tells where it is.
+
+    Examples:
+        >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
+        >>> placement = lp.place(scene, basis, solution, {"bulb": lp.Freedom(within=0.5)})
+        >>> all(move.gain_share > 0 for move in placement.moves)
+        True
+    """
+
+    name: str
+    old: Site
+    new: Site
+    gain_share: float
+    place_error: float | None = None
+    turn_error: float | None = None
+    is_hardly_visible: bool = False
+
+    @property
+    def distance(self) -> float:
+        """Distance that it slid, in units of the scene."""
+        if self.old.position is None or self.new.position is None:
+            return 0.0
+        return math.dist(self.old.position, self.new.position)
+
+    @property
+    def turn(self) -> float:
+        """Degrees that it turned."""
+        if self.old.direction is None or self.new.direction is None:
+            return 0.0
+        cosine = float(np.dot(self.old.direction, self.new.direction))
+        return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
+
+    @property
+    def pose(self) -> Pose:
+        """The change as a pose."""
+        new, slid = self.new, self.distance > 0
+        place = np.array(new.position or (0.0, 0.0, 0.0))
+        turned = self.turn > 0 or slid
+        target = None if new.direction is None else as_position(place + np.array(new.direction))
+        return Pose(
+            position=new.position if slid else None,
+            target=target if turned else None,
+            cutoff=new.cutoff if new.cutoff != self.old.cutoff else None,
+            beam=new.beam if new.beam != self.old.beam else None,
+        )
+
+    def __str__(self) -> str:
+        done = []
+        if self.turn >= 0.5:
+            done.append(f"turned by {self.turn:.0f}°")
+        if self.distance > 0:
+            done.append(f"slid by {self.distance:.2g}")
+        if self.new.cutoff is not None and self.new.cutoff != self.old.cutoff:
+            done.append(f"cone {self.old.cutoff:.0f}° to {self.new.cutoff:.0f}°")
+        gain = f"{self.gain_share:.0%} of what was missed"
+        return _with_advice(f"{self.name}: {', '.join(done)}: {gain}", self)
+
+
+@keywords()
+@dataclass(frozen=True)
+class AddedLight:
+    """A new light that is worth it.
+
+    Attributes:
+        emitter: The light: its name, kind, place and emission.
+        gain_share: The share of what was missed that it gives, beside the other changes.
+        place_error: Standard error of its place, in units of the scene.
+        turn_error: The same of its direction, in degrees; None if it has none.
+        is_hardly_visible: Whether the picture hardly tells where it is.
+        seen_at: Its place in the first picture, from (0, 0) top left to (1, 1); None if outside.
+
+    Examples:
+        >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
+        >>> new = [lp.NewLights("point", count=1)]
+        >>> [x.name for x in lp.place(scene, basis, solution, new=new).additions]
+        []
+    """
+
+    emitter: NewEmitter
+    gain_share: float
+    place_error: float | None = None
+    turn_error: float | None = None
+    is_hardly_visible: bool = False
+    seen_at: tuple[float, float] | None = None
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.emitter.name
+
+    @property
+    def site(self) -> Site:
+        """Its place, direction and cone."""
+        return self.emitter.site
+
+    @property
+    def flux(self) -> RGB:
+        """Watts that it radiates per channel, if a unit of the scene is a metre.
+
+        Of a panel it is surer than size and radiance: a small bright one far away looks much the
+        same.
+        """
+        light, site = self.emitter, self.site
+        if light.kind == "panel":
+            assert light.size is not None
+            unit = lambertian_flux(light.size[0] * light.size[1])
+        elif light.kind == "spot":
+            unit = spot_flux(*(math.radians(angle or 0.0) for angle in (site.cutoff, site.beam)))
+        else:
+            unit = point_flux()
+        r, g, b = (unit * amount for amount in light.emission)
+        return r, g, b
+
+    def __str__(self) -> str:
+        x, y, z = self.site.position or (0.0, 0.0, 0.0)
+        gain = f"{self.gain_share:.0%} of what was missed"
+        text = f"{self.name}: a new {self.emitter.kind} at ({x:.2f}, {y:.2f}, {z:.2f}): {gain}"
+        return _with_advice(text, self)
+
+
+def _with_advice(text: str, change: Move | AddedLight) -> str:
+    return f"{text}; {HARDLY_VISIBLE}" if change.is_hardly_visible else text
+
+
+@keywords()
+@dataclass(frozen=True)
+class Placement:
+    """Better places of lights.
+
+    Attributes:
+        scenes: The scene with these, through the sensor of each view, for bases and a solve of
+            their own.
+        moves: Those worth it, the one that gives most first; none if no move surely gives a
+            hundredth of what is missed.
+        additions: New lights worth it, the same way.
+        missed_before: The share of ‖Ψ‖² that the solve misses, estimated on paths that no place was
+            fitted to.
+        missed_after: The same with the moves and additions.
+
+    Examples:
+        >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
+        >>> placement = lp.place(scene, basis, solution, {"bulb": lp.Freedom(within=0.5)})
+        >>> placement.missed_after <= placement.missed_before
+        True
+    """
+
+    scenes: tuple[Scene, ...]
+    moves: tuple[Move, ...]
+    additions: tuple[AddedLight, ...]
+    missed_before: float
+    missed_after: float
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of the first view."""
+        return self.scenes[0]

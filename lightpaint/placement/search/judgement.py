@@ -1,0 +1,152 @@
+"""Which moves and new lights are worth it, and how sure their places are.
+
+Weights are fitted along some paths and judged along others, which no pose was fitted to. Places are
+fitted once more along each set of other paths; their spread is the error bar, for the slope of what
+is missed alone would promise too much.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Doubles, Floats
+from lightpaint.placement.movable import Arrangement, all_sites, by_column
+from lightpaint.placement.placement_fit import PlacementFit
+from lightpaint.placement.search.new_light_search import SURE, WORTH, standard_error
+from lightpaint.placement.search.pose_steps import PoseSteps
+from lightpaint.placement.view_paths import SearchPaths, ViewPaths
+from lightpaint.scene.properties.pose import Site
+
+#: Steps of a fit along other paths, and the share of the first differences that they begin with.
+REFIT_STEPS, REFIT_SHARE = 5, 0.5
+
+
+@dataclass(frozen=True)
+class Found:
+    """An arrangement that is worth it.
+
+    arrangement: with its moves and new lights; what is not worth a move stays where it was. gains:
+    the share of what was missed that each movable gives, beside the others; 0 without a move.
+    before, after: what is missed, as a share of ‖Ψ‖², on paths that no pose was fitted to.
+    """
+
+    arrangement: Arrangement
+    gains: tuple[float, ...]
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """Standard errors of a pose: of its place, in units of the scene, and of its direction.
+
+    Degrees; None for what has none, or does not change.
+    """
+
+    place: float | None
+    turn: float | None
+
+
+class Judgement:
+    """A judge of arrangements."""
+
+    def __init__(self, fit: PlacementFit, steps: PoseSteps, paths: SearchPaths) -> None:
+        self._fit, self._steps, self._paths = fit, steps, paths
+
+    def judged(self, start: Arrangement, found: Arrangement) -> Found:
+        """Return what is worth it of `found`, whose first movables are those of `start`."""
+        movables, there = found.movables, len(start.movables)
+        alternatives = [
+            self._changes(start, found, at) for at in (self._paths.refine, self._paths.judge)
+        ]
+
+        def missed(changed: Bools) -> Doubles:
+            """Return what is missed with some of the changes, (2, p).
+
+            By the paths that the weights are fitted on, and by the others.
+            """
+            columns = []
+            for old, new in alternatives:
+                its = self._fit.columns.copy()
+                for k, movable in enumerate(movables):
+                    for column in movable.columns:
+                        its[column] = new[column] if changed[k] else old.get(column, 0)
+                columns.append(its)
+            weights = self._fit.fitted(columns[0]).weights
+            return np.stack([self._fit.missed_map(its, weights) for its in columns])
+
+        moved = [k >= there or x != start.sites[k] for k, x in enumerate(found.sites)]
+        changed = np.array(moved, dtype=bool)
+        before = missed(np.zeros(len(movables), dtype=bool))
+        total, gains = float(before[1].sum()), np.zeros(len(movables))
+        after = missed(changed)
+        while changed.any():
+            lost = {}
+            for k in np.flatnonzero(changed):
+                without = changed.copy()
+                without[k] = False
+                lost[int(k)] = missed(without) - after
+                gains[k] = float(lost[int(k)][1].sum()) / max(total, 1e-300)
+            least = min(lost, key=lambda k: gains[k])
+            if gains[least] * total >= max(WORTH * total, SURE * standard_error(lost[least])):
+                break
+            changed[least], gains[least] = False, 0.0
+            after = missed(changed)
+        norm2 = self._fit.norm2 or 1.0
+        return Found(
+            self._kept(start, found, changed),
+            tuple(gains[(np.arange(len(movables)) < there) | changed].tolist()),
+            total / norm2,
+            float(after[1].sum()) / norm2,
+        )
+
+    def errors(self, found: Arrangement) -> list[PoseError]:
+        """Return how far each pose differs between fits along independent paths."""
+        fits = [found.sites]
+        for at in (self._paths.judge, self._paths.spread):
+            start = self._steps.refitted(found, at)
+            its = self._steps.descend(start, at, REFIT_STEPS, first_share=REFIT_SHARE)
+            fits.append(its.sites)
+        return [
+            _error([sites[k] for sites in fits], found.movables[k].light.freedom.slides)
+            for k in range(len(found.movables))
+        ]
+
+    def _changes(
+        self, start: Arrangement, found: Arrangement, at: ViewPaths
+    ) -> tuple[dict[int, Floats], dict[int, Floats]]:
+        """Return columns before and after, by their indices."""
+        made = []
+        for its in (start, found):
+            columns = at.columns(all_sites(its.movables, its.sites))
+            made.append(dict(by_column(its.movables, columns)))
+        return made[0], made[1]
+
+    def _kept(self, start: Arrangement, found: Arrangement, changed: Bools) -> Arrangement:
+        """Return `found` without what has not changed."""
+        kept, sites = [], []
+        for k, (movable, site) in enumerate(zip(found.movables, found.sites, strict=True)):
+            if changed[k]:
+                kept.append(movable)
+                sites.append(site)
+            elif k < len(start.movables):
+                kept.append(movable)
+                sites.append(start.sites[k])
+        fitted = self._steps.fitted(kept, sites, self._paths.refine)
+        return Arrangement(tuple(kept), tuple(sites), fitted)
+
+
+def _error(sites: Sequence[Site], slides: bool) -> PoseError:
+    """Return the spread of the poses of one light in several fits."""
+    place = turn = None
+    if slides and sites[0].position is not None:
+        places = np.array([site.position for site in sites], dtype=float)
+        place = float(np.sqrt(np.square(places - places.mean(axis=0)).sum() / (len(sites) - 1)))
+    if sites[0].direction is not None:
+        axes = np.array([site.direction for site in sites], dtype=float)
+        mean = axes.mean(axis=0) / max(float(np.linalg.norm(axes.mean(axis=0))), 1e-12)
+        angles = np.arccos(np.clip(axes @ mean, -1, 1))
+        turn = math.degrees(math.sqrt(float(np.square(angles).sum()) / (len(sites) - 1)))
+    return PoseError(place, turn)

@@ -1,0 +1,194 @@
+"""The search for new lights: the best place for one more, then all of them moved together.
+
+This is the sliding Frank-Wolfe method (Denoyelle et al. 2019): weights are never searched for, the
+convex solve gives them. Each new light is judged on paths that it was not fitted to, for of many
+candidates some seem to help by their noise alone.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.placement.movable import Arrangement, Movable
+from lightpaint.placement.search.pose_search import SHORT_STEPS, PoseSearch
+from lightpaint.scene.properties.pose import Site
+
+#: Least gain of a new light, as a share of what is missed, and in standard errors.
+WORTH, SURE = 0.01, 3.0
+
+#: Least fall of what is missed for which a new light goes elsewhere once all are there.
+WORTH_AGAIN = 0.05
+
+#: Steps of all lights together, after each one that is added.
+STEPS = 6
+
+#: Weight, relative to the largest, below which a light is off.
+OFF = 1e-6
+
+#: Most rise of what is missed for which two lights near each other become one.
+MERGED_RISE = 0.03
+
+#: Distance of lights that may be one, relative to the spread of visible points.
+MERGED_DISTANCE = 0.5
+
+#: Share of ‖Ψ‖² that counts as nothing.
+NOTHING = 1e-4
+
+
+class NewLightSearch:
+    """A search for lights to add.
+
+    Args:
+        search: Of poses.
+        slots: New lights that may be added; those of one group are alike.
+    """
+
+    def __init__(self, search: PoseSearch, slots: Sequence[Movable]) -> None:
+        self._search, self._free = search, list(slots)
+        self._fit, self._steps, self._paths = search.fit, search.steps, search.paths
+
+    def run(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
+        """Return an arrangement with the new lights that are worth it."""
+        found = start
+        while self._free and found.missed > NOTHING * self._fit.norm2:
+            more = self._with_one_more(found)
+            progress()
+            if more is None or not self._is_worth(found, more):
+                break
+            added = more.movables[-1]
+            self._free = [slot for slot in self._free if slot.columns != added.columns]
+            found = self._steps.descend(more, self._paths.compare, STEPS, first_share=0.5)
+            found = self._without_off(found)
+        return self._merged(self._tried_again(found))
+
+    def _tried_again(self, found: Arrangement) -> Arrangement:
+        """Return the arrangement after each new light was tried elsewhere, beside the others."""
+        for k, movable in enumerate(found.movables):
+            if movable.group is None or found.missed <= NOTHING * self._fit.norm2:
+                continue
+            better = self._search.tried(found, k)
+            if better.missed < (1 - WORTH_AGAIN) * found.missed:
+                found = self._steps.descend(better, self._paths.compare, STEPS, first_share=0.5)
+        return found
+
+    def _with_one_more(self, found: Arrangement) -> Arrangement | None:
+        """Return the arrangement with the best light added, the others where they are."""
+        kinds: list[Movable] = []
+        for slot in self._free:
+            if all(slot.group is not kind.group for kind in kinds):
+                kinds.append(slot)
+        best: Arrangement | None = None
+        for j, its in self._search.candidates(found, kinds).items():
+            for site, fitted in its:
+                more = found.with_movable(kinds[j], site, fitted)
+                last = len(more.movables) - 1
+                more = self._steps.descend(more, self._paths.compare, SHORT_STEPS, moving=[last])
+                if best is None or more.missed < best.missed:
+                    best = more
+        return best
+
+    def _is_worth(self, before: Arrangement, after: Arrangement) -> bool:
+        """Return whether the last light gains enough on paths that nothing was fitted to."""
+        if after.missed >= before.missed:
+            return False
+        maps = []
+        for its in (before, after):
+            judged = self._steps.fitted(its.movables, its.sites, self._paths.judge)
+            fitted = its.fitted
+            maps.append(
+                [
+                    self._fit.missed_map(columns, fitted.weights)
+                    for columns in (fitted.columns, judged.columns)
+                ]
+            )
+        gain = np.array(maps[0]) - np.array(maps[1])
+        least = max(
+            WORTH * float(maps[0][1].sum()),
+            SURE * standard_error(gain),
+            NOTHING * self._fit.norm2,
+        )
+        # Noise of the painting, which no other paths can tell, is that of single pixels.
+        return float(gain[1].sum() - gain[1].max()) >= least
+
+    def _without_off(self, found: Arrangement) -> Arrangement:
+        """Return the arrangement without new lights that are off, whose slots are free again."""
+        weights = found.fitted.weights
+        for k in reversed(range(len(found.movables))):
+            movable = found.movables[k]
+            its = weights[list(movable.columns)]
+            if movable.group is not None and its.max() <= OFF * weights.max():
+                self._free.insert(0, movable)
+                found = found.without(k, self._fit.fitted(self._blackened(found, k)))
+        return found
+
+    def _blackened(self, found: Arrangement, k: int) -> Floats:
+        columns = found.fitted.columns.copy()
+        columns[list(found.movables[k].columns)] = 0
+        return columns
+
+    def _merged(self, found: Arrangement) -> Arrangement:
+        """Return the arrangement with lights that stand for one light made one."""
+        while (pair := self._nearest_pair(found)) is not None:
+            one, other = pair
+            merged = self._one_for_two(found, one, other)
+            if merged.missed > (1 + MERGED_RISE) * found.missed + NOTHING * self._fit.norm2:
+                break
+            self._free.insert(0, found.movables[other])
+            found = merged
+        return found
+
+    def _one_for_two(self, found: Arrangement, one: int, other: int) -> Arrangement:
+        level = found.fitted.weights.mean(axis=1)
+        a, b = (max(float(level[found.movables[k].columns[0]]), 1e-300) for k in (one, other))
+        site = _between(found.sites[one], found.sites[other], b / (a + b))
+        movable = found.movables[one]
+        sites = list(found.sites)
+        sites[one] = movable.light.permitted(site)
+        movables = [m for k, m in enumerate(found.movables) if k != other]
+        del sites[other]
+        fitted = self._steps.fitted(movables, sites, self._paths.compare)
+        made = Arrangement(tuple(movables), tuple(sites), fitted)
+        return self._steps.descend(made, self._paths.compare, STEPS, first_share=0.5)
+
+    def _nearest_pair(self, found: Arrangement) -> tuple[int, int] | None:
+        """Return the nearest two new lights of one group that may be one, or None."""
+        best, nearest = None, MERGED_DISTANCE * self._search.spread
+        for k, movable in enumerate(found.movables):
+            for j in range(k):
+                if movable.group is None or movable.group is not found.movables[j].group:
+                    continue
+                places = [np.array(found.sites[i].position, dtype=float) for i in (k, j)]
+                away = float(np.linalg.norm(places[0] - places[1]))
+                if away < nearest:
+                    best, nearest = (j, k), away
+        return best
+
+
+def _between(one: Site, other: Site, share: float) -> Site:
+    """Return the pose between two. share: of the other."""
+
+    def mixed(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
+        x, y, z = ((1 - share) * p + share * q for p, q in zip(a, b, strict=True))
+        return x, y, z
+
+    assert one.position is not None
+    assert other.position is not None
+    made = replace(one, position=mixed(one.position, other.position))
+    if one.direction is None or other.direction is None:
+        return made
+    way = np.array(mixed(one.direction, other.direction))
+    length = float(np.linalg.norm(way))
+    if length < 1e-6:
+        return made
+    x, y, z = (way / length).tolist()
+    return replace(made, direction=(x, y, z))
+
+
+def standard_error(differences: Doubles) -> float:
+    """Return the standard error of a sum over pixels, (2, p): by how much two sets of paths differ.
+
+    They share what is signal, and have independent noise at each pixel.
+    """
+    return float(np.sqrt(np.square(differences[0] - differences[1]).sum() / 2))

@@ -1,0 +1,102 @@
+"""Poses all over a light's freedom, ranked by the direct light that they give.
+
+The sums that a ranking needs are inner products over visible points, so one matrix product serves
+all directions and cones of a light at one place, whose shadow rays they share.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.free_space import as_position
+from lightpaint.placement.frozen_paths import PanelSite, away_from
+from lightpaint.placement.placement_fit import Ranking
+from lightpaint.placement.view_paths import ViewPaths
+from lightpaint.scene.properties.pose import Site
+from lightpaint.threads import one_thread
+
+#: Degrees between directions, and number of cones.
+APART, CONES = 20.0, 3
+
+#: One of so many first hits counts.
+THINNING = 2
+
+
+class PoseCandidates:
+    """Candidates along few first hits. ranking: on all pixels, without the light in question."""
+
+    def __init__(self, paths: ViewPaths, ranking: Ranking) -> None:
+        self._paths = paths
+        # Half of the first hits are enough to rank by.
+        self._points = np.ascontiguousarray(paths.points[::THINNING])
+        its = ranking.at(paths.indices()[::THINNING])
+        self._ranking, self._root = its, its.root.astype(np.float32)
+        # For each channel: residual and columns of others, weighed twice, (1 + others, v).
+        self._weighed = [
+            np.concatenate([its.residual[None, :, c], its.others[c]]).astype(np.float32)
+            * self._root[:, c]
+            for c in range(3)
+        ]
+
+    def gains(self, light: FreeLight, places: Floats) -> Iterator[tuple[Doubles, list[Site]]]:
+        """Yield the gains of poses at each place, (k,), with these poses."""
+        if light.site.position is None:
+            yield from self._suns(light)
+            return
+        directions, cones = light.directions(APART), light.cones(CONES)
+        for place in places:
+            here = replace(light.site, position=as_position(place))
+            added = self._paths.contributions(Site(here.position))[::THINNING]
+            if light.site.direction is None:
+                yield self._gains(added, None), [here]
+                continue
+            cosine = directions.astype(np.float32) @ away_from(place, self._points).T
+            if isinstance(here, PanelSite):
+                # Seen from afar a panel is a point whose light falls with the cosine.
+                gains = self._gains(added * here.side**2, np.maximum(cosine, 0))
+                yield gains, [replace(here, direction=as_position(d)) for d in directions]
+                continue
+            angle = np.degrees(np.arccos(np.clip(cosine, -1, 1, out=cosine)))
+            for cutoff, beam in cones.tolist():
+                share = (np.float32(cutoff) - angle) * np.float32(1 / max(cutoff - beam, 1e-6))
+                opened = replace(here, cutoff=cutoff, beam=beam)
+                sites = [replace(opened, direction=as_position(d)) for d in directions]
+                yield self._gains(added, np.clip(share, 0, 1, out=share)), sites
+
+    def _suns(self, light: FreeLight) -> Iterator[tuple[Doubles, list[Site]]]:
+        sites = [replace(light.site, direction=as_position(d)) for d in light.directions(APART / 2)]
+        for site in sites:
+            yield self._gains(self._paths.contributions(site)[::THINNING], None), [site]
+
+    def _gains(self, added: Floats, shares: Floats | None) -> Doubles:
+        """Return gains of what is added at first hits, (v, 3), by shares of it, (k, v)."""
+        inner = [self._weighed[c] * added[:, c] for c in range(3)]
+        power = np.square(added * self._root)
+        if shares is None:
+            products, squares = np.concatenate(inner).sum(axis=1)[None], power.sum(axis=0)[None]
+        else:
+            with one_thread():
+                products = shares @ np.concatenate(inner).T
+                squares = np.square(shares) @ power
+        gains, start = np.zeros(len(products)), 0
+        for c in range(3):
+            its = products[:, start : start + len(inner[c])]
+            start += len(inner[c])
+            gains += self._ranking.gain(c, its[:, 0], its[:, 1:], squares[:, c])
+        return gains
+
+
+def best_poses(
+    found: Iterator[tuple[Doubles, Sequence[Site]]], count: int
+) -> list[tuple[float, Site]]:
+    """Return the `count` poses with the largest gains, the best first."""
+    best: list[tuple[float, Site]] = []
+    for gains, sites in found:
+        order = np.argsort(-gains)[:count]
+        best += [(float(gains[k]), sites[k]) for k in order if gains[k] > 0]
+        if len(best) > 4 * count:
+            best = sorted(best, key=lambda its: -its[0])[:count]
+    return sorted(best, key=lambda its: -its[0])[:count]

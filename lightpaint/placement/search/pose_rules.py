@@ -1,0 +1,65 @@
+"""What poses have to keep to besides the freedom of each light: free space, distance, view."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Floats
+from lightpaint.placement.movable import Movable
+from lightpaint.placement.view_paths import SearchPaths
+from lightpaint.scene.properties.pose import Site
+
+
+class PoseRules:
+    """Rules about where lights may hang. paths: those of the search."""
+
+    def __init__(self, paths: SearchPaths) -> None:
+        self._paths = paths
+
+    def permit(self, movables: Sequence[Movable], sites: Sequence[Site]) -> bool:
+        """Return whether new lights are clear of surfaces, apart, and out of view if asked."""
+        for k, (movable, site) in enumerate(zip(movables, sites, strict=True)):
+            group = movable.group
+            if group is None or site.position is None:
+                continue
+            place = np.array([site.position])
+            if movable.light.freedom.surfaces is None and not self._paths.clear(place).all():
+                return False
+            others = range(len(movables))
+            rest = [j for j in others if j != k]
+            if (
+                group.apart
+                and not self.keep_apart(
+                    [movables[j] for j in rest], [sites[j] for j in rest], movable, place
+                ).all()
+            ):
+                return False
+            if not group.in_view and self._paths.in_view(place).any():
+                return False
+        return True
+
+    def usable(self, movable: Movable, places: Floats) -> Bools:
+        """Return which places, (k,), are free, see the picture and are seen as the light may be."""
+        clear = movable.light.freedom.clear
+        # What hangs on a surface is as near to it as was asked for.
+        its = self._paths.usable(places, None if clear is None else 0.9 * clear)
+        if movable.group is not None and not movable.group.in_view:
+            its &= ~self._paths.in_view(places)
+        return its
+
+    def keep_apart(
+        self,
+        movables: Sequence[Movable],
+        sites: Sequence[Site],
+        movable: Movable,
+        places: Floats,
+    ) -> Bools:
+        """Return which places, (k,), are far enough from the other new lights of its group."""
+        kept = np.ones(len(places), dtype=bool)
+        if movable.group is None or not movable.group.apart:
+            return kept
+        for other, site in zip(movables, sites, strict=True):
+            if other.group == movable.group and site.position is not None:
+                away = np.linalg.norm(places - np.array(site.position), axis=1)
+                kept &= away >= movable.group.apart
+        return kept

@@ -1,0 +1,172 @@
+"""The search for better poses of lights: by blocks first, then all together.
+
+A descent alone cannot turn a beam that misses what it should light: there is no slope. So each free
+light in turn is tried at places, directions and cones all over its freedom, ranked by direct light
+and compared by all light; then Gauss-Newton steps move all of them at once, their weights
+eliminated. Every comparison is of the same frozen paths, so its noise cancels.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Floats
+from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
+from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
+from lightpaint.placement.search.pose_candidates import PoseCandidates, best_poses
+from lightpaint.placement.search.pose_rules import PoseRules
+from lightpaint.placement.search.pose_steps import PoseSteps
+from lightpaint.placement.view_paths import SearchPaths
+from lightpaint.scene.properties.pose import Site
+
+#: Places that each light is tried at, if all of them are along lines, and if not.
+PLACES_ON_LINES, PLACES = 24, 64
+
+#: Places near which more are tried, and how many.
+BESIDE, AROUND = 6, 8
+
+#: Most turns of each light, and the share by which one has to lower what is missed for another.
+TURNS, WORTH_A_TURN = 2, 0.15
+
+#: Candidates that all light is computed for; those of them that are refined, far from each other
+#: in place or direction; and the steps of that.
+COMPARED, REFINED, SHORT_STEPS = 32, 3, 3
+
+#: Closest two refined candidates, relative to the spread of visible points, and in degrees.
+NEAREST, NARROWEST = 0.15, 25.0
+
+#: Least fall of what is missed that a trial is kept for.
+KEPT_GAIN = 0.005
+
+
+class PoseSearch:
+    """A search for the poses of lights.
+
+    Args:
+        fit: The goal, and the columns of all lights.
+        paths: To search along.
+        rules: What poses have to keep to besides the freedom of each light.
+        seed: Of the places that are tried.
+    """
+
+    def __init__(
+        self, fit: PlacementFit, paths: SearchPaths, rules: PoseRules, *, seed: int
+    ) -> None:
+        self.fit, self.paths, self.rules = fit, paths, rules
+        self.spread = paths.space.spread or 1.0
+        self.steps = PoseSteps(fit, self.spread, rules.permit)
+        self._rng = np.random.default_rng(seed)
+
+    def by_blocks(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
+        """Return an arrangement in which each light was tried all over its freedom."""
+        found = start
+        for _ in range(TURNS):
+            before = found.missed
+            for k in range(len(found.movables)):
+                found = self.tried(found, k)
+                progress()
+            if found.missed > (1 - WORTH_A_TURN) * before:
+                break
+        return found
+
+    def tried(self, start: Arrangement, k: int) -> Arrangement:
+        """Return the arrangement with the best pose of movable `k`, the others where they are."""
+        movable = start.movables[k]
+        black = dict.fromkeys(movable.columns, 0 * start.fitted.columns[0])
+        others = self.fit.fitted(with_columns(start.fitted.columns, black))
+        best = start
+        for site, fitted in self.candidates(start.without(k, others), [movable]).get(0, []):
+            moved = self.steps.descend(
+                start.with_site(k, site, fitted), self.paths.compare, SHORT_STEPS, moving=[k]
+            )
+            best = min(best, moved, key=lambda its: its.missed)
+        return best if best.missed < (1 - KEPT_GAIN) * start.missed else start
+
+    def candidates(
+        self, others: Arrangement, movables: Sequence[Movable]
+    ) -> dict[int, list[tuple[Site, Fitted]]]:
+        """Return the most promising poses of lights that are not in `others`, the best first.
+
+        By the place of each in `movables`, a few of them all together, with the best lighting.
+        """
+        ranking = self.fit.ranking(others.fitted)
+        direct = PoseCandidates(self.paths.rank, ranking)
+        poses: list[tuple[float, Site, int]] = []
+        for j, movable in enumerate(movables):
+            places = self._places(others, movable)
+            found = best_poses(direct.gains(movable.light, places), COMPARED)
+            if len(places) > 1:
+                beside = self._places_beside(others, movable, places, found)
+                nearer = best_poses(direct.gains(movable.light, beside), COMPARED // 2)
+                # Some of both: direct light makes much of places that are close to one hit.
+                found = [*found[: COMPARED - len(nearer)], *nearer]
+            poses += [(gain, site, j) for gain, site in found]
+        poses = sorted(poses, key=lambda its: -its[0])[:COMPARED]
+        trials: list[tuple[float, Site, int, Fitted]] = []
+        for _, site, j in poses:
+            fitted = self._fitted_with(others, movables[j], site)
+            trials.append((fitted.missed, site, j, fitted))
+        kept: list[tuple[float, Site, int, Fitted]] = []
+        for trial in sorted(trials, key=lambda its: its[0]):
+            if all(self._differ(trial[1], other) for _, other, _, _ in kept):
+                kept.append(trial)
+        made: dict[int, list[tuple[Site, Fitted]]] = {}
+        for _, site, j, fitted in kept[:REFINED]:
+            made.setdefault(j, []).append((site, fitted))
+        return made
+
+    def _fitted_with(self, others: Arrangement, movable: Movable, site: Site) -> Fitted:
+        columns = self.paths.compare.columns(all_sites([movable], [site]))
+        return self.fit.fitted(with_columns(others.fitted.columns, by_column([movable], columns)))
+
+    def _places(self, others: Arrangement, movable: Movable) -> Floats:
+        """Return places to try a light at: those that are free, and where it hangs now."""
+        light = movable.light
+        if light.site.position is None or not light.freedom.slides:
+            return light.some_places(1, self._rng)
+        count = PLACES_ON_LINES if light.freedom.all_rails else PLACES
+        if movable.group is not None:
+            count = 2 * PLACES
+        places = light.some_places(count, self._rng)
+        its = self._is_permitted(others, movable, places)
+        if movable.group is None:
+            its[0] = True
+        return places[its]
+
+    def _places_beside(
+        self,
+        others: Arrangement,
+        movable: Movable,
+        places: Floats,
+        found: Sequence[tuple[float, Site]],
+    ) -> Floats:
+        """Return more places around the best of those that were tried, nearer than the next."""
+        assert movable.light.places is not None
+        best: list[Floats] = []
+        for _, site in found:
+            place = np.array(site.position, dtype=float)
+            if all(np.abs(place - other).max() > 0 for other in best) and len(best) < BESIDE:
+                best.append(place)
+        around = []
+        for place in best:
+            away = np.linalg.norm(places - place, axis=1)
+            radius = float(np.min(away[away > 0], initial=self.spread))
+            off = self._rng.normal(size=(AROUND, 3))
+            off *= radius * self._rng.random((AROUND, 1)) / np.linalg.norm(off, axis=1)[:, None]
+            around += [movable.light.places.nearest(place + x) for x in off]
+        made = np.array(around, dtype=float).reshape(-1, 3)
+        return made[self._is_permitted(others, movable, made)]
+
+    def _is_permitted(self, others: Arrangement, movable: Movable, places: Floats) -> Bools:
+        its = self.rules.usable(movable, places)
+        return its & self.rules.keep_apart(others.movables, others.sites, movable, places)
+
+    def _differ(self, one: Site, other: Site) -> bool:
+        here, there = (one.position or (0.0, 0.0, 0.0)), (other.position or (0.0, 0.0, 0.0))
+        if math.dist(here, there) > NEAREST * self.spread:
+            return True
+        if one.direction is None or other.direction is None:
+            return False
+        cosine = float(np.dot(one.direction, other.direction))
+        return cosine < math.cos(math.radians(NARROWEST))

@@ -1,0 +1,170 @@
+"""Gauss-Newton steps of several lights' poses, their weights eliminated."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Floats
+from lightpaint.placement.free_light import FreeLight
+from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
+from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
+from lightpaint.placement.view_paths import ViewPaths
+from lightpaint.scene.properties.pose import Site
+
+#: Lengths of a step, in those of its differences, that no number exceeds at once.
+TRUST = 6.0
+
+#: Ridge of the first trial of a step, relative to the diagonal, and by how much it grows for the
+#: next; and the trials.
+RIDGE, RIDGE_GROWTH, TRIALS = 1e-2, 6.0, 5
+
+#: Length of the first differences, relative to the spread of visible points; the share of it that
+#: the last have; and by how much they shorten after a step that helped, or one that hardly did.
+FIRST_STEP, LAST_SHARE, SHORTER, MUCH_SHORTER = 0.04, 0.15, 0.6, 0.4
+
+#: Share of what is missed below which a step hardly helped.
+HARDLY = 1e-4
+
+
+class PoseSteps:
+    """Steps of arrangements.
+
+    Args:
+        fit: The goal, and the columns of lights that stay.
+        spread: Median distance of visible points from their middle.
+        permits: Whether movables may have these poses together.
+    """
+
+    def __init__(
+        self,
+        fit: PlacementFit,
+        spread: float,
+        permits: Callable[[Sequence[Movable], Sequence[Site]], bool],
+    ) -> None:
+        self._fit, self._permits = fit, permits
+        self.first_step = FIRST_STEP * spread
+        self._unit = spread / 3
+
+    def fitted(self, movables: Sequence[Movable], sites: Sequence[Site], at: ViewPaths) -> Fitted:
+        """Return the best lighting with these poses."""
+        columns = at.columns(all_sites(movables, sites))
+        return self._fit.fitted(self._fit.replaced(by_column(movables, columns)))
+
+    def refitted(self, arrangement: Arrangement, at: ViewPaths) -> Arrangement:
+        """Return an arrangement along other paths."""
+        its = arrangement
+        return Arrangement(its.movables, its.sites, self.fitted(its.movables, its.sites, at))
+
+    def descend(
+        self,
+        arrangement: Arrangement,
+        at: ViewPaths,
+        steps: int,
+        *,
+        moving: Sequence[int] | None = None,
+        first_share: float = 1.0,
+        is_central: bool = False,
+        progress: Callable[[], None] = lambda: None,
+    ) -> Arrangement:
+        """Return the arrangement after at most so many steps; see `step`.
+
+        first_share: of `first_step` that the first differences have.
+        """
+        step, last = first_share * self.first_step, LAST_SHARE * self.first_step
+        for _ in range(steps):
+            before = arrangement.missed
+            arrangement = self.step(arrangement, at, step, moving=moving, is_central=is_central)
+            progress()
+            share = 1 - arrangement.missed / max(before, 1e-300)
+            if share < HARDLY and step <= last:
+                break
+            step = max((MUCH_SHORTER if share < HARDLY else SHORTER) * step, last)
+        return arrangement
+
+    def step(
+        self,
+        arrangement: Arrangement,
+        at: ViewPaths,
+        step: float,
+        *,
+        moving: Sequence[int] | None = None,
+        is_central: bool = False,
+    ) -> Arrangement:
+        """Return an arrangement that misses less, or itself.
+
+        step: length of the differences. moving: movables that move; None for all. is_central:
+        whether differences are to both sides, which costs twice as much.
+        """
+        every = range(len(arrangement.movables)) if moving is None else moving
+        scales = {
+            k: self._scales(arrangement.movables[k].light, arrangement.sites[k]) for k in every
+        }
+        numbers = [(k, j) for k, its in scales.items() for j in range(len(its))]
+        if not numbers:
+            return arrangement
+        slopes, owners, places = self._slopes(arrangement, at, numbers, scales, step, is_central)
+        matrix, gradient = self._fit.newton(arrangement.fitted, slopes, owners, places)
+        ridge = np.diag(matrix) + 1e-9 * np.trace(matrix) + 1e-300
+        damping = RIDGE
+        for _ in range(TRIALS):
+            change = np.linalg.solve(matrix + damping * np.diag(ridge), gradient)
+            change = change.clip(-TRUST * step, TRUST * step)
+            sites = list(arrangement.sites)
+            for k, scale in scales.items():
+                own = change[[q for q, (owner, _) in enumerate(numbers) if owner == k]]
+                sites[k] = arrangement.movables[k].light.stepped(sites[k], own * scale)
+            if self._permits(arrangement.movables, sites):
+                fitted = self._moved(arrangement, sites, [*scales], at)
+                if fitted.missed < arrangement.missed * (1 - 1e-7):
+                    return Arrangement(arrangement.movables, tuple(sites), fitted)
+            damping *= RIDGE_GROWTH
+        return arrangement
+
+    def _moved(
+        self, arrangement: Arrangement, sites: Sequence[Site], moving: Sequence[int], at: ViewPaths
+    ) -> Fitted:
+        """Return the best lighting with other poses of the `moving`."""
+        movables = [arrangement.movables[k] for k in moving]
+        columns = at.columns(all_sites(movables, [sites[k] for k in moving]))
+        changed = by_column(movables, columns)
+        return self._fit.fitted(with_columns(arrangement.fitted.columns, changed))
+
+    def _slopes(
+        self,
+        arrangement: Arrangement,
+        at: ViewPaths,
+        numbers: Sequence[tuple[int, int]],
+        scales: dict[int, Doubles],
+        step: float,
+        is_central: bool,
+    ) -> tuple[Floats, list[int], list[int]]:
+        """Return slopes of columns (s, p, 3), the index of each one's column and number."""
+        ahead: list[Site] = []
+        back: list[Site] = []
+        owners: list[int] = []
+        places: list[int] = []
+        widths: list[float] = []
+        for q, (k, j) in enumerate(numbers):
+            movable, site = arrangement.movables[k], arrangement.sites[k]
+            one = np.zeros(len(scales[k]))
+            one[j] = step * scales[k][j]
+            there, width = movable.light.stepped(site, one), step
+            if is_central:
+                back += movable.sites(movable.light.stepped(site, -one))
+                width = 2 * step
+            elif there == site:
+                # It stands at a bound: look the other way.
+                there, width = movable.light.stepped(site, -one), -step
+            ahead += movable.sites(there)
+            owners += movable.columns
+            places += [q] * len(movable.columns)
+            widths += [width] * len(movable.columns)
+        slopes = at.columns(ahead)
+        slopes -= at.columns(back) if is_central else arrangement.fitted.columns[owners]
+        slopes /= np.array(widths, np.float32)[:, None, None]
+        return slopes, owners, places
+
+    def _scales(self, light: FreeLight, site: Site) -> Doubles:
+        """Return how much of each number of a pose counts like a scene unit of sliding."""
+        place, turn, cone = light.dimensions(site)
+        return np.array([1.0] * place + [1 / self._unit] * (turn + cone))

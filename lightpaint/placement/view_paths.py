@@ -1,0 +1,120 @@
+"""Frozen paths of all views together: their pixels stand behind each other."""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Bools, Floats, Indices
+from lightpaint.placement.free_space import (
+    CLEARANCE,
+    FreeSpace,
+    free_space,
+    is_clear,
+    seen_by_camera,
+)
+from lightpaint.placement.frozen_paths import FrozenPaths
+from lightpaint.scene.properties.pose import Site
+from lightpaint.scene.scene import Scene
+from lightpaint.scene.scene_render import Stream, pass_seed
+from lightpaint.scene.surfaces import loaded_features
+
+#: First hits of a pixel, and paths that go on: to rank, compare, refine and judge candidates, and
+#: to ask how far places spread.
+SAMPLES = ((1, 0), (9, 2), (36, 8), (36, 8), (36, 8))
+
+
+class ViewPaths:
+    """Frozen paths of views, each on its small film."""
+
+    def __init__(self, parts: Sequence[FrozenPaths]) -> None:
+        self.parts = tuple(parts)
+
+    def columns(self, sites: Sequence[Site]) -> Floats:
+        """Return the images of lights at unit emission, (k, p, 3), p being all pixels."""
+        made = [part.columns(sites) for part in self.parts]
+        return np.concatenate([x.reshape(len(x), math.prod(x.shape[1:3]), 3) for x in made], axis=1)
+
+    def indices(self) -> Indices:
+        """Return the index among all pixels of the pixel of each first hit, (v,)."""
+        starts = np.cumsum([0, *(part.size[0] * part.size[1] for part in self.parts)])
+        its = [part.direct.pixels + start for part, start in zip(self.parts, starts, strict=False)]
+        return np.concatenate(its)
+
+    @cached_property
+    def points(self) -> Floats:
+        """The first hits, (v, 3)."""
+        return np.concatenate([part.points(part.direct) for part in self.parts])
+
+    def contributions(self, site: Site) -> Floats:
+        """Return what a light adds at each first hit, (v, 3), as if it shone all around."""
+        return np.concatenate([part.contributions(part.direct, site) for part in self.parts])
+
+
+class SearchPaths:
+    """All paths of a search, made when they are first asked for.
+
+    Args:
+        views: The scenes on their small films, which differ in the sensor alone.
+        loaded: They, loaded.
+        seed: Of the paths.
+    """
+
+    def __init__(self, views: Sequence[Scene], loaded: Any, *, seed: int) -> None:
+        self._views, self.loaded, self._seed = views, loaded, seed
+        self._features = [loaded_features(view, loaded, seed) for view in views]
+        self.space = FreeSpace.of_views([free_space(view, loaded, seed=seed) for view in views])
+
+    @cached_property
+    def rank(self) -> ViewPaths:
+        """Few first hits, for direct light."""
+        return self._made(0)
+
+    @cached_property
+    def compare(self) -> ViewPaths:
+        """Paths for trials."""
+        return self._made(1)
+
+    @cached_property
+    def refine(self) -> ViewPaths:
+        """Many, for the last steps."""
+        return self._made(2)
+
+    @cached_property
+    def judge(self) -> ViewPaths:
+        """As many, from other random numbers."""
+        return self._made(3)
+
+    @cached_property
+    def spread(self) -> ViewPaths:
+        """As many, from others again."""
+        return self._made(4)
+
+    def in_view(self, places: Floats) -> Bools:
+        """Return which of some places any camera sees, (k,)."""
+        seen = [seen_by_camera(view, self.loaded, places) for view in self._views]
+        return np.asarray(np.any(seen, axis=0))
+
+    def clear(self, places: Floats) -> Bools:
+        """Return which places, (k,), are clear of surfaces."""
+        return is_clear(self.loaded, places, CLEARANCE * self.space.spread)
+
+    def usable(self, places: Floats, clear: float | None = None) -> Bools:
+        """Return which places, (k,), are clear of surfaces and see something of the picture."""
+        return self.space.usable(self.loaded, places, clear)
+
+    def _made(self, k: int) -> ViewPaths:
+        first_hits, bounces = SAMPLES[k]
+        made = []
+        for j, (view, features) in enumerate(zip(self._views, self._features, strict=True)):
+            paths = FrozenPaths(
+                view,
+                self.loaded,
+                first_hits=first_hits,
+                bounces=bounces,
+                seed=pass_seed(self._seed, Stream.FROZEN_PATHS, k + len(SAMPLES) * j),
+            )
+            made.append(paths.filtered_along(features))
+        return ViewPaths(made)
