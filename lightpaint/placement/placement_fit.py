@@ -20,8 +20,9 @@ from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
-from lightpaint.lighting.unknowns.reduction import Reduction, reduce_to
+from lightpaint.lighting.unknowns.reduction import Reduction
 
 #: Share of a column that others cannot replace, below which it counts as none.
 LEAST_OWN = 1e-3

@@ -14,9 +14,9 @@ from lightpaint.scene.properties.pose import Site
 #: Lengths of a step, in those of its differences, that no number exceeds at once.
 TRUST = 6.0
 
-#: Ridge of the first trial of a step, relative to the diagonal, and by how much it grows for the
-#: next; and the trials.
-RIDGE, RIDGE_GROWTH, TRIALS = 1e-2, 6.0, 5
+#: Ridge of the first step, relative to the diagonal; by how much it grows if a trial misses more,
+#: and shrinks after one that helped; the least of it; and the trials of a step.
+RIDGE, RIDGE_GROWTH, RIDGE_SHRINK, LEAST_RIDGE, TRIALS = 1e-2, 6.0, 4.0, 1e-5, 5
 
 #: Length of the first differences, relative to the spread of visible points; the share of it that
 #: the last have; and by how much they shorten after a step that helped, or one that hardly did.
@@ -70,14 +70,18 @@ class PoseSteps:
 
         first_share: of `first_step` that the first differences have.
         """
-        step, last = first_share * self.first_step, LAST_SHARE * self.first_step
+        step, last, ridge = first_share * self.first_step, LAST_SHARE * self.first_step, RIDGE
         for _ in range(steps):
             before = arrangement.missed
-            arrangement = self.step(arrangement, at, step, moving=moving, is_central=is_central)
+            arrangement, ridge = self.step(
+                arrangement, at, step, ridge, moving=moving, is_central=is_central
+            )
             progress()
             share = 1 - arrangement.missed / max(before, 1e-300)
             if share < HARDLY and step <= last:
                 break
+            if share < HARDLY:
+                ridge = RIDGE
             step = max((MUCH_SHORTER if share < HARDLY else SHORTER) * step, last)
         return arrangement
 
@@ -86,11 +90,12 @@ class PoseSteps:
         arrangement: Arrangement,
         at: ViewPaths,
         step: float,
+        ridge: float = RIDGE,
         *,
         moving: Sequence[int] | None = None,
         is_central: bool = False,
-    ) -> Arrangement:
-        """Return an arrangement that misses less, or itself.
+    ) -> tuple[Arrangement, float]:
+        """Return an arrangement that misses less, or itself, and the ridge of the next step.
 
         step: length of the differences. moving: movables that move; None for all. is_central:
         whether differences are to both sides, which costs twice as much.
@@ -101,13 +106,12 @@ class PoseSteps:
         }
         numbers = [(k, j) for k, its in scales.items() for j in range(len(its))]
         if not numbers:
-            return arrangement
+            return arrangement, ridge
         slopes, owners, places = self._slopes(arrangement, at, numbers, scales, step, is_central)
         matrix, gradient = self._fit.newton(arrangement.fitted, slopes, owners, places)
-        ridge = np.diag(matrix) + 1e-9 * np.trace(matrix) + 1e-300
-        damping = RIDGE
+        diagonal = np.diag(matrix) + 1e-9 * np.trace(matrix) + 1e-300
         for _ in range(TRIALS):
-            change = np.linalg.solve(matrix + damping * np.diag(ridge), gradient)
+            change = np.linalg.solve(matrix + ridge * np.diag(diagonal), gradient)
             change = change.clip(-TRUST * step, TRUST * step)
             sites = list(arrangement.sites)
             for k, scale in scales.items():
@@ -116,9 +120,10 @@ class PoseSteps:
             if self._permits(arrangement.movables, sites):
                 fitted = self._moved(arrangement, sites, [*scales], at)
                 if fitted.missed < arrangement.missed * (1 - 1e-7):
-                    return Arrangement(arrangement.movables, tuple(sites), fitted)
-            damping *= RIDGE_GROWTH
-        return arrangement
+                    its = Arrangement(arrangement.movables, tuple(sites), fitted)
+                    return its, max(ridge / RIDGE_SHRINK, LEAST_RIDGE)
+            ridge *= RIDGE_GROWTH
+        return arrangement, ridge
 
     def _moved(
         self, arrangement: Arrangement, sites: Sequence[Site], moving: Sequence[int], at: ViewPaths
