@@ -21,7 +21,7 @@ from lightpaint.paint.rig.pointing import aimed, with_highlight, with_shadow
 from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Poses
 from lightpaint.paint.subject import Subject
-from lightpaint.placement.place import SEARCHED
+from lightpaint.placement.lights_to_place import SEARCHED
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
