@@ -61,7 +61,7 @@ class PanelSite(Site):
 
 @dataclass(frozen=True)
 class _Origin:
-    """Where light comes from, without the cone of a spot: what a shadow ray depends on."""
+    """The origin of light, without the cone of a spot: what a shadow ray depends on."""
 
     position: tuple[float, ...]
     axis: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""What a search moves, and where it has it at present."""
+"""Lights that a search moves, and where it has them at present."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from lightpaint.scene.properties.pose import Site
 
 @dataclass(frozen=True)
 class Movable:
-    """What moves as one: a light, or a mirrored pair of lights.
+    """A light, or a mirrored pair of lights, which move as one.
 
     columns: their indices among the columns of the fit. mirror: of the second; None for one light.
     group: what it was added for; None for a light that is there.
@@ -38,7 +38,7 @@ class Arrangement:
 
     @property
     def missed(self) -> float:
-        """What the best lighting misses, and the pull of the constraints."""
+        """The loss of the best lighting, with the pull of the constraints."""
         return self.fitted.missed
 
     def with_site(self, k: int, site: Site, fitted: Fitted) -> "Arrangement":

@@ -126,7 +126,7 @@ def place(
 
 @dataclass(frozen=True)
 class _Result:
-    """What a search found. errors, seen: of each movable; its place in the first picture."""
+    """The result of a search. errors, seen: of each movable; its place in the first picture."""
 
     found: Found
     errors: list[PoseError]

@@ -84,12 +84,12 @@ class SearchPaths:
 
     @cached_property
     def judge(self) -> ViewPaths:
-        """As many, from other random numbers."""
+        """Paths as many, from other random numbers, to judge by."""
         return self._made(3)
 
     @cached_property
     def spread(self) -> ViewPaths:
-        """As many, from others again."""
+        """Paths as many, from others again, to tell how far places spread."""
         return self._made(4)
 
     def in_view(self, places: Floats) -> Bools:

@@ -1,4 +1,4 @@
-"""Which moves and new lights are worth it, and how sure their places are.
+"""The judgement which moves and new lights are worth it, and how sure their places are.
 
 Weights are fitted along some paths and judged along others, which no pose was fitted to. Places are
 fitted once more along each set of other paths; their spread is the error bar, for the slope of what

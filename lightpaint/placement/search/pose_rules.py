@@ -1,4 +1,4 @@
-"""What poses have to keep to besides the freedom of each light: free space, distance, view."""
+"""Rules that poses keep to besides the freedom of each light: free space, distance, view."""
 
 from collections.abc import Sequence
 
