@@ -18,7 +18,7 @@ from lightpaint.lighting.fit import Fit, resolve_fit, resolve_for_targets
 from lightpaint.lighting.linear_problem import SummedProblem, reduce_lights
 from lightpaint.lighting.loss.painting import ignored_paint
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.target.target import Target
+from lightpaint.target.target import Target, titled
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def summed_problem(
     """
     if not sums.equations.target_norm2.any() and not sums.equations.M.any():
         raise TargetError(
-            f"target {name}: no light reaches a painted pixel that counts; paint others, too, or "
+            f"{titled(name)}: no light reaches a painted pixel that counts; paint others, too, or "
             'pass emitters="count"'
         )
     all_constraints, fit = constraints_of(lights.requests).and_then(constraints), resolve_fit(fit)

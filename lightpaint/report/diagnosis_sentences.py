@@ -127,12 +127,14 @@ def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = 
         return f"{clause} {gained}."
     if reason.kind == "views":
         return ""
-    opening = "Unpainted parts are held near their present look;"
     if (loosening := reason.loosening) is None:
-        return f"{opening} releasing them {gained}."
+        return f"Releasing unpainted parts {gained}."
     share, rest = spoken_percent(loosening.share), loosening.unpainted_change
     cost = "" if rest is None else f", and change {spoken_changed(rest)}"
-    return f"{opening} {weaker} {loosening.hold:g} would remove {share} of the difference{cost}."
+    return (
+        f"A weaker hold on unpainted parts ({weaker} {loosening.hold:g}) would remove {share} of "
+        f"the difference{cost}."
+    )
 
 
 def painting_noise_clause(diagnosis: Diagnosis) -> str:

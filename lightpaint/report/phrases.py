@@ -86,8 +86,8 @@ def spoken_place(place: Place) -> str:
     place_text = f"{spoken_region(place)} ({spoken_percent(place.share)})"
     change = spoken_difference(place.painted, place.reached)
     return (
-        f"Most of what is out of reach is {place_text}: the painting is {change} than any mix of "
-        "the lights."
+        f"Most of what is out of reach is {place_text}: the paint is {change} than any mix of the "
+        "lights."
     )
 
 

@@ -108,7 +108,7 @@ def _paint_headline(appearance: Appearance) -> str:
     if appearance.is_far:
         where = spoken_where(appearance.place)
         change = spoken_difference(appearance.place.painted, appearance.place.reached)
-        painted = f"{where} the painting is {change} than the lights make it"
+        painted = f"{where} the paint is {change} than the lights make it"
         return f"{_headline_start(appearance)}: {painted}; {spoken_reason(appearance)}."
     state = (
         "is out of reach" if not appearance.causes and appearance.is_out_of_reach else "is missing"

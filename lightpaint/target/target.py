@@ -23,6 +23,15 @@ TIE = 1e-5
 NEGATIVE = 1e-3
 
 
+#: The name of targets made of arrays, unless they are given one.
+UNNAMED = "target"
+
+
+def titled(name: str) -> str:
+    """Return a target as messages call it: `target evening.exr`, or `the target` without a name."""
+    return "the target" if name == UNNAMED else f"target {name}"
+
+
 @keywords()
 @dataclass(frozen=True)
 class Target(Shown):
@@ -77,36 +86,36 @@ class Target(Shown):
     def __post_init__(self) -> None:
         if self.image.shape != (*self.importance.shape, 3):
             raise SizeError(
-                f"target {self.name}: image {self.image.shape} and importance "
+                f"{titled(self.name)}: image {self.image.shape} and importance "
                 f"{self.importance.shape} differ in size"
             )
         if self.at_least is not None and self.at_least.shape != self.image.shape:
             raise SizeError(
-                f"target {self.name}: image {self.image.shape} and at_least {self.at_least.shape} "
+                f"{titled(self.name)}: image {self.image.shape} and at_least {self.at_least.shape} "
                 "differ in size"
             )
         if lost := int((~np.isfinite(self.image).all(axis=-1)).sum()):
             raise TargetError(
-                f"target {self.name} holds NaN or Inf in {lost} of {self.importance.size} pixels: "
+                f"{titled(self.name)} holds NaN or Inf in {lost} of {self.importance.size} pixels: "
                 "make them 0, and their importance too"
             )
         if not np.isfinite(self.importance).all() or (self.importance < 0).any():
             raise TargetError(
-                f"target {self.name}: importance must be finite and not negative; it is between "
+                f"{titled(self.name)}: importance must be finite and not negative; it is between "
                 f"{np.min(self.importance):g} and {np.max(self.importance):g}"
             )
         if not self.importance.any():
             if self.not_finite == self.importance.size:
-                raise TargetError(f"target {self.name} holds NaN or Inf in every pixel")
+                raise TargetError(f"{titled(self.name)} holds NaN or Inf in every pixel")
             raise TargetError(
-                f"target {self.name} has importance 0 everywhere, so nothing in it counts: "
+                f"{titled(self.name)} has importance 0 everywhere, so nothing in it counts: "
                 "paint with some alpha, or give a mask that is not black"
             )
 
     @classmethod
     @keywords()
     def of(
-        cls, image: npt.ArrayLike, importance: npt.ArrayLike | None = None, *, name: str = "target"
+        cls, image: npt.ArrayLike, importance: npt.ArrayLike | None = None, *, name: str = UNNAMED
     ) -> "Target":
         """Make a target of arrays, which are copied as float32.
 
@@ -120,16 +129,16 @@ class Target(Shown):
         given = np.asarray(image)
         if given.ndim != 3 or given.shape[-1] != 3 or not given.size:
             raise SizeError(
-                f"target {name}: an image of the shape {given.shape}: expected (height, width, 3)"
+                f"{titled(name)}: an image of the shape {given.shape}: expected (height, width, 3)"
             )
         if given.dtype.kind != "f":
             raise TargetError(
-                f"target {name}: an image of {given.dtype}: expected floats, linear Rec.709; "
+                f"{titled(name)}: an image of {given.dtype}: expected floats, linear Rec.709; "
                 "display values of 8 bits are ViewTransform().decode(image / 255)"
             )
         counts = np.ones(given.shape[:2]) if importance is None else np.asarray(importance)
         if counts.dtype.kind not in "bfui":
-            raise TargetError(f"target {name}: importance of {counts.dtype}: expected numbers")
+            raise TargetError(f"{titled(name)}: importance of {counts.dtype}: expected numbers")
         with np.errstate(over="ignore"):  # what float32 cannot hold is infinite, and refused
             pixels, counts = given.astype(np.float32), counts.astype(np.float32)
         if counts.shape == pixels.shape[:2]:  # else that is told
@@ -256,13 +265,13 @@ class Target(Shown):
             return self.reduced(factor)
         if self.size != size and not resize:
             raise SizeError(
-                f"target {self.name} is {self.size[1]}x{self.size[0]} but the basis is "
+                f"{titled(self.name)} is {self.size[1]}x{self.size[0]} but the basis is "
                 f"{size[1]}x{size[0]}: export it at that size, or pass resize=True"
             )
         (height, width), (mine_h, mine_w) = size, self.size
         if abs(width * mine_h / (height * mine_w) - 1) > 0.02:
             raise SizeError(
-                f"target {self.name} is {mine_w}x{mine_h}, of another shape than the basis with "
+                f"{titled(self.name)} is {mine_w}x{mine_h}, of another shape than the basis with "
                 f"{width}x{height}: crop it to that shape, since resize=True does not stretch"
             )
         return self.resized(size)
@@ -275,7 +284,7 @@ def _check_is_light(name: str, image: Floats, counts: npt.NDArray[np.bool_]) -> 
     if least < -NEGATIVE * float(np.abs(bright).max()):
         below = int((bright < 0).sum())
         raise TargetError(
-            f"target {name} has a negative luminance in {below} of {bright.size} pixels, down to "
+            f"{titled(name)} has a negative luminance in {below} of {bright.size} pixels, down to "
             f"{least:.3g}: expected light, which is never below 0; np.maximum(image, 0) cuts it off"
         )
 

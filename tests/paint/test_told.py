@@ -114,8 +114,8 @@ def test_a_button_says_what_it_lets_go_and_what_that_brings():
     held = replace(appearance, reasons=(replace(HOLD, loosening=weaker),))
     assert advice(held) == Advice("hold", (), closes=0.35, hold=0.8)
     assert spoken_cause(held.reasons[0]) == (
-        "Unpainted parts are held near their present look; a hold of 0.8 would remove 35 % of "
-        "the difference, and change the annex by ΔE 12."
+        "A weaker hold on unpainted parts (a hold of 0.8) would remove 35 % of the difference, and "
+        "change the annex by ΔE 12."
     )
     # Of what takes several, none closes a share by itself.
     joint = replace(appearance, reasons=(replace(OFF, is_joint=True), replace(HOLD, is_joint=True)))

@@ -59,12 +59,12 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Appearance:
         ),
         (
             _seen(14.0),
-            "These lights cannot match this: in the middle the painting is brighter "
+            "These lights cannot match this: in the middle the paint is brighter "
             "than the lights make it; no light reaches it.",
         ),
         (
             _seen(2.8, 3.0, reasons=(Reason("hold"),)),
-            "Constraints keep the lights from this: in the middle the painting is "
+            "Constraints keep the lights from this: in the middle the paint is "
             "brighter than the lights make it; unpainted parts are held near their present look.",
         ),
         (
@@ -79,7 +79,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Appearance:
         ),
         (
             _seen(14.0, on="<b>\x1b[1m", local_lights=("lamp",)),
-            "These lights cannot match this: on the <b>\\x1b[1m the painting is "
+            "These lights cannot match this: on the <b>\\x1b[1m the paint is "
             "brighter than the lights make it; lamp would light too much else.",
         ),
         (
@@ -99,7 +99,7 @@ def _seen(missed: float, asked: float = 20.0, **about: Any) -> Appearance:
         ),
         (
             _seen(14.0, local_lights=("lamp",), held_lights=("lamp",)),
-            "Constraints keep the lights from this: in the middle the painting is "
+            "Constraints keep the lights from this: in the middle the paint is "
             "brighter than the lights make it; lamp is limited by its constraints.",
         ),
         (

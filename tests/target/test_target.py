@@ -347,3 +347,8 @@ def test_a_lamp_painted_white_is_not_dimmed_by_a_reduced_film(make_basis: Any, r
 def test_at_least_has_the_images_size():
     with pytest.raises(SizeError, match="at_least"):
         replace(_random(4, 5), at_least=np.zeros((4, 5), bool))
+
+
+def test_a_target_without_a_name_is_called_the_target() -> None:
+    with pytest.raises(TargetError, match=r"^the target has importance 0 everywhere"):
+        Target.of(np.ones((2, 2, 3)), np.zeros((2, 2)))

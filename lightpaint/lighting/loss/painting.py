@@ -14,7 +14,7 @@ from lightpaint.lighting.loss.emitter_paint import dark_threshold, find_glow_pai
 from lightpaint.lighting.loss.loss import Loss, Squares
 from lightpaint.lighting.loss.painting_loss import PaintingLoss
 from lightpaint.lighting.views import Views
-from lightpaint.target.target import Target
+from lightpaint.target.target import Target, titled
 
 
 def literal_squares(
@@ -60,7 +60,7 @@ def resolve_importance(target: Target, is_emitter: Bools, emitters: Emitters = "
     )
     if not importance.any():
         raise TargetError(
-            f"target {target.name}: the camera sees an emitter in every painted pixel, so none "
+            f"{titled(target.name)}: the camera sees an emitter in every painted pixel, so none "
             'counts; paint others too, or pass emitters="count"'
         )
     return replace(target, importance=importance, everything=False)

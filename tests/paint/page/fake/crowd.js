@@ -28,7 +28,7 @@ export const SENTENCES = [
     'lights may not have, 27 % is given up for the other views, 22 % is out of reach of these lights, ' +
     '6 % is finer detail than light can show: grain, edges and texture of the paint, 4 % is render ' +
     'noise, which more samples reduce.',
-  'Most of what is out of reach is at the bottom right (38 %): the painting is a little brighter and ' +
+  'Most of what is out of reach is at the bottom right (38 %): the paint is a little brighter and ' +
     'yellower than any mix of the lights.',
   `Lights ${named(12)}, ${named(13)} are limited in colour (2700 to 6500 K, duv 0.003); any other colour ` +
     'would remove 12 % of the difference.',
