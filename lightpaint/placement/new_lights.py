@@ -39,7 +39,7 @@ class NewLights:
             anywhere unless `aim` says otherwise, as degrees from straight ahead of `like`.
         apart: Least distance from each other, in units of the scene.
         in_view: False for places that the camera does not see.
-        name: Their name; several have `_1`, `_2` … behind it.
+        name: Their name; several of them are numbered, as in new_1.
         size: Smallest and largest side of panels; None for sides that suit the room.
 
     Raises:

@@ -27,7 +27,7 @@ from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.new_lights import MirroredPair, NewLights
 from lightpaint.placement.placement import AddedLight, Move, Placement
 from lightpaint.placement.placement_fit import fit_of
-from lightpaint.placement.search.judgement import Found, Judgement, PoseError
+from lightpaint.placement.search.judgement import Found, PlacementJudge, PoseError
 from lightpaint.placement.search.new_light_search import NewLightSearch
 from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_search import TURNS, PoseSearch
@@ -115,7 +115,7 @@ def place(
         )
         poses = PoseSearch(fit, paths, PoseRules(paths), seed=seed)
         found = _searched(poses, movables, slots, progress)
-        errors = Judgement(fit, poses.steps, paths).errors(found.arrangement)
+        errors = PlacementJudge(fit, poses.steps, paths).errors(found.arrangement)
         places = [x.position or (0.0, 0.0, 0.0) for x in found.arrangement.sites]
         seen = pixels_of(small[0], loaded, np.array(places, dtype=float).reshape(-1, 3))
         return _Result(found, errors, seen, paths.space.spread or 1.0)
@@ -161,7 +161,7 @@ def _searched(
     found = steps.refitted(found, paths.refine)
     found = steps.descend(found, paths.refine, STEPS, is_central=True, progress=count)
     progress("poses", total, total)
-    return Judgement(poses.fit, steps, paths).judged(start, found)
+    return PlacementJudge(poses.fit, steps, paths).judged(start, found)
 
 
 def _placement(

@@ -49,7 +49,7 @@ class PoseError:
     turn: float | None
 
 
-class Judgement:
+class PlacementJudge:
     """A judge of arrangements."""
 
     def __init__(self, fit: PlacementFit, steps: PoseSteps, paths: SearchPaths) -> None:
