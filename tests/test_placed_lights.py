@@ -160,3 +160,79 @@ def test_the_report_says_what_moved(room: Scene, tmp_path: Path) -> None:
     page = (tmp_path / "a" / "report.html").read_text()
     assert numbers["changes"][0]["text"] in page
     assert "Plan and elevation" in page
+
+
+LAMP = lp.NewEmitter("lamp", "point", lp.Pose(position=(0.5, 1.4, 0.6)), emission=(2.0, 1.4, 0.8))
+
+
+def test_a_missing_lamp_is_added_with_its_constraint_and_written_behind_the_users_text(
+    room: Scene, tmp_path: Path
+) -> None:
+    goal = lp.render_basis(room.with_new_emitters([LAMP]), spp=256, seed=2).present_look
+    look = lp.paint_with_light(
+        room,
+        lp.Target.of(goal),
+        tmp_path / "answer",
+        rigging=lp.Rigging.of(new=[{"kind": "point", "kelvin": [2000, 6500]}]),
+        spp=256,
+        space="linear",
+        hold=0,
+    )
+    assert look.placement is not None
+    [added] = look.placement.additions
+    assert added.name == "new_point"
+    assert added.site.position == pytest.approx(LAMP.pose.position, abs=0.1)
+    assert look.verification is not None
+    assert look.verification.agrees
+    setting = look.lighting["new_point"]
+    assert setting.constraint == "2000 to 6500 K"
+    assert setting.emission == pytest.approx(LAMP.emission, rel=0.2)
+    text, own = (tmp_path / "answer" / "relit.xml").read_text(), room.path.read_text()
+    assert text.index('id="new_point"') > text.index('id="sky"')
+    assert 'id="new_point"' not in own
+    # The answer alone brings the lamp into the scene of the file, in which it is not.
+    again = lp.relight(room, look.lighting, tmp_path / "again" / "relit.xml")
+    assert again.light("new_point").emission == pytest.approx(setting.emission)
+
+
+def test_two_views_place_a_light_together(tmp_path: Path) -> None:
+    second = """<sensor type="perspective" id="side"><float name="fov" value="60"/>
+        <transform name="to_world"><lookat origin="2.5 1.2 1.5" target="0 0.5 0" up="0 1 0"/>
+        </transform><sampler type="independent"/>
+        <film type="hdrfilm"><integer name="width" value="24"/>
+        <integer name="height" value="20"/></film></sensor>"""
+    path = write_room(tmp_path, sensors=second)
+    scenes = [load_scene(path, sensor=name) for name in ("camera", "side")]
+    moved = [scene.moved({"beam": AIMED}) for scene in scenes]
+    targets = [lp.Target.of(lp.render_basis(x, spp=128, seed=2).present_look) for x in moved]
+    looks = lp.paint_with_light(
+        scenes,
+        targets,
+        tmp_path / "answer",
+        rigging=lp.Rigging.of({"beam": {"aim": True}}),
+        spp=128,
+        space="linear",
+        hold=0,
+        verify=False,
+    )
+    assert [look.placement.moves[0].name for look in looks if look.placement] == ["beam"] * 2
+    relit = load_scene(tmp_path / "answer" / "relit.xml")
+    there = moved[0].light("beam").members[0].site
+    assert np.dot(relit.light("beam").members[0].site.direction, there.direction) > np.cos(0.07)
+    assert "Plan and elevation" in (tmp_path / "answer" / "side" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("new", "words"),
+    [
+        ({"kind": "point", "on": "shelf"}, "new.on: no rail, surface or shape 'shelf'"),
+        ({"like": "sky"}, "'sky' is not one"),
+        ({"kind": "spot", "aim": 30}, "aim of new lights is True or left out"),
+    ],
+)
+def test_lights_that_cannot_be_added_say_so_before_a_sample(
+    room: Scene, tmp_path: Path, new: dict[str, object], words: str
+) -> None:
+    target = lp.Target.of(np.ones((*room.size, 3), np.float32))
+    with pytest.raises(LightpaintError, match=words):
+        lp.Job((room,), (target,), tmp_path / "a", rigging=lp.Rigging.of(new=[new]))

@@ -5,14 +5,15 @@ from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
 from lightpaint.images.estimate import Estimate
+from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.job_bases import obtain, view_listener
 from lightpaint.pipeline.needed_samples import problem_of, without_noise
-from lightpaint.pipeline.results.results import spoken_move
+from lightpaint.pipeline.results.results import all_changes, spoken_change
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Placement
-from lightpaint.placement.rigging.rigged_lights import freedoms_of
+from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
 
@@ -23,25 +24,32 @@ def place_lights(
     """Return a job whose lights are where its paintings want them, its bases, and the placement.
 
     That is None where nothing may move. bases: of the views of `job`; the list is emptied to save
-    memory. Only the planes of lights that moved are rendered.
+    memory. Only the planes of lights that moved or are new are rendered.
     """
     if not job.all_rigging:
         return job, bases, None
-    [view], [basis] = job.views, bases
-    assert view.scene is not None
-    solution = without_noise(job, solution_of(problem_of(job, bases)))
-    freedoms = freedoms_of(job.all_rigging, view.scene)
+    scenes = [view.scene for view in job.views if view.scene is not None]
+    rigged = rigged_lights(job.all_rigging, scenes[0])
     placement = place(
-        view.scene, basis, solution, freedoms, seed=job.settings.seed, progress=listen
+        scenes,
+        bases,
+        without_noise(job, solution_of(problem_of(job, bases))),
+        rigged.freedoms,
+        new=rigged.new,
+        pairs=rigged.pairs,
+        constraints=rigged.constraints,
+        seed=job.settings.seed,
+        progress=lambda label, done, total, unit="": listen(label, done, total, "steps"),
     )
-    del solution
-    for move in placement.moves:
-        listen.say(spoken_move(move))
-    if not placement.moves:
-        listen.say("no light is moved: no move is surely worth a hundredth of what is missed")
-        return job, list(bases), placement
-    scenes = [on_film_of(placement.scene, x) for x in bases]
-    moved = job.with_moved_lights(scenes)
+    for change in all_changes(placement):
+        listen.say(spoken_change(change))
+    if placement.scene is scenes[0]:
+        listen.say("no light is moved: no change is surely worth a hundredth of what is missed")
+        return job, bases, placement
+    added = {light.name for light in placement.additions}
+    asked = tuple(x for x in rigged.constraints.lights if x[0] in added)
+    films = [on_film_of(scene, basis) for scene, basis in zip(placement.scenes, bases, strict=True)]
+    moved = job.with_moved_lights(films, Constraints(asked))
     before = list(bases)
     bases.clear()
     return moved, _bases_of(moved, before, listen), placement

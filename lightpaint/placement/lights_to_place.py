@@ -46,7 +46,7 @@ class NewLight:
 
     @property
     def as_basis_light(self) -> BasisLight:
-        """The light as constraints know it."""
+        """What constraints know of it."""
         plugin = PLUGIN_OF[self.kind]
         parameter, unit = PLUGINS[plugin]
         return BasisLight(self.name, plugin, parameter, unit, (0.0, 0.0, 0.0))
@@ -77,7 +77,7 @@ def movables_of(
     seed: int,
 ) -> list[Movable]:
     """Return the lights of `scene` that may move. names: of the lights, in the basis's order."""
-    followers = _followers(scene, freedoms, pairs)
+    followers = followers_of(scene, freedoms, pairs)
     made = []
     for name, freedom in freedoms.items():
         if freedom.is_still or name in {x.lights[1] for x in pairs}:
@@ -151,7 +151,7 @@ def _places(
     return places_of(freedom, np.array(site.position, dtype=float), surfaces)
 
 
-def _followers(
+def followers_of(
     scene: Scene, freedoms: Mapping[str, Freedom], pairs: Sequence[MirroredPair]
 ) -> dict[str, MirroredPair]:
     """Return pairs by the names of their first lights. Raises SceneError for impossible ones."""

@@ -3,6 +3,7 @@
 import argparse
 from typing import Any
 
+from lightpaint.placement.rigging.rigging_values import KINDS
 from lightpaint.validation import BRIGHTEST
 
 
@@ -119,6 +120,19 @@ def cone(text: str) -> tuple[str, list[float]]:
     expected = "NAME=10:45, in degrees"
     ends = [_number_of(text, end, expected) for end in ((least, most) if colon else (least,) * 2)]
     return name, ends
+
+
+def new_light(text: str) -> dict[str, Any]:
+    """Parse lights to add, `KIND[:COUNT][@WHERE]`."""
+    what, at, where = text.partition("@")
+    kind, colon, count = what.partition(":")
+    if not kind.strip() or (at and not where.strip()) or (colon and not count.strip().isdecimal()):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not KIND, KIND:2 or KIND:2@WHERE, like spot:2@ceiling"
+        )
+    table: dict[str, Any] = {"kind" if kind in KINDS else "like": kind.strip()}
+    table |= {"count": int(count)} if colon else {}
+    return table | ({"on": names_of(where)} if at else {})
 
 
 def _number_of(text: str, value: Any, expected: str) -> float:

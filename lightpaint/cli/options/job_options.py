@@ -135,7 +135,7 @@ def rigging_of(options: Namespace) -> Rigging:
     for key in MOVES:
         for name, value in getattr(options, key):
             lights.setdefault(name, {})[key] = value
-    return Rigging.of(lights, where=BY_OPTION)
+    return Rigging.of(lights, new=options.added, where=BY_OPTION)
 
 
 def folders_of(output: Path | None, names: Sequence[str]) -> list[Path]:

@@ -314,7 +314,7 @@ def add_rigging(parser: argparse.ArgumentParser) -> None:
     )
 
     def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
-        dest = option[2:]
+        dest = "added" if option == "--add" else option[2:]
         group.add_argument(
             option, dest=dest, type=kind, action="append", default=[], metavar=metavar, help=about
         )
@@ -331,6 +331,13 @@ def add_rigging(parser: argparse.ArgumentParser) -> None:
         "NAME=10:45",
         arguments.cone,
         "let the spot's cone end between these degrees from its axis",
+    )
+    add(
+        "--add",
+        "KIND[:N][@WHERE]",
+        arguments.new_light,
+        "add a light, or up to N: point, spot, panel, or the name of one to add another like it; "
+        "anywhere, or on a rail or surface of the lights file, or a shape",
     )
     group.add_argument(
         "--no-move",

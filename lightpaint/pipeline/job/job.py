@@ -43,7 +43,7 @@ from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
 from lightpaint.placement.light_search import check_suggestible
-from lightpaint.placement.rigging.rigged_lights import freedoms_of
+from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
@@ -164,9 +164,13 @@ class Job:
         basis = content(self.basis)
         return basis if isinstance(basis, LightGroups) else None
 
-    def with_moved_lights(self, scenes: Sequence[Scene]) -> "Job":
-        """Return this job with lights elsewhere. scenes: those of the views, on the same films."""
+    def with_moved_lights(self, scenes: Sequence[Scene], constraints: Constraints) -> "Job":
+        """Return this job with lights elsewhere.
+
+        scenes: those of the views, on the same films. constraints: on lights that they add.
+        """
         moved = copy(self)
+        vars(moved)["all_constraints"] = self.all_constraints.and_then(constraints)
         views = zip(self.views, scenes, strict=True)
         vars(moved)["views"] = tuple(replace(x, scene=scene, basis=None) for x, scene in views)
         return moved
@@ -239,7 +243,7 @@ class Job:
         if not self.settings.move_lights:
             return Rigging()
         if rigging:
-            freedoms_of(rigging, scenes[0])
+            rigged_lights(rigging, scenes[0])
         return rigging
 
     def _check_painting_is_no_light(self) -> None:

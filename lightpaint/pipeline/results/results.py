@@ -20,7 +20,7 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.placement import Move, Placement
+from lightpaint.placement.placement import HARDLY_VISIBLE, AddedLight, Move, Placement
 from lightpaint.placement.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
@@ -252,32 +252,54 @@ def _report_arguments(look: Look, command: str) -> dict[str, Any]:
 
 def hung_of(placement: Placement, lighting: Lighting) -> HungLights:
     """Return the lights of an answer, and what a placement changed of them."""
-    changes = tuple(_change_of(move) for move in placement.moves)
+    changes = [_change_of(change) for change in all_changes(placement)]
+    changes.sort(key=lambda change: -change.numbers["gain_share"])
     missed = placement.missed_before, placement.missed_after
-    return HungLights(hung_lights(lighting), changes, lighting.up, *missed)
+    return HungLights(hung_lights(lighting), tuple(changes), lighting.up, *missed)
 
 
-def _change_of(move: Move) -> LightChange:
-    numbers = {
-        "distance": move.distance,
-        "turn": move.turn,
-        "cutoff": move.new.cutoff,
-        "gain_share": move.gain_share,
+def all_changes(placement: Placement) -> list[Move | AddedLight]:
+    """Return the moves, then the new lights."""
+    return [*placement.moves, *placement.additions]
+
+
+def _change_of(change: Move | AddedLight) -> LightChange:
+    numbers: dict[str, Any] = {
+        "gain_share": change.gain_share,
+        "place_error": change.place_error,
+        "turn_error": change.turn_error,
+        "is_hardly_visible": change.is_hardly_visible,
     }
-    return LightChange(move.name, spoken_move(move), numbers)
+    if isinstance(change, Move):
+        numbers |= {"distance": change.distance, "turn": change.turn, "cutoff": change.new.cutoff}
+    return LightChange(change.name, spoken_change(change), numbers)
+
+
+def spoken_change(change: Move | AddedLight) -> str:
+    """Return what a light did and gained: `spot_knot turned by 12°, slid 0.6: a fifth …`."""
+    if isinstance(change, Move):
+        done = spoken_move(change)
+    else:
+        x, y, z = (f"{v:.2f}" for v in change.site.position or (0.0, 0.0, 0.0))
+        done = f"a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
+        if change.place_error:
+            done += f" ± {change.place_error:.1g}"
+    text = f"{change.name} {done}: {spoken_fraction(change.gain_share)} of what was missed"
+    return f"{text}; {HARDLY_VISIBLE}" if change.is_hardly_visible else text
 
 
 def spoken_move(move: Move) -> str:
-    """Return what a light did and gained: `spot_knot turned by 12°, slid .6: a fifth …`."""
+    """Return what a light did, with the errors of that: `turned by 12° ± 1°, slid 0.6 ± 0.05`."""
     done = []
     if move.turn >= 0.5:
-        done.append(f"turned by {move.turn:.0f}°")
+        error = f" ± {move.turn_error:.1g}°" if move.turn_error else ""
+        done.append(f"turned by {move.turn:.0f}°{error}")
     if move.distance > 0:
-        done.append(f"slid {move.distance:.2g}")
+        error = f" ± {move.place_error:.1g}" if move.place_error else ""
+        done.append(f"slid {move.distance:.2g}{error}")
     if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
         done.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
-    gain = spoken_fraction(move.gain_share)
-    return f"{move.name} {', '.join(done)}: {gain} of what was missed"
+    return ", ".join(done)
 
 
 def verify_result(

@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -9,15 +10,46 @@ import numpy as np
 
 from lightpaint.arrays import Position
 from lightpaint.errors import ConstraintError, SceneError
-from lightpaint.lighting.constraints.constraints import is_pattern
+from lightpaint.lighting.constraints.constraints import Constraints, is_pattern
 from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.lights_to_place import free_light
+from lightpaint.placement.lights_to_place import followers_of, free_light, new_lights_of
+from lightpaint.placement.new_lights import MirroredPair, NewLights
 from lightpaint.placement.rigging.rigging import Rigging
-from lightpaint.placement.rigging.rigging_values import names_of
+from lightpaint.placement.rigging.rigging_values import constraint_of, names_of
 from lightpaint.scene.lights.light import Light
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
+
+
+@dataclass(frozen=True)
+class RiggedLights:
+    """The lights of a scene that may move, and those that may be added to it.
+
+    freedoms: by name. constraints: those on new lights, by the names that they get.
+    """
+
+    freedoms: Mapping[str, Freedom]
+    new: tuple[NewLights, ...]
+    pairs: tuple[MirroredPair, ...]
+    constraints: Constraints
+
+
+def rigged_lights(rigging: Rigging, scene: Scene) -> RiggedLights:
+    """Return what `rigging` asks of the lights of `scene`.
+
+    Raises ConstraintError for names that nothing has, and for lights that cannot do it.
+    """
+    freedoms = freedoms_of(rigging, scene)
+    pairs = [_pair(table, where, scene, freedoms) for table, where in rigging.pairs]
+    new = [_new_lights(table, where, scene, rigging) for table, where in rigging.new]
+    tables = {}
+    for light in new_lights_of(scene, new):
+        table, where = rigging.new[next(k for k, x in enumerate(new) if x is light.group)]
+        if constraint := constraint_of(table):
+            tables[light.name] = (constraint, where)
+    asked = tuple((name, table, where) for name, (table, where) in tables.items())
+    return RiggedLights(freedoms, tuple(new), tuple(pairs), Constraints(asked))
 
 
 def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
@@ -26,8 +58,6 @@ def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
     Each key of a pattern is for those of its lights that can do it. Raises ConstraintError for
     names that nothing has, and for lights that cannot move.
     """
-    for _, where in (*rigging.new, *rigging.pairs):
-        raise ConstraintError(f"{where}: only lights that are there can be placed so far")
     tables: dict[str, dict[str, Any]] = {}
     places: dict[str, str] = {}
     for name, table, where in rigging.lights:
@@ -36,7 +66,8 @@ def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
             refused = []
             for light in matches:
                 try:
-                    free_light(scene, light.name, _freedom({key: value}, light, rigging, where))
+                    freedom = _freedom({key: value}, light, scene, rigging, where)
+                    free_light(scene, light.name, freedom)
                 except SceneError as error:
                     refused.append(str(error))
                     continue
@@ -45,7 +76,7 @@ def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
             if len(refused) == len(matches):
                 raise ConstraintError(f"{where}.{key}: {refused[0]}")
     return {
-        name: _freedom(table, scene.light(name), rigging, places[name])
+        name: _freedom(table, scene.light(name), scene, rigging, places[name])
         for name, table in tables.items()
     }
 
@@ -64,34 +95,92 @@ def _matches(name: str, scene: Scene, where: str) -> list[Light]:
     return matches
 
 
-def _freedom(table: Mapping[str, Any], light: Light, rigging: Rigging, where: str) -> Freedom:
+def _freedom(
+    table: Mapping[str, Any], light: Light, scene: Scene, rigging: Rigging, where: str
+) -> Freedom:
     """Return the freedom that the keys `move`, `aim` and `cone` give a light."""
     move = table.get("move", {})
     move = move if isinstance(move, Mapping) else {"within": move}
-    within, box, line = move.get("within"), move.get("box"), None
+    places: dict[str, Any] = {}
     if "along" in move and (here := light.members[0].site.position) is not None:
         way = np.array(move["along"], dtype=float)
         way *= move["within"] / np.linalg.norm(way)
-        line, within = (as_position(here - way), as_position(here + way)), None
+        places["line"] = (as_position(here - way), as_position(here + way))
+    elif "within" in move:
+        places["within"] = move["within"]
+    if "box" in move:
+        places["box"] = _segment(move["box"])
     if "on" in move:
-        [name] = names_of(move["on"], f"{where}.move.on")
-        line = _segment(_place(name, rigging, f"{where}.move.on")["line"])
-    return Freedom(
-        within=within,
-        box=None if box is None else _segment(box),
-        line=line,
-        aim=table.get("aim", False),
-        cone=table.get("cone"),
-    )
+        places |= _places_on(move["on"], scene, rigging, f"{where}.move.on")
+    return Freedom(**places, aim=table.get("aim", False), cone=table.get("cone"))
 
 
-def _place(name: str, rigging: Rigging, where: str) -> Mapping[str, Any]:
-    """Return the last rail or surface of that name. Raises ConstraintError if there is none."""
-    named = {its: table for its, table, _ in rigging.on}
-    if name not in named:
-        there = f"there are {some_names(named)}" if named else "there is none"
-        raise ConstraintError(f"{where}: no rail or surface {name!r}; {there}: add [on.{name}]")
-    return named[name]
+def _new_lights(table: Mapping[str, Any], where: str, scene: Scene, rigging: Rigging) -> NewLights:
+    """Return the lights that a table of `new` may add."""
+    places: dict[str, Any] = {}
+    if "on" in table:
+        places = _places_on(table["on"], scene, rigging, f"{where}.on")
+    if "box" in table:
+        places["box"] = _segment(table["box"])
+    size = table.get("size")
+    like = table.get("like")
+    try:
+        new = NewLights(
+            kind=table.get("kind", "point"),
+            like=like,
+            count=table.get("count", 1),
+            freedom=Freedom(**places, aim=table.get("aim", False), cone=table.get("cone")),
+            apart=table.get("apart", 0.0),
+            in_view=table.get("in_view", True),
+            name=table.get("name", f"new_{like or table['kind']}"),
+            size=(size, size) if isinstance(size, int | float) else size,
+        )
+        new_lights_of(scene, [new])
+    except SceneError as error:
+        raise ConstraintError(f"{where}: {error}") from None
+    return new
+
+
+def _pair(
+    table: Mapping[str, Any], where: str, scene: Scene, freedoms: dict[str, Freedom]
+) -> MirroredPair:
+    """Return a pair of which the first light has the freedom."""
+    first, second = table["lights"]
+    if first not in freedoms and second in freedoms:
+        first, second = second, first
+    try:
+        pair = MirroredPair((first, second), table["mirror"])
+        followers_of(scene, freedoms, [pair])
+    except SceneError as error:
+        raise ConstraintError(f"{where}: {error}") from None
+    return pair
+
+
+def _places_on(names: Any, scene: Scene, rigging: Rigging, where: str) -> dict[str, Any]:
+    """Return rails and surfaces of these names as fields of a freedom.
+
+    A name is that of a table `[on.NAME]`, or else of shapes of the scene.
+    """
+    tables = {name: table for name, table, _ in rigging.on}
+    rails, surfaces, clear = [], list[str](), list[float]()
+    for name in names_of(names, where):
+        table = tables.get(name, {"shapes": [name]})
+        if "line" in table:
+            rails.append(_segment(table["line"]))
+            continue
+        clear += [table["clear"]] if table.get("clear") else []
+        for shape in names_of(table["shapes"], where):
+            found = [x for x in dict.fromkeys(scene.shape_names) if fnmatchcase(x, shape)]
+            if not found:
+                kind = "shape" if name in tables else "rail, surface or shape"
+                there = some_names([*tables, *dict.fromkeys(scene.shape_names)])
+                raise ConstraintError(f"{where}: no {kind} {shape!r}; there are {there}")
+            surfaces += found
+    places: dict[str, Any] = {"rails": tuple(rails)} if rails else {}
+    if surfaces:
+        places["surfaces"] = tuple(dict.fromkeys(surfaces))
+        places["clear"] = max(clear, default=None)
+    return places
 
 
 def _segment(ends: Sequence[Sequence[float]]) -> tuple[Position, Position]:

@@ -174,11 +174,9 @@ def _check_size(value: Any, kind: str, where: str) -> None:
         raise ConstraintError(f"{where} is for panels: a {kind} has no size")
     sides = [value, value] if _is_number(value) else value
     if not (
-        _is_list(sides, 2)
-        and all(map(_is_number, sides))
-        and all(0 < side <= FARTHEST for side in sides)
+        _is_list(sides, 2) and all(map(_is_number, sides)) and 0 < sides[0] <= sides[1] <= FARTHEST
     ):
-        raise _wrong(where, value, "width and height, like [0.6, 0.6]")
+        raise _wrong(where, value, "the smallest and the largest side, like [0.3, 0.6]")
 
 
 def _wrong(where: str, value: Any, expected: str) -> ConstraintError:
