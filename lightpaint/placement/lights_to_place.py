@@ -46,7 +46,7 @@ class NewLight:
 
     @property
     def as_basis_light(self) -> BasisLight:
-        """What constraints know of it."""
+        """The light as constraints know it."""
         plugin = PLUGIN_OF[self.kind]
         parameter, unit = PLUGINS[plugin]
         return BasisLight(self.name, plugin, parameter, unit, (0.0, 0.0, 0.0))
