@@ -49,7 +49,8 @@ class Basis(Shown):
             given as these are. Where an interrupt left the halves unequal, it overstates the noise
             a little. Zeros where nothing is known of it (see `knows_noise`). `half_differences` is
             the array.
-        emitters_seen: (h, w) bool, pixels in which the camera sees an emitter directly.
+        emitters_seen: (h, w) bool, pixels in which the camera sees an emitter, directly or
+            through clear glass.
         origin: Where it comes from: scene, sensor, seed, samples.
         guide_table: (2, cells, emitters) float32, what the renderer has learned about which emitter
             matters where, or None. Only rendering more samples needs it.

@@ -9,19 +9,23 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from lightpaint.arrays import RGB, Floats
+from lightpaint.arrays import RGB, Bools, Floats
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.integrators import depth_limit
 from lightpaint.basis.render.render_budget import PASS_DIVISOR, Budget, Clock, Keeper, next_pair
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.progress import Interrupted, Progress
 from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
+from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, as_float32, pass_seed, plan_passes, render_pass
 
 WHITE: RGB = (1.0, 1.0, 1.0)
 BLACK: RGB = (0.0, 0.0, 0.0)
+
+#: Samples of a pixel that look for emitters.
+SEEN_SAMPLES = 16
 
 #: (half 0 or 1, samples per pixel) of passes in a row.
 Plan = list[tuple[int, int]]
@@ -203,18 +207,35 @@ def light_pass(
 
 
 @MITSUBA.taken()
-def emitters_seen(scene: Scene) -> npt.NDArray[np.bool_]:
-    """Return (h, w), pixels where light reaches the camera without a bounce."""
+def emitters_seen(scene: Scene) -> Bools:
+    """Return (h, w), pixels that show the camera an emitter, directly or through clear glass."""
     import mitsuba as mi
 
     if scene.integrator.hide_emitters:
         return np.zeros(scene.size, dtype=bool)
     loaded: Any = scene.load({light.name: WHITE for light in scene.lights})
     direct = mi.load_dict({"type": "path", "max_depth": 1})
-    spp = -(-16 // scene.film.block_pixels)
+    spp = -(-SEEN_SAMPLES // scene.film.block_pixels)
     image = as_float32(
         np.array(mi.render(loaded, sensor=scene.camera(loaded), integrator=direct, seed=0, spp=spp))
     )
+    seen = block_mean(image, scene.film.block).max(axis=-1) > 0
+    if use_variant().is_jit:
+        seen |= _seen_through_glass(scene, loaded)
     del loaded
     gc.collect()
-    return np.asarray(block_mean(image, scene.film.block).max(axis=-1) > 0)
+    return np.asarray(seen)
+
+
+def _seen_through_glass(scene: Scene, loaded: Any) -> Bools:
+    """Return (h, w), pixels in which some ray meets an emitter behind clear surfaces alone."""
+    from lightpaint.basis.render.tracer.one_pass import view_of
+    from lightpaint.basis.render.tracer.seen_emitters import (
+        emitters_seen_through,
+        has_clear_surfaces,
+    )
+
+    if not has_clear_surfaces(loaded):
+        return np.zeros(scene.size, dtype=bool)
+    depth = depth_limit(scene.integrator)
+    return emitters_seen_through(view_of(scene, loaded), depth, samples=SEEN_SAMPLES, seed=0)

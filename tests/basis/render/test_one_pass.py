@@ -5,7 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from renderer import CORNELL, LIGHTS, REPOSITORY, SAME_SAMPLES, mitsuba_render, one_pass, write_room
+from renderer import (
+    CORNELL,
+    LIGHTS,
+    PATH,
+    REPOSITORY,
+    SAME_SAMPLES,
+    mitsuba_render,
+    one_pass,
+    write_room,
+)
 
 from lightpaint.basis.render.basis_render import _render_one_by_one, render_basis
 from lightpaint.basis.render.integrators import needs_a_bounce, why_not_one_pass
@@ -85,6 +94,51 @@ def test_each_plane_is_that_light_alone_within_noise(
     assert (basis.emitters_seen != seen).mean() < 0.02
     assert seen.any()
     assert not seen.all()
+
+
+#: What may be between the camera and a lamp, and whether this is seen through it.
+SHEETS = {
+    "pane": ('<bsdf type="thindielectric"/>', True),
+    "hole": (
+        """<bsdf type="mask"><float name="opacity" value="0.3"/><bsdf type="diffuse"/>
+        </bsdf>""",
+        True,
+    ),
+    "frosted": ('<bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf>', False),
+}
+
+LAMP = """<shape type="sphere" id="lamp"><point name="center" x="-0.4" y="1.3" z="0"/>
+        <float name="radius" value="0.3"/><emitter type="area">
+        <rgb name="radiance" value="20 20 20"/></emitter></shape>"""
+
+
+@pytest.mark.parametrize("name", ["pane", "hole", "frosted"])
+@pytest.mark.parametrize("method", ["path", "volpath"])
+def test_lamps_are_seen_through_clear_surfaces_alone(tmp_path: Path, name: str, method: str):
+    """A sheet before the camera, of which a straight ray passes some share unless it is frosted."""
+    bsdf, is_clear = SHEETS[name]
+    sheet = f"""<shape type="rectangle"><transform name="to_world"><scale value="3"/>
+        <translate y="1" z="2.5"/></transform>{bsdf}</shape>"""
+    integrator = f'<integrator type="{method}mis"/>' if method == "volpath" else PATH
+    seen = []
+    for k, its in enumerate(("", sheet)):
+        room = write_room(tmp_path, lights=LAMP + its, integrator=integrator, name=f"{k}.xml")
+        seen.append(render_basis(load_scene(room), spp=16).emitters_seen)
+    assert 10 < seen[0].sum() < 60
+    if is_clear:
+        assert (seen[1] != seen[0]).mean() < 0.03
+    else:
+        assert not seen[1].any()
+
+
+def test_a_lamp_in_a_mirror_is_not_seen(tmp_path: Path):
+    mirror = """<shape type="rectangle"><transform name="to_world"><scale value="0.5"/>
+        <translate y="1" z="-0.9"/></transform><bsdf type="conductor"/></shape>"""
+    lamp = """<shape type="sphere" id="lamp"><point name="center" x="0" y="1" z="4.5"/>
+        <float name="radius" value="0.3"/><emitter type="area">
+        <rgb name="radiance" value="20 20 20"/></emitter></shape>"""
+    scene = load_scene(write_room(tmp_path, lights=mirror + lamp))
+    assert not render_basis(scene, spp=16).emitters_seen.any()
 
 
 def test_a_light_alone_is_black_elsewhere(small_room: Scene) -> None:

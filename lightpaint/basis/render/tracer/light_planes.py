@@ -78,7 +78,7 @@ class LightPlanes:
             self._add_one(self._sums, value[channel], place + channel, active)
 
     def note_seen(self, pixel, active):
-        """Count a camera ray that sees an emitter."""
+        """Count a camera ray that sees an emitter, directly or through clear glass."""
         self._add_one(self._seen, mi.Float(1), pixel, active)
 
     def _add_one(self, array, value, place, active):

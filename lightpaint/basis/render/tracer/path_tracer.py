@@ -126,6 +126,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
     previous_delta = mi.Bool(True)              # Whether nothing but the surface could choose it
     previous_cell = mi.UInt32(0)                # Cell of the guide that the vertex lies in
     cell = mi.UInt32(0)                         # Cell of the guide that the path is in
+    looks_through = mi.Bool(True)               # Whether nothing but clear surfaces was passed
     # fmt: on
 
     if dr.hint(rules.must_bounce, mode="scalar"):
@@ -151,7 +152,7 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         carried = weight * throughput
         found = carried * emission * _mis(previous_pdf, pdf)
         planes.add(place, emitter, found, depth, hit)
-        planes.note_seen(place, hit & (depth == 0))
+        planes.note_seen(place, hit & looks_through)
 
         # Next-event estimation: emitters are sampled.
         active_next = active & (depth + 1 < rules.max_depth) & si.is_valid()
@@ -182,9 +183,18 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
         previous_pdf = sample.pdf
         previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         previous_cell = mi.UInt32(cell)
+        looks_through &= passes_clearly(sample)
         depth[si.is_valid()] += 1
         active = _roulette(throughput, eta, depth >= rules.rr_depth, fate, active_next)
         pi = scene.ray_intersect_preliminary(ray, False, active)
+
+
+def passes_clearly(sample):
+    """Return whether a surface, by its sample, lets the ray through as clear glass or a hole."""
+    flags = mi.BSDFFlags
+    return mi.has_flag(sample.sampled_type, flags.DeltaTransmission) | mi.has_flag(
+        sample.sampled_type, flags.Null
+    )
 
 
 @dr.syntax
