@@ -11,6 +11,7 @@ from lightpaint.images.denoiser import denoiser_text
 from lightpaint.images.formats.png import png_bytes, png_has_text
 from lightpaint.progress import Progress, silent
 from lightpaint.report.light_sheet import light_sheet
+from lightpaint.report.rig.hung_lights import HungLight
 from lightpaint.scene.quality_presets import Preset
 from lightpaint.scene.runtime.variant import use_variant
 from lightpaint.scene.scene import Scene
@@ -60,7 +61,9 @@ def render_sheet(scene: Scene, path: Path, progress: Progress = silent) -> str:
         basis = obtain_basis(small, spp=SHEET.spp, seed=SHEET_SEED, progress=progress)
     title = f"{Path(*scene.path.parts[-2:])} through {sensor}, {len(scene.lights)} lights"
     texts = denoiser_text(basis.features, raw=f"basis of {basis.origin.spp} samples per pixel")
-    image = light_sheet(basis, title=title)
+    lit = {member.name: member.emission for member in scene.emitters}
+    lights = [HungLight(place, lit[place.name]) for place in scene.emitter_places]
+    image = light_sheet(basis, title=title, lights=lights, up=scene.up)
     write_bytes(path, png_bytes(image, {SHEET_KEY: "what each light does alone", **texts}))
     return ""
 

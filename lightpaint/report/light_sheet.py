@@ -1,12 +1,13 @@
 """The contact sheet of a scene's lights: each light alone, with its name and share."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Doubles, Floats, Position
 from lightpaint.basis.basis import Basis
 from lightpaint.colour.srgb import encode_display, to_8_bit
 from lightpaint.images.denoiser import denoised
@@ -16,6 +17,8 @@ from lightpaint.report.comparison import shorten_to_width
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import exposure_of
 from lightpaint.report.phrases import spoken_percent
+from lightpaint.report.rig.hung_lights import HungLight
+from lightpaint.report.rig.rig_drawing import rig_drawing
 from lightpaint.screen import visible
 
 #: The most lights shown; the others, with the smallest shares, are counted.
@@ -23,6 +26,9 @@ MAX_LIGHTS = 64
 
 #: Widths of a picture by the largest number of lights; height over width of the sheet to aim at.
 WIDTHS, ASPECT = {4: 400, 12: 320, 30: 256, MAX_LIGHTS: 208}, 0.62
+
+#: Height of the plan and the elevation, at least, if they have more room than they need.
+PLAN_HEIGHT = 240
 
 #: A dark ground, unlike any picture, the colours of texts on it, and the edge of pictures.
 GROUND, TEXT, FAINT, EDGE = (24, 24, 26), (226, 226, 226), (142, 142, 146), (44, 44, 48)
@@ -77,12 +83,19 @@ class _Grid:
         return x, self.head + row * (self.height + self.below + self.gap)
 
 
-def light_sheet(basis: Basis, *, title: str) -> npt.NDArray[np.uint8]:
+def light_sheet(
+    basis: Basis,
+    *,
+    title: str,
+    lights: Sequence[HungLight] = (),
+    up: Position = (0.0, 1.0, 0.0),
+) -> npt.NDArray[np.uint8]:
     """Draw each light alone, (H, W, 3) uint8 sRGB, denoised, with its name and share.
 
     Each is at its present emission, or at a white one if it is off, with an exposure of its own:
     brightness does not compare between pictures. Lights stand in their order; of more than MOST,
-    those with the largest shares, and a line tells the share of the others.
+    those with the largest shares, and a line tells the share of the others. Below them is a plan of
+    the room, and an elevation, with `lights`; up: the axis of the scene that is up.
     """
     shares = energy_shares(basis, Lighting.present(basis))
     shown = sorted(np.argsort(-shares, kind="stable")[:MAX_LIGHTS].tolist())
@@ -105,7 +118,14 @@ def light_sheet(basis: Basis, *, title: str) -> npt.NDArray[np.uint8]:
     if left:
         y = sheet.height - round(2.2 * grid.text)
         draw.text((grid.gap, y), shorten_to_width(left, small, room), FAINT, small)
-    return np.asarray(sheet)
+    height = max(sheet.width - sheet.height - 1, PLAN_HEIGHT)
+    plan = rig_drawing(basis.features, lights, up=up, width=sheet.width, height=height)
+    return np.asarray(sheet) if plan is None else _with_plan(np.asarray(sheet), plan)
+
+
+def _with_plan(sheet: npt.NDArray[np.uint8], plan: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Return the sheet with the plan below it."""
+    return np.concatenate([sheet, plan])
 
 
 def _cell(basis: Basis, k: int, share: float, factor: int) -> _Cell:

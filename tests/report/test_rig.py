@@ -1,12 +1,15 @@
 """Plans and arrows: the camera follows from what pixels show, and marks stand where lights do."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from conftest import BasisFactory
 
 from lightpaint.images.denoiser import Features
+from lightpaint.report.light_sheet import light_sheet
 from lightpaint.report.page.placement_section import placement_section
 from lightpaint.report.rig.aim_picture import aim_picture
 from lightpaint.report.rig.hung_lights import (
@@ -128,3 +131,13 @@ def test_the_section_lists_changes_and_shows_both_pictures() -> None:
     assert "key &lt;turned&gt; by 37°" in html
     assert "brings a third of what was missed" in html
     assert placement_section(None, np.zeros((*SIZE, 3), np.uint8), a_room()) == ""
+
+
+def test_a_sheet_of_lights_ends_in_their_plan(make_basis: BasisFactory) -> None:
+    room = a_room()
+    basis = replace(make_basis(2, size=SIZE), features=room)
+    plain = light_sheet(basis, title="room")
+    with_plan = light_sheet(basis, title="room", lights=[turned()])
+    assert with_plan.shape[1] == plain.shape[1]
+    assert len(with_plan) > len(plain)
+    assert np.array_equal(with_plan[: len(plain)], plain)

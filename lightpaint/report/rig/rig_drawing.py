@@ -66,10 +66,12 @@ def rig_drawing(
     *,
     up: Position = (0.0, 1.0, 0.0),
     width: int = 960,
+    height: int | None = None,
 ) -> npt.NDArray[np.uint8] | None:
     """Draw a plan and an elevation below it, (h, w, 3) uint8 sRGB; the camera looks to the right.
 
-    features: of the picture. up: the axis of the scene that is up. None if the picture does not
+    features: of the picture. up: the axis of the scene that is up. height: the most, for both
+    beside each other. None if the picture does not
     tell where anything is, or no light has a place.
     """
     geometry = ViewGeometry.of(features)
@@ -79,42 +81,61 @@ def rig_drawing(
     is_whole = np.linalg.norm(features.normal, axis=-1) > 0
     albedo = np.where(is_whole[..., None], features.albedo, 0)
     colors = albedo[tuple((geometry.pixels[:, ::-1] - 0.5).astype(int).T)]
-    text = FINER * max(11, width // 72)
-    panels = _panels(geometry, lights, np.array(up), FINER * width)
-    sheet = Image.new("RGB", (FINER * width, sum(_height(x, text) for x in panels)), GROUND)
-    y = 0
-    for panel in panels:
-        sheet.paste(
-            _drawn(panel, geometry, colors, lights, text), ((FINER * width - panel.size[0]) // 2, y)
-        )
-        y += _height(panel, text)
+    text = FINER * max(11, width // (72 if height is None else 110))
+    row = None if height is None else FINER * height - round(2.4 * text)
+    panels = _panels(geometry, lights, np.array(up), FINER * width, row)
+    pictures = [_drawn(panel, geometry, colors, lights, text) for panel in panels]
+    sheet = _in_row(pictures, width) if row else _in_column(pictures, width)
     small = sheet.resize((width, sheet.height // FINER), Image.Resampling.LANCZOS)
     return np.asarray(small)
 
 
-def _height(panel: _Panel, text: int) -> int:
-    """Return the height of a panel with its title."""
-    return panel.size[1] + round(2.4 * text)
+def _in_column(pictures: Sequence[Image.Image], width: int) -> Image.Image:
+    """Return pictures one below the other, in the middle of a sheet of that width."""
+    sheet = Image.new("RGB", (FINER * width, sum(x.height for x in pictures)), GROUND)
+    y = 0
+    for picture in pictures:
+        sheet.paste(picture, ((sheet.width - picture.width) // 2, y))
+        y += picture.height
+    return sheet
+
+
+def _in_row(pictures: Sequence[Image.Image], width: int) -> Image.Image:
+    """Return pictures beside each other, on one line at the bottom."""
+    tallest = max(x.height for x in pictures)
+    sheet = Image.new("RGB", (FINER * width, tallest), GROUND)
+    gap = (sheet.width - sum(x.width for x in pictures)) // (len(pictures) + 1)
+    x = gap
+    for picture in pictures:
+        sheet.paste(picture, (x, tallest - picture.height))
+        x += picture.width + gap
+    return sheet
 
 
 def _panels(
-    geometry: ViewGeometry, lights: Sequence[HungLight], up: Doubles, width: int
+    geometry: ViewGeometry, lights: Sequence[HungLight], up: Doubles, width: int, row: int | None
 ) -> list[_Panel]:
-    """Return plan and elevation on one scale, `width` pixels wide or less."""
+    """Return plan and elevation on one scale, `width` pixels wide or less.
+
+    row: the most height of each beside the other; None for one below the other.
+    """
     ahead = _ahead(geometry, up)
     left = np.cross(up, ahead)
     places = _places_near(geometry, lights)
     low, high = np.percentile(geometry.points, [0.5, 99.5], axis=0)
     points = np.concatenate([places, [low, high]])
     views = [
-        ("plan: from above, the camera looks to the right", left),
-        ("elevation: from the side", up),
+        ("plan: the camera looks to the right", left),
+        ("elevation", up),
     ]
     flat = np.stack([points @ ahead, points @ left, points @ up], axis=1)
     least, most = flat.min(axis=0), flat.max(axis=0)
     room = MARGIN * float((most - least).max())
     least, extent = least - room, most - least + 2 * room
-    scale = min(width / extent[0], TALLEST * width / (extent[1] + extent[2]))
+    if row is None:
+        scale = min(width / extent[0], TALLEST * width / (extent[1] + extent[2]))
+    else:
+        scale = min(0.96 * width / (2 * extent[0]), row / max(extent[1], extent[2]))
     return [
         _Panel(
             title,
@@ -171,7 +192,7 @@ def _drawn(
     if len(lights) > MOST_NAMES:
         names = {name: light for name, light in names.items() if light.is_changed}
     _draw_names(draw, panel, names, text)
-    whole = Image.new("RGB", (width, _height(panel, text)), GROUND)
+    whole = Image.new("RGB", (width, height + round(2.4 * text)), GROUND)
     whole.paste(picture, (0, 0))
     below = ImageDraw.Draw(whole)
     font = ImageFont.load_default(text)
