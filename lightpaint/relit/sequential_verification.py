@@ -1,10 +1,10 @@
 """A verification that stops as soon as it can tell.
 
 It is a group-sequential test: it looks at the render after a few samples, and each time that their
-number has doubled. It goes on while an error would probably not show in a large part of the light
-and more samples would help. That depends on the noise, and not on how well the two agree, so the
-difference in standard errors is as likely at one look as at any other. Only a difference beyond the
-limit ends it at once.
+number has grown by half or a third. It goes on while an error would probably not show in a large
+part of the light and more samples would help. That depends on the noise, and not on how well the
+two agree, so the difference in standard errors is as likely at one look as at any other. Only a
+difference beyond the limit ends it at once.
 
 The chance of a false alarm is spent evenly on the looks: the limit of each is so far out that all
 looks together pass sound renders as often as one look at `LIMIT` does, whenever it ends.
@@ -31,8 +31,8 @@ from lightpaint.relit.verification import (
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, render_in_stages
 
-#: Parts of its samples after which a verification is looked at.
-PARTS = (32, 16, 8, 4, 2, 1)
+#: Parts of its samples, of so many, after which a verification is looked at.
+LOOKS, ALL_PARTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64), 64
 
 #: Least samples of each pixel at a look, one for each half.
 FIRST_LOOK = 2
@@ -89,7 +89,8 @@ def stages_of(spp: int, block_pixels: int = 1) -> list[int]:
     Both halves have equal ones, in multiples of `block_pixels`.
     """
     step = 2 * block_pixels
-    looks = {max(spp // part // step * step, step) for part in PARTS if spp // part >= FIRST_LOOK}
+    each = [spp * part // ALL_PARTS for part in LOOKS]
+    looks = {max(samples // step * step, step) for samples in each if samples >= FIRST_LOOK}
     return [*sorted(samples for samples in looks if samples < spp), spp]
 
 

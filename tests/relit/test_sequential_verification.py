@@ -16,8 +16,9 @@ from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.relit.detection_power import LightShares
 from lightpaint.relit.relight import relight
 from lightpaint.relit.sequential_verification import (
+    ALL_PARTS,
     FIRST_LOOK,
-    PARTS,
+    LOOKS,
     can_tell,
     stages_of,
     verify_in_stages,
@@ -34,7 +35,7 @@ def test_stages_grow_up_to_all_samples_in_equal_halves(samples: int, block_pixel
     stages = stages_of(spp, block_pixels)
     assert stages[-1] == spp
     assert stages == sorted(set(stages))
-    assert len(stages) <= len(PARTS)
+    assert len(stages) <= len(LOOKS)
     for stage in stages:
         assert stage % (2 * block_pixels) == 0
     assert stages[0] >= min(spp, FIRST_LOOK)
@@ -42,13 +43,13 @@ def test_stages_grow_up_to_all_samples_in_equal_halves(samples: int, block_pixel
 
 def test_one_look_has_the_limit_and_more_looks_no_more_false_alarms():
     assert limit_of_tests(1) == pytest.approx(LIMIT, rel=1e-9)  # float64 in the tail
-    # Sums of white noise, looked at after 1/8, 1/4, 1/2 and all: how often one is beyond. At 5
-    # standard errors nothing would ever be, so it is tried where one look alarms in 1 of 20.
+    # Sums of white noise, looked at after some and all: how often one is beyond. At 5 standard
+    # errors nothing would ever be, so it is tried where one look alarms in 1 of 20.
     once, runs = NormalDist().inv_cdf(0.975), 20_000
-    looks = limit_of_tests(len(PARTS), once=once)
+    looks = limit_of_tests(len(LOOKS), once=once)
     rng = np.random.default_rng(0)
-    walk = rng.normal(size=(runs, PARTS[0])).cumsum(axis=1)
-    at = np.array([PARTS[0] // part for part in PARTS])
+    walk = rng.normal(size=(runs, ALL_PARTS)).cumsum(axis=1)
+    at = np.array(LOOKS)
     z = walk[:, at - 1] / np.sqrt(at)
     alarms = (np.abs(z) > looks).any(axis=1).mean()
     error = 4 * np.sqrt(0.05 * 0.95 / runs)
