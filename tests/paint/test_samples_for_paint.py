@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from renderer import LIGHTS, write_room
 
+from lightpaint.basis.cache.denoised_planes import read_denoised_planes
 from lightpaint.basis.render import guide_training
 from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import LatestWork
 from lightpaint.paint.store.store import MemoryStore
+from lightpaint.paint.studio import plane_denoiser
 from lightpaint.paint.studio.background_sampling import add_round
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -69,6 +71,40 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
         # Nothing more is taken then.
         time.sleep(1)
         assert studio.snapshot().bases[0].origin == basis.origin
+    finally:
+        studio.close()
+        studio.wait()
+
+
+def test_planes_with_added_samples_are_denoised_anew(
+    subject: Subject, monkeypatch: pytest.MonkeyPatch
+):
+    """Once there are enough, and not after each round."""
+    denoised: list[tuple[float, int]] = []
+    inner = plane_denoiser.denoise_to_halves
+
+    def denoise(basis: Any, k: int) -> Any:
+        denoised.append((basis.origin.extra_spp, k))
+        return inner(basis, k)
+
+    monkeypatch.setattr(plane_denoiser, "denoise_to_halves", denoise)
+    studio = Studio([subject], MemoryStore)
+    studio.start()
+    try:
+        wait(lambda: studio.store is not None)
+        paint(studio, 1, (0.5, 0.3, 0.2))
+
+        def is_done() -> bool:
+            [basis] = studio.snapshot().bases
+            extra = basis.origin.extra_spp
+            return extra > 0 and (extra, len(basis.lights) - 1) in denoised
+
+        wait(is_done)
+        [basis] = studio.snapshot().bases
+        assert Certainty.of(studio.snapshot().solution()).error <= 0.1
+        lights = list(range(len(basis.lights)))
+        assert [k for extra, k in denoised if extra > 0] == lights
+        wait(lambda: read_denoised_planes(basis) is not None)
     finally:
         studio.close()
         studio.wait()

@@ -30,6 +30,9 @@ class SamplingHost(Protocol):
     def use_bases(self, bases: Sequence[Basis]) -> None:
         """Continue the session with these bases."""
 
+    def denoise_planes(self) -> None:
+        """Denoise the planes of the present bases, where that is not done yet."""
+
     def publish(self, message: Message) -> None:
         """Send a message to pages."""
 
@@ -58,7 +61,7 @@ class BackgroundSampling:
             self._loop.give((snapshot, solution))
 
     def _add(self, answer: tuple[SessionSnapshot, Solution]) -> None:
-        """Add a round of samples."""
+        """Add a round of samples; once there are enough, denoise the planes that have them."""
         snapshot, solution = answer
 
         def is_outdated() -> bool:
@@ -69,6 +72,8 @@ class BackgroundSampling:
             bases = add_round(self._host.subjects, snapshot, solution, is_enough=is_outdated)
             if bases is not None:
                 self._host.use_bases(bases)
+            elif not is_outdated():
+                self._host.denoise_planes()
 
 
 def add_round(

@@ -1,7 +1,7 @@
 """Denoised planes, computed one after the other while the user paints."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,6 +99,7 @@ class PlaneDenoiser:
     def write_cache(self) -> None:
         """Cache the planes of the final basis for the next session."""
         if self._use_cache:
-            for planes_of_view in self._by_view.values():
+            for view, planes_of_view in list(self._by_view.items()):
                 if not planes_of_view.is_cached:
                     cache_denoised_planes(planes_of_view.basis, planes_of_view.planes)
+                    self._by_view[view] = replace(planes_of_view, is_cached=True)

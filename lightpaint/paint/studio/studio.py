@@ -332,6 +332,11 @@ class Studio:
             if is_reported and self.is_open:
                 self.on_failure(error)  # type: ignore[misc]
 
+    def denoise_planes(self) -> None:
+        """Denoise the planes of the present bases, where that is not done yet, and keep them."""
+        self._denoiser.denoise(self.session)
+        self._denoiser.write_cache()
+
     def use_bases(self, bases: Sequence[Basis]) -> None:
         """Continue the session with these bases."""
         presents = self._denoiser.load_cached(bases)
