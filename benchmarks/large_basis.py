@@ -5,7 +5,9 @@
 A basis of made-up lights is written plane by plane, none of which is kept, and a picture that other
 emissions of them make as a painting. Then `lightpaint solve` answers it from the file, report and
 all, in a process of its own, whose largest resident memory and time are printed, with how often it
-walked over all planes. A folder that is given keeps the files, where the next call finds the basis.
+walked over all planes. The answer is exported, and a hall of as many lights on as many pixels is
+drawn light by light and relit with it. With `--noise 1` single pixels say little, and blocks of
+them are fitted. A folder that is given keeps the files, where the next call finds the basis.
 """
 
 import argparse
@@ -19,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hall import write_hall
 
 import lightpaint as lp
 from lightpaint.basis.basis import Basis
@@ -30,6 +33,13 @@ from lightpaint.images.formats.png import png_bytes
 
 #: Values of noise that are drawn; each plane begins at another of them.
 DRAWN = 2**22 + 3
+
+#: Plugin, parameter and unit of four lights of a hall, whose lighting the answer can be.
+AREA = "area", "radiance", "W/(m² sr)"
+HALL_KINDS = (("spot", "intensity", "W/sr"), AREA, ("point", "intensity", "W/sr"), AREA)
+
+#: Formats of other programs that a lighting is exported to.
+FORMATS = "csv,json,mitsuba,usd,blender"
 
 #: Bytes of a GB, in which memory is told here, as in docs/benchmarks.md.
 GB = 1e9
@@ -89,7 +99,7 @@ def made_basis(count: int, size: tuple[int, int], noise: float) -> Basis:
     """A basis whose planes are made when they are asked for."""
     rng = np.random.default_rng(3)
     lights = [
-        BasisLight(f"light_{k}", "area", "radiance", "W/(m² sr)", tuple(rng.uniform(0, 0.1, 3)))
+        BasisLight(f"light_{k}", *HALL_KINDS[k % 4], tuple(rng.uniform(0, 0.1, 3)))
         for k in range(count)
     ]
     y, x = np.mgrid[: size[0], : size[1]]
@@ -117,9 +127,10 @@ def write_files(folder: Path, count: int, size: tuple[int, int], noise: float) -
 def measured(command: list[str], lights: int) -> Iterator[str]:
     """Run a command, and yield what it took."""
     code = f"""
-import collections, resource, runpy, sys, time
+import collections, os, resource, runpy, sys, time
 from lightpaint.images.formats.exr_rows import RowFile
 sys.argv = {command!r}
+sys.path.insert(0, os.path.dirname(sys.argv[0]))
 rows, spent_s, plain = collections.Counter(), collections.Counter(), RowFile.read_rows
 def read_rows(self, part, top, bottom, names, into):
     began_s = time.thread_time()
@@ -157,13 +168,18 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, help="for the files; one that is deleted by default")
     parser.add_argument("--write", action="store_true", help=argparse.SUPPRESS)
     options, more = parser.parse_known_args()
-    width, height = map(int, options.size.split("x"))
     if options.write:
-        write_files(options.folder, options.lights, (height, width), options.noise)
+        write_files(options.folder, options.lights, made_size(options), options.noise)
         return
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.folder or Path(temporary)
         run(folder, options, more)
+
+
+def made_size(options: argparse.Namespace) -> tuple[int, int]:
+    """(height, width) in pixels."""
+    width, height = map(int, options.size.split("x"))
+    return height, width
 
 
 def run(folder: Path, options: argparse.Namespace, more: list[str]) -> None:
@@ -182,6 +198,17 @@ def run(folder: Path, options: argparse.Namespace, more: list[str]) -> None:
     for told in measured(solve, options.lights):
         print(f"    solved, predicted and reported: {told}", flush=True)
     print(f"    results: {', '.join(sorted(x.name for x in (folder / 'results').iterdir()))}")
+    height, width = made_size(options)
+    scene = str(write_hall(folder, options.lights, width=width, height=height))
+    lighting = str(folder / "results" / "lighting.json")
+    for what, command in {
+        "exported": ["export", lighting, "--to", FORMATS, "--scene", scene, "-o", "exports"],
+        "drawn as lights.png": ["lights", scene, "-o", "lights.png"],
+        "relit, 4 samples per pixel": ["relight", scene, lighting, "--spp", "4", "-o", "relit"],
+    }.items():
+        command[-1] = str(folder / command[-1])
+        for told in measured([lightpaint, *command, "--force"], options.lights):
+            print(f"    {what}: {told}", flush=True)
 
 
 if __name__ == "__main__":

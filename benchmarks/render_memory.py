@@ -1,15 +1,17 @@
 """How much memory a basis takes while it is rendered, and then at rest.
 
-    python benchmarks/render_memory.py [--lights 64] [--size 1920x1080] [--spp 4]
+    python benchmarks/render_memory.py [--lights 64] [--size 1920x1080] [--spp 4] [--whole]
         [--before CHECKOUT]
 
 A hall of lights is rendered by `obtain_basis` in a process of its own, with a cache and without.
 Printed are the largest resident memory of the process, and what it has for each light afterwards
 beyond what it had with the scene loaded. Neither depends on the samples. `--before` names a
-checkout of an earlier version, which is then measured as well.
+checkout of an earlier version, which is then measured as well. `--whole` traces the whole film at
+once beside it, whatever memory that takes: what bands cost in time.
 """
 
 import argparse
+import itertools
 import os
 import subprocess
 import sys
@@ -21,7 +23,7 @@ from hall import write_hall
 REPOSITORY = Path(__file__).parent.parent
 
 #: What renders in a process of its own. Arguments: the scene with few pixels, and with all of them,
-#: samples, and whether there is a cache.
+#: samples, whether there is a cache, and whether the film is traced in bands or whole.
 RENDER = """
 import gc, resource, sys, time
 from pathlib import Path
@@ -37,6 +39,9 @@ def resident():
             return int(line.split()[1]) * 1024
 
 small, path, spp, has_cache = *sys.argv[1:3], int(sys.argv[3]), sys.argv[4] == "cache"
+if sys.argv[5] == "whole":
+    from lightpaint.basis.render import banded_film
+    banded_film.WHOLE_MAX_BYTES = 2**62
 # A few pixels first, so that everything is imported and compiled.
 obtain_basis(lp.load_scene(small), spp=2, use_cache=False)
 scene = lp.load_scene(path)
@@ -56,6 +61,7 @@ def main() -> None:
     parser.add_argument("--lights", type=int, default=64)
     parser.add_argument("--size", default="1920x1080", metavar="WxH")
     parser.add_argument("--spp", type=int, default=4)
+    parser.add_argument("--whole", action="store_true", help="trace whole films as well")
     parser.add_argument("--before", type=Path, metavar="CHECKOUT")
     options = parser.parse_args()
     width, height = map(int, options.size.split("x"))
@@ -68,18 +74,20 @@ def main() -> None:
             (Path(folder) / name).mkdir()
             paths.append(write_hall(Path(folder) / name, options.lights, width=w, height=h))
         for name, checkout in (checkouts | {"now": REPOSITORY}).items():
-            for how in ("cache", "none"):
-                print(
-                    f"    {name:6s} cache: {how:5s} {rendered(paths, checkout, options, how)}",
-                    flush=True,
-                )
+            films = ["bands", "whole"] if options.whole and checkout == REPOSITORY else ["bands"]
+            for how, film in itertools.product(("cache", "none"), films):
+                told = rendered(paths, checkout, options, how, film)
+                kind = f"{name:6s} cache: {how:5s}" + (f" {film}" if options.whole else "")
+                print(f"    {kind} {told}", flush=True)
 
 
-def rendered(paths: list[Path], checkout: Path, options: argparse.Namespace, how: str) -> str:
+def rendered(
+    paths: list[Path], checkout: Path, options: argparse.Namespace, how: str, film: str
+) -> str:
     """Return what a render in a process of its own took."""
     with tempfile.TemporaryDirectory() as cache:
         its = os.environ | {"PYTHONPATH": str(checkout), "LIGHTPAINT_CACHE": cache}
-        command = [sys.executable, "-c", RENDER, *map(str, paths), str(options.spp), how]
+        command = [sys.executable, "-c", RENDER, *map(str, paths), str(options.spp), how, film]
         done = subprocess.run(command, env=its, cwd=checkout, capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(done.stderr)

@@ -98,13 +98,16 @@ def test_results_are_those_of_planes_in_memory(
     assert np.abs(sheets[0] - sheets[1]).max() <= 1
 
 
+@pytest.mark.parametrize("grain", [0.02, NOISY])
 def test_memory_of_a_large_film_is_that_of_a_few_pictures(
-    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, make_basis: Any, monkeypatch: pytest.MonkeyPatch, grain: float
 ) -> None:
     size = 360, 640
-    files = written(tmp_path, make_basis, size)
     monkeypatch.chdir(tmp_path)
-
+    (tmp_path / "small").mkdir()
+    small = written(tmp_path / "small", make_basis, (36, 64))
+    lp.paint_with_light(None, small["painting"], "warm", basis=small["basis"])  # imports
+    files = written(tmp_path, make_basis, size, grain=grain)
     stay_in_the_file(monkeypatch, 2**15)
     tracemalloc.start()
     try:
