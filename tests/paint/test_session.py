@@ -409,14 +409,14 @@ def test_a_hand_on_one_of_tied_lights_moves_all_of_them(basis: lp.Basis, space: 
 
 def test_what_is_held_is_let_go_of_by_zero(basis: lp.Basis):
     session = session_of(basis)
-    usual = session.edit_state["meant"].hold
+    usual = session.edit_state["resolved"].hold
     assert usual > 0
     session.handle(protocol.Set({"hold": 0}), {})
-    assert session.edit_state["meant"].hold == session.snapshot().settings.hold == 0
+    assert session.edit_state["resolved"].hold == session.snapshot().settings.hold == 0
     assert options_of(session.requests) == ["--hold 0"]
     assert session.edit_state["history"].undo == ("Unpainted parts",)
     session.handle(protocol.Set({"hold": None}), {})
-    assert session.edit_state["meant"].hold == usual
+    assert session.edit_state["resolved"].hold == usual
     session.handle(protocol.Undo(), {})
     assert session.edit_state["settings"] == {"hold": 0}
 

@@ -208,7 +208,7 @@ class EditState:
     """The steps that can be undone, and the requests in effect.
 
     asked: constraints by name of light, keys and values as in a lights file. ties: names on one
-    dimmer. settings: set by somebody. meant: the values in effect. poses: of lights that were
+    dimmer. settings: set by somebody. resolved: the values in effect. poses: of lights that were
     moved, by name.
     """
 
@@ -217,7 +217,7 @@ class EditState:
     ties: tuple[tuple[str, ...], ...] | None = field(default=None, metadata=OPTIONAL)
     settings: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
     poses: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
-    meant: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
+    resolved: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
 
 
 #: Tone of a message to a person.

@@ -22,7 +22,7 @@ def edit_state(history: History, live_answer: LiveAnswer) -> dict[str, Any]:
         "ties": requests.ties,
         "settings": dict(requests.values),
         "poses": dict(requests.poses),
-        "meant": ResolvedFit(fit.space, fit.hold, fit.colors),
+        "resolved": ResolvedFit(fit.space, fit.hold, fit.colors),
     }
 
 

@@ -22,7 +22,7 @@ export class SlowHost extends Emitter {
   async answer(kind = "answer", more = {}) {
     const next = this.said.find((one) => !one.isDone);
     next.isDone = true;
-    this.tell(kind, { kind, arrays: {}, ...more });
+    this.emit(kind, { kind, arrays: {}, ...more });
     next.resolve({ kind, arrays: {}, ...more });
     await settle();
   }
@@ -33,14 +33,14 @@ export class SlowHost extends Emitter {
       one.isDone = true;
       one.reject(new Error("lost"));
     }
-    this.tell("connection", { kind: "connection", state: "lost" });
+    this.emit("connection", { kind: "connection", state: "lost" });
     await settle();
   }
 
   async find(stroke = 0) {
     this.isOpen = true;
-    this.tell("state", { kind: "state", stroke, arrays: {} });
-    this.tell("connection", { kind: "connection", state: "open" });
+    this.emit("state", { kind: "state", stroke, arrays: {} });
+    this.emit("connection", { kind: "connection", state: "open" });
     await settle();
   }
 

@@ -13,14 +13,14 @@ export class SiteHost extends Emitter {
 
   async begin() {
     const weights = await array("weights");
-    this.tell("state", { kind: "state", ...this.state, arrays: { weights } });
-    this.tell("connection", { kind: "connection", state: "open" });
+    this.emit("state", { kind: "state", ...this.state, arrays: { weights } });
+    this.emit("connection", { kind: "connection", state: "open" });
   }
 
   async send(kind, fields = {}, arrays = {}) {
     this.said.push({ kind, fields, arrays });
     const made = { kind: kind === "drop" ? "patch" : "answer", arrays: {} };
-    this.tell(made.kind, made);
+    this.emit(made.kind, made);
     return made;
   }
 

@@ -171,7 +171,7 @@ def test_asking_by_numbers_line_fill_and_undo(run: Any):
         await rest();
         const arrays = { image: { data: new Float32Array(3 * H * W).fill(0.125), shape: [H, W, 3] },
             importance: { data: new Float32Array(H * W), shape: [H, W] } };
-        host.tell("patch", { kind: "patch", region: [0, H, 0, W], arrays });
+        host.emit("patch", { kind: "patch", region: [0, H, 0, W], arrays });
         const back = light(30, 3);
         engine.line(at(2, 25), at(18, 25));
         return [wall, floor, back, [light(2, 25), light(10, 25), light(10, 20)], await rest()];
@@ -192,7 +192,7 @@ def test_what_is_undone_while_the_painting_is_fetched_stays_undone(run: Any):
         await until(() => host.fetched.includes("importance"));
         const arrays = { image: { data: new Float32Array(3 * H * W).fill(0.125), shape: [H, W, 3] },
             importance: { data: new Float32Array(H * W), shape: [H, W] } };
-        host.tell("patch", { kind: "patch", region: [0, H, 0, W], arrays });
+        host.emit("patch", { kind: "patch", region: [0, H, 0, W], arrays });
         go();
         await synced;
         return engine.lightAt("painting", 5, 5)[0];
@@ -270,7 +270,7 @@ def test_newer_pictures_are_fetched_and_others_are_not(run: Any):
     fetched = run(
         """
         const before = host.fetched.length;
-        host.tell("renewed", { kind: "renewed", resources: { "plane/1": 2 } });
+        host.emit("renewed", { kind: "renewed", resources: { "plane/1": 2 } });
         await until(() => loads.at(-1)[1] === 0 && host.fetched.length > before);
         return host.fetched.slice(before);
         """
@@ -300,7 +300,7 @@ def test_of_another_view_only_its_pictures_are_fetched(run: Any, site_of: Any):
 def test_old_answers_do_not_come_back(run: Any):
     weights = run(
         """
-        const say = (version, value) => host.tell("answer", { kind: "answer", version,
+        const say = (version, value) => host.emit("answer", { kind: "answer", version,
             arrays: { weights: { data: new Float64Array(9).fill(value), shape: [3, 3] } } });
         say(7, 1); say(6, 2);
         return Array.from(engine.mirror.weights);
@@ -312,7 +312,7 @@ def test_old_answers_do_not_come_back(run: Any):
 def test_an_answer_to_what_was_undone_does_not_come_back(run: Any):
     weights = run(
         """
-        const say = (kind, version, value) => host.tell(kind, { kind, version, region: [0, 0, 0, 0],
+        const say = (kind, version, value) => host.emit(kind, { kind, version, region: [0, 0, 0, 0],
             arrays: { weights: { data: new Float64Array(9).fill(value), shape: [3, 3] } } });
         say("patch", 7, 1); say("answer", 6, 2); say("patch", 6, 3);
         return Array.from(engine.mirror.weights);

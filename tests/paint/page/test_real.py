@@ -535,7 +535,7 @@ def test_a_tab_of_an_earlier_start_says_what_to_do(subject: Subject, browser: An
         page = context.new_page()
         page.goto(served.server.url)
         me = Person(page, served).ready()
-        me.look("host.hearers.delete('closed')")  # one that is killed says no goodbye
+        me.look("host.listeners.delete('closed')")  # one that is killed says no goodbye
     finally:
         served.close()
     again = None

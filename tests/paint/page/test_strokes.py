@@ -111,11 +111,11 @@ def test_what_another_page_has_not_let_through_is_given_up(told: Any):
     said = told(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); strokes.end("a");
-        host.tell("closed", { kind: "closed", reason: "taken" });
+        host.emit("closed", { kind: "closed", reason: "taken" });
         await host.lose();
         strokes.begin(); strokes.touch([8, 9, 8, 9]);
         host.said.length = 0;
-        host.tell("state", { kind: "state", stroke: 7, is_back: false });
+        host.emit("state", { kind: "state", stroke: 7, is_back: false });
         await host.find(7);
         const lost = host.lost;
         strokes.begin(); strokes.touch([1, 2, 1, 2]); strokes.end("b");
@@ -147,7 +147,7 @@ def test_nothing_of_a_stroke_is_sent_again_as_pictures_come(told: Any):
     said = told(
         """
         strokes.begin(); strokes.touch([0, 2, 0, 2]); await host.answer();
-        host.tell("renewed", { kind: "renewed", resources: {} });
+        host.emit("renewed", { kind: "renewed", resources: {} });
         strokes.touch([5, 6, 5, 6]);
         return host.told;
         """
@@ -207,7 +207,7 @@ def test_what_another_page_did_not_let_through_waits(told: Any):
         await host.answer();
         await host.answer("closed");
         const pending = strokes.isPending;
-        host.tell("connection", { state: "open" });
+        host.emit("connection", { state: "open" });
         await host.answer();
         return [host.told, [pending, strokes.isPending]];
         """

@@ -197,7 +197,7 @@ export interface Findings {
  * The steps that can be undone, and the requests in effect.
  *
  * asked: constraints by name of light, keys and values as in a lights file. ties: names on one
- * dimmer. settings: set by somebody. meant: the values in effect. poses: of lights that were
+ * dimmer. settings: set by somebody. resolved: the values in effect. poses: of lights that were
  * moved, by name.
  */
 export interface EditState {
@@ -206,7 +206,7 @@ export interface EditState {
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
-  meant?: ResolvedFit;
+  resolved?: ResolvedFit;
 }
 
 /**
@@ -228,7 +228,7 @@ export interface SessionState {
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
-  meant?: ResolvedFit;
+  resolved?: ResolvedFit;
   version: number;
   scene: string;
   folder: string;
@@ -294,7 +294,7 @@ export interface AnswerUpdate {
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
-  meant?: ResolvedFit;
+  resolved?: ResolvedFit;
   version: number;
   stroke: number;
   exact: boolean;
@@ -317,7 +317,7 @@ export interface CanvasPatch {
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
-  meant?: ResolvedFit;
+  resolved?: ResolvedFit;
   region: Region;
   view: number;
   views: number[];

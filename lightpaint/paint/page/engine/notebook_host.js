@@ -9,8 +9,8 @@ import { VERSION, bufferInfo, pictureOf } from './message_frames.js';
 
 /** What anywidget has of a model.
  * @typedef {{get: (name: string) => unknown,
- *   on: (event: string, hear: (...given: any[]) => void) => void,
- *   off: (event: string, hear: (...given: any[]) => void) => void,
+ *   on: (event: string, listener: (...values: any[]) => void) => void,
+ *   off: (event: string, listener: (...values: any[]) => void) => void,
  *   send: (content: unknown, callbacks?: unknown, buffers?: (ArrayBuffer | ArrayBufferView)[]) =>
  *   void}} Model */
 
@@ -33,8 +33,8 @@ export class ModelHost extends Emitter {
     /** @type {Map<number, {resolve: (message: Message) => void, reject: (error: Error) => void}>} */
     this.asked = new Map();
     /** @type {(content: any, buffers: DataView[]) => void} */
-    this.hear = (content, buffers) => this.receive(content, buffers);
-    model.on('msg:custom', this.hear);
+    this.onContent = (content, buffers) => this.receive(content, buffers);
+    model.on('msg:custom', this.onContent);
     // A comm lives from its beginning, and what changes is that it ends: with a kernel that is
     // started again, for one. What is sent to it then reaches nobody.
     this.end = () => this.ended();
@@ -69,8 +69,8 @@ export class ModelHost extends Emitter {
     );
     const message = /** @type {Message} */ ({ ...content, arrays });
     this.hush(false);
-    this.tell(message.kind, message);
-    if (message.kind === 'state') this.tell('connection', { kind: 'connection', state: 'open' });
+    this.emit(message.kind, message);
+    if (message.kind === 'state') this.emit('connection', { kind: 'connection', state: 'open' });
     if (message.reply === undefined) return;
     this.asked.get(message.reply)?.resolve(message);
     this.asked.delete(message.reply);
@@ -89,7 +89,7 @@ export class ModelHost extends Emitter {
 
   /** @param {boolean} isSilent */
   hush(isSilent) {
-    if (isSilent !== this.isSilent) this.tell('silence', { kind: 'silence', isSilent });
+    if (isSilent !== this.isSilent) this.emit('silence', { kind: 'silence', isSilent });
     this.isSilent = isSilent;
   }
 
@@ -97,7 +97,7 @@ export class ModelHost extends Emitter {
   ended() {
     this.leave(ENDED_TEXT);
     this.hush(false);
-    this.tell('closed', { kind: 'closed', reason: 'ended', text: ENDED_TEXT });
+    this.emit('closed', { kind: 'closed', reason: 'ended', text: ENDED_TEXT });
   }
 
   /** Nothing is asked or answered any more. @param {string} why */
@@ -136,7 +136,7 @@ export class ModelHost extends Emitter {
   }
 
   close() {
-    this.model.off('msg:custom', this.hear);
+    this.model.off('msg:custom', this.onContent);
     this.model.off('comm_live_update', this.end);
     this.leave('the painter is closed');
   }

@@ -48,7 +48,7 @@ export class PictureEngine extends Emitter {
     this.element = document.createElement('div');
     this.element.className = 'pictures';
     this.screen = new Screen(this.element, { view, refill: () => this.mirror.refill() });
-    this.mirror = new SessionMirror(host, this.screen, (kind, event) => this.tell(kind, event));
+    this.mirror = new SessionMirror(host, this.screen, (kind, event) => this.emit(kind, event));
     this.on('lost', () => this.dropStroke());
     /** @type {Stroke | null} */
     this.stroke = null;
@@ -196,7 +196,7 @@ export class PictureEngine extends Emitter {
   move(points) {
     if (!this.stroke) return;
     this.touched(this.stroke.move(points));
-    if (this.stroke.settings.tool === 'adjust') this.tell('asking', this.stroke.asked);
+    if (this.stroke.settings.tool === 'adjust') this.emit('asking', this.stroke.asked);
   }
 
   end() {

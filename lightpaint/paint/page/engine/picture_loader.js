@@ -16,12 +16,12 @@ const RETRY_MS = 2000;
 export class PictureLoader {
   /** @param {import("./socket_host.js").Host} host
    * @param {(slot: string, name: string, picture: Picture) => void} use a picture for its slot
-   * @param {(done: number, total: number, isFirst: boolean) => void} tell isFirst: some light has no
+   * @param {(done: number, total: number, isFirst: boolean) => void} onProgress isFirst: some light has no
    *   picture yet */
-  constructor(host, use, tell) {
+  constructor(host, use, onProgress) {
     this.host = host;
     this.use = use;
-    this.tell = tell;
+    this.onProgress = onProgress;
     /** @type {Record<string, number>} */
     this.resources = {};
     /** Name of the picture that each slot is to have. @type {Map<string, string>} */
@@ -92,7 +92,7 @@ export class PictureLoader {
     const missing = this.missing();
     this.total = missing.length ? Math.max(this.total, missing.length) : 0;
     const isFirst = missing.some(([slot]) => slot.startsWith('plane ') && !this.there.has(slot));
-    this.tell(this.total - missing.length, this.total, isFirst);
+    this.onProgress(this.total - missing.length, this.total, isFirst);
     for (const [slot, name] of missing) {
       if (this.onTheWay.size >= MAX_FETCHES) return;
       if (!this.onTheWay.has(slot)) this.load(slot, name);

@@ -19,18 +19,18 @@ import { StrokeSender } from './stroke_sender.js';
 
 export class SessionMirror {
   /** @param {Host} host @param {Screen} screen
-   * @param {(kind: string, event: any) => void} tell */
-  constructor(host, screen, tell) {
+   * @param {(kind: string, event: any) => void} emit */
+  constructor(host, screen, emit) {
     this.host = host;
     this.screen = screen;
-    this.tell = tell;
+    this.emit = emit;
     this.loader = new PictureLoader(
       host,
       (slot, name, picture) => this.loaded(slot, name, picture),
-      (done, total, isFirst) => tell('loading', { done, total, isFirst }),
+      (done, total, isFirst) => emit('loading', { done, total, isFirst }),
     );
     /** As the session said it last, and as it is of the view. @type {Message | null} */
-    this.said = null;
+    this.latestState = null;
     /** @type {Message | null} */
     this.state = null;
     /** Which view is shown, and painted. */
@@ -81,21 +81,21 @@ export class SessionMirror {
 
   /** Show another view. @param {number} view */
   showView(view) {
-    const { said } = this;
-    if (!said?.views?.[view] || view === this.view) return;
+    const { latestState } = this;
+    if (!latestState?.views?.[view] || view === this.view) return;
     // Whatever was done since is to be asked for.
-    this.open({ ...said, first: false }, view);
+    this.open({ ...latestState, first: false }, view);
     this.weigh();
     this.want();
   }
 
-  /** @param {Message} said @param {number} view */
-  open(said, view) {
+  /** @param {Message} message @param {number} view */
+  open(message, view) {
     const before = this.state;
-    const state = stateOfView(said, view);
-    const isOther = !before || !this.said || sizes(this.said) !== sizes(said);
+    const state = stateOfView(message, view);
+    const isOther = !before || !this.latestState || sizes(this.latestState) !== sizes(message);
     const isSame = !isOther && this.view === view;
-    this.said = said;
+    this.latestState = message;
     this.state = state;
     this.view = view;
     if (isSame) return;
@@ -106,7 +106,7 @@ export class SessionMirror {
       const refused = () => this.host.send('hello', { version: VERSION }).catch(() => {});
       this.strokes?.close();
       const lost = (/** @type {number} */ count, /** @type {boolean} */ isStale) =>
-        this.tell('lost', { count, isStale });
+        this.emit('lost', { count, isStale });
       this.strokes = new StrokeSender(this.host, refused, lost);
       this.strokes.count = Math.max(0, Number(state.stroke) || 0);
     }
@@ -147,7 +147,7 @@ export class SessionMirror {
     const { view = 0, views = [] } = message;
     if (view !== this.view) {
       // What is undone is seen.
-      if (views.length && !views.includes(this.view)) this.tell('view', { view });
+      if (views.length && !views.includes(this.view)) this.emit('view', { view });
       return;
     }
     const region = /** @type {Region} */ (message.region);
@@ -187,7 +187,7 @@ export class SessionMirror {
     } catch (error) {
       // Who does not have the session has been told so.
       if (this.loader.isHeld) return;
-      this.tell('trouble', { text: error instanceof Error ? error.message : String(error) });
+      this.emit('trouble', { text: error instanceof Error ? error.message : String(error) });
     }
   }
 

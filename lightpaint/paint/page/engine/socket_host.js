@@ -21,7 +21,7 @@ import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
  * @typedef {object} Host
  * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K], arrays?: Arrays) =>
  *   Promise<Message>} send
- * @property {<K extends keyof HostEvents>(kind: K, hear: (message: HostEvents[K]) => void) => void} on
+ * @property {<K extends keyof HostEvents>(kind: K, listener: (message: HostEvents[K]) => void) => void} on
  * @property {(name: string) => Promise<Picture>} fetch
  * @property {() => void} close
  * @property {() => Promise<void>} [gate] is waited for by what is said after strokes
@@ -41,19 +41,19 @@ export class Emitter {
      * @type {() => Promise<void>} */
     this.gate = async () => {};
     /** @type {Map<string, ((message: any) => void)[]>} */
-    this.hearers = new Map();
+    this.listeners = new Map();
   }
 
-  /** @param {string} kind @param {(message: any) => void} hear */
-  on(kind, hear) {
-    this.hearers.set(kind, [...(this.hearers.get(kind) ?? []), hear]);
+  /** @param {string} kind @param {(message: any) => void} listener */
+  on(kind, listener) {
+    this.listeners.set(kind, [...(this.listeners.get(kind) ?? []), listener]);
   }
 
   /** One who fails does not keep it from the others. @param {string} kind @param {any} message */
-  tell(kind, message) {
-    for (const hear of this.hearers.get(kind) ?? [])
+  emit(kind, message) {
+    for (const listener of this.listeners.get(kind) ?? [])
       try {
-        hear(message);
+        listener(message);
       } catch (error) {
         console.error(error);
       }
@@ -133,7 +133,7 @@ export class SocketHost extends Emitter {
   /** Connect again, after a while. */
   retry() {
     if (this.isOver) return;
-    this.tell('connection', { kind: 'connection', state: 'lost' });
+    this.emit('connection', { kind: 'connection', state: 'lost' });
     this.timer = setTimeout(() => void this.open(), this.wait);
     this.wait = Math.min(WAITS.most, 2 * this.wait);
   }
@@ -141,7 +141,7 @@ export class SocketHost extends Emitter {
   /** Say that the server does not know this page, and ask it no more. */
   refuse() {
     this.close();
-    this.tell('connection', { kind: 'connection', state: 'stale' });
+    this.emit('connection', { kind: 'connection', state: 'stale' });
   }
 
   /** Whether a server is there that does not know this page; then it is not asked again, since the
@@ -168,8 +168,8 @@ export class SocketHost extends Emitter {
     if (kind === 'state') this.generations = { ...message.resources };
     // Who is of another version, or has been told to leave, does not come back by itself.
     if (kind === 'closed' && message.reason === 'version') this.isOver = true;
-    this.tell(kind, message);
-    if (isThere) this.tell('connection', { kind: 'connection', state: 'open' });
+    this.emit(kind, message);
+    if (isThere) this.emit('connection', { kind: 'connection', state: 'open' });
     if (reply === undefined) return;
     this.asked.get(reply)?.resolve(message);
     this.asked.delete(reply);

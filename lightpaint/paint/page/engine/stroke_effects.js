@@ -51,7 +51,7 @@ export function pixelChange(canvas, effect) {
     }
   };
   const { full, lift } = canvas;
-  const its = new Float64Array(3); // one for all pixels: they are many
+  const pixel = new Float64Array(3); // one for all pixels: they are many
   /** @type {(tile: Tile, q: number, p: number, covered: number) => void} */
   const count = (tile, q, p, covered) => {
     const before = scaledImportance(tile.importance[q], lift);
@@ -71,9 +71,9 @@ export function pixelChange(canvas, effect) {
       const { ground } = effect;
       if (ground)
         return (tile, q, p, covered) => {
-          for (let c = 0; c < 3; c++) its[c] = VALUES[present[3 * p + c]];
-          adjust(its, ground);
-          towards(tile, q, p, covered, (c) => its[c]);
+          for (let c = 0; c < 3; c++) pixel[c] = VALUES[present[3 * p + c]];
+          adjust(pixel, ground);
+          towards(tile, q, p, covered, (c) => pixel[c]);
           importance[p] = tile.importance[q] + covered * (1 - tile.importance[q]);
         };
       return (tile, q, p, covered) => {
@@ -89,9 +89,9 @@ export function pixelChange(canvas, effect) {
       };
     case 'adjust':
       return (tile, q, p, covered) => {
-        for (let c = 0; c < 3; c++) its[c] = tile.image[3 * q + c];
-        adjust(its, effect);
-        towards(tile, q, p, covered, (c) => its[c]);
+        for (let c = 0; c < 3; c++) pixel[c] = tile.image[3 * q + c];
+        adjust(pixel, effect);
+        towards(tile, q, p, covered, (c) => pixel[c]);
         count(tile, q, p, covered);
       };
   }

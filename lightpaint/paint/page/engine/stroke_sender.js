@@ -81,7 +81,7 @@ export class StrokeSender {
       this.left.filter((one) => !('isDropped' in one)).length + (this.live?.whole ? 1 : 0);
     this.left = [];
     this.live = null;
-    this.tell();
+    this.resolveWaiting();
     if (count) this.lost(count, isStale);
   }
 
@@ -90,7 +90,7 @@ export class StrokeSender {
     this.isOver = true;
     this.left = [];
     removeEventListener('pagehide', this.leave);
-    this.tell();
+    this.resolveWaiting();
   }
 
   /** The page goes away: what is done is said now, and nobody waits for the answers. */
@@ -114,11 +114,11 @@ export class StrokeSender {
   settled() {
     return new Promise((resolve) => {
       this.waiting.push(resolve);
-      this.tell();
+      this.resolveWaiting();
     });
   }
 
-  tell() {
+  resolveWaiting() {
     if (!this.left.length) for (const resolve of this.waiting.splice(0)) resolve();
   }
 
@@ -199,7 +199,7 @@ export class StrokeSender {
     }
     this.isBusy = false;
     this.isDropping = false;
-    this.tell();
+    this.resolveWaiting();
     this.pump();
   }
 }

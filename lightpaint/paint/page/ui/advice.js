@@ -43,8 +43,8 @@ const BUTTON_CHARACTERS = 14;
  * light's name */
 function nameOf({ kind, names }, most = Infinity) {
   if (kind in OF_ALL) return OF_ALL[kind];
-  const which = names.length === 1 ? shortened(names[0], most) : `${names.length} lights`;
-  return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${which}`;
+  const lights = names.length === 1 ? shortened(names[0], most) : `${names.length} lights`;
+  return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${lights}`;
 }
 
 /** The same at length. @param {Cause} cause @param {string} name */
@@ -58,8 +58,8 @@ function titleOf({ kind, hold }, name) {
 function changeOf({ kind, names, hold }, ui, session) {
   /** @param {string} key @param {any} value @returns {Change} */
   const set = (key, value) => ({ kind: 'set', fields: { values: { [key]: value } } });
-  if (kind === 'hold') return ui.meant.hold === hold ? null : set('hold', hold);
-  if (kind === 'colors') return ui.meant.colors === 'free' ? null : set('colors', 'free');
+  if (kind === 'hold') return ui.resolved.hold === hold ? null : set('hold', hold);
+  if (kind === 'colors') return ui.resolved.colors === 'free' ? null : set('colors', 'free');
   if (kind === 'sparse' || kind === 'prefer_current')
     return ui.settings[kind] ? set(kind, null) : null;
   if (kind === 'tie') {

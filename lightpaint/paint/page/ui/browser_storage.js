@@ -38,16 +38,16 @@ export function storedFolds() {
 /** What the hand had the last time, of that what is sound.
  * @returns {Partial<Ui>} the size as it is kept: as a part of the picture's height, in `share` */
 export function storedTool() {
-  const kept = read(TOOL_KEY);
-  const paint = validPaint(kept);
-  const second = validPaint(kept.second);
+  const stored = read(TOOL_KEY);
+  const paint = validPaint(stored);
+  const second = validPaint(stored.second);
   const shares = { flow: 0.01, fillFlow: 0.01, hardness: 0 };
-  const found = Object.entries(shares).filter(([key, least]) => isWithin(kept[key], least, 1));
+  const found = Object.entries(shares).filter(([key, least]) => isWithin(stored[key], least, 1));
   return {
-    ...Object.fromEntries(found.map(([key]) => [key, kept[key]])),
+    ...Object.fromEntries(found.map(([key]) => [key, stored[key]])),
     ...paint,
     ...(second ? { second } : {}),
-    recent: recentPaints(kept),
+    recent: recentPaints(stored),
   };
 }
 

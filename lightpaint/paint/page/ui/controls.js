@@ -154,7 +154,7 @@ export function Slider(props) {
   const of = curve?.of ?? ((/** @type {number} */ x) => x);
   const move = (/** @type {number} */ place, /** @type {boolean} */ done) =>
     change(of(place), done);
-  const moved = (/** @type {any} */ event, /** @type {boolean} */ done) =>
+  const moveTo = (/** @type {any} */ event, /** @type {boolean} */ done) =>
     move(Number(event.currentTarget.value), done);
   const input = useRef(/** @type {HTMLInputElement | null} */ (null));
   const latest = useRef({ move, place: to(value) });
@@ -180,8 +180,8 @@ export function Slider(props) {
       aria-valuetext=${text ?? `${Number(value.toFixed(digits))} ${unit ?? ''}`.trim()}
       class=${track ? 'has-track' : ''}
       style=${{ '--at': String(at), ...(track ? { '--track': track } : {}) }}
-      onInput=${(/** @type {any} */ event) => moved(event, false)}
-      onChange=${(/** @type {any} */ event) => moved(event, true)}
+      onInput=${(/** @type {any} */ event) => moveTo(event, false)}
+      onChange=${(/** @type {any} */ event) => moveTo(event, true)}
       onDblClick=${() => rest !== undefined && change(rest, true)} />
     ${
       !plain &&

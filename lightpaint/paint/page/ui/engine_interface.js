@@ -17,7 +17,7 @@
  * @typedef {object} Host
  * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K],
  *   arrays?: Record<string, Picture>) => Promise<Message>} send
- * @property {<K extends keyof HostEvents>(kind: K, hear: (message: HostEvents[K]) => void) => void} on
+ * @property {<K extends keyof HostEvents>(kind: K, listener: (message: HostEvents[K]) => void) => void} on
  * @property {(name: string) => Promise<Picture>} fetch
  * @property {() => void} close
  */
@@ -96,7 +96,7 @@
  * @property {() => Objects | null} objects which object each pixel shows, once that is known
  * @property {() => number} greatest importance that is painted; 1 at least
  * @property {(rgb: RGB, stops: number) => number[]} codes that light is shown with, at an exposure
- * @property {(name: string, hear: (event: any) => void) => void} on "message": an answer to a
+ * @property {(name: string, listener: (event: any) => void) => void} on "message": an answer to a
  *   stroke; "loading": {done, total, isFirst} pictures, where some of
  *   the lights have none yet; "asking": {stops, mired} while a drag asks;
  *   "view": {view} in which something was undone; "lost": {count, isStale} strokes that are not

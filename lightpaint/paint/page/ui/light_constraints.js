@@ -61,7 +61,7 @@ export function LightConstraints(props) {
 function LockedLevel({ k, light, app, rgb }) {
   const [unit, setUnit] = useState(isOnNow(light) ? 'stops' : 'value');
   const level = luminance(rgb);
-  const hold = (/** @type {number} */ to) =>
+  const lockAt = (/** @type {number} */ to) =>
     app.session.lockLight(k, atLevel(rgb, light, to), true);
   const now = nowOf(light);
   const { value, least, step, of } = {
@@ -84,7 +84,7 @@ function LockedLevel({ k, light, app, rgb }) {
     <${NumberField} label="Locked at" value=${value} least=${least} most=${unit === 'stops' ? 20 : undefined}
       figures=${unit === 'stops' ? undefined : FIGURES} step=${step} start=${DARKEST}
       empty=${unit === 'stops' ? 'off' : undefined}
-      change=${(/** @type {number | null} */ to) => hold(to === null ? 0 : of(to))} />
+      change=${(/** @type {number | null} */ to) => lockAt(to === null ? 0 : of(to))} />
     ${
       isOnNow(light) &&
       html`<${Select} label="Unit" value=${unit} choices=${units} change=${setUnit} />`
@@ -120,12 +120,12 @@ function LockedColour({ k, app, rgb }) {
 /** @param {import("./light_row.js").Props} props */
 function LevelLimits({ k, light, app, asked = {} }) {
   const limits = asked.limits ?? {};
-  const given = Object.values(limits);
+  const levels = Object.values(limits);
   const canShare = isOnNow(light);
   const [chosen, setUnit] = useState(canShare ? 'share' : 'value');
   // A lights file may have luminances, shares and colours: what is no share is shown as luminance.
-  const areShares = given.every((x) => typeof x === 'string');
-  const unit = given.length ? (areShares ? 'share' : 'value') : chosen;
+  const areShares = levels.every((x) => typeof x === 'string');
+  const unit = levels.length ? (areShares ? 'share' : 'value') : chosen;
   const shown = (/** @type {any} */ level) => amount(level, light, unit);
   const set = (/** @type {"min" | "max"} */ key, /** @type {number | null} */ value) => {
     const made = {
@@ -146,12 +146,12 @@ function LevelLimits({ k, light, app, asked = {} }) {
     const { limits: _, ...rest } = asked;
     app.session.constrainLight(k, Object.keys(kept).length ? { ...rest, limits: kept } : rest);
   };
-  const into = (/** @type {string} */ to) => {
+  const convert = (/** @type {string} */ to) => {
     setUnit(to);
-    if (!given.length || to === unit) return;
+    if (!levels.length || to === unit) return;
     const turned = Object.entries(limits).map(([key, x]) => {
-      const its = Number(amount(x, light, to).toPrecision(FIGURES));
-      return [key, to === 'share' ? `${its}%` : its];
+      const level = Number(amount(x, light, to).toPrecision(FIGURES));
+      return [key, to === 'share' ? `${level}%` : level];
     });
     app.session.constrainLight(k, { ...asked, limits: Object.fromEntries(turned) });
   };
@@ -162,7 +162,7 @@ function LevelLimits({ k, light, app, asked = {} }) {
       change=${(/** @type {number | null} */ value) => set('max', value)} figures=${FIGURES} />
     ${
       canShare &&
-      html`<${Select} label="Unit" value=${unit} choices=${unitsOf(light)} change=${into} />`
+      html`<${Select} label="Unit" value=${unit} choices=${unitsOf(light)} change=${convert} />`
     }
   </div>`;
 }

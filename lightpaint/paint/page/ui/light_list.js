@@ -57,14 +57,14 @@ export function LightList({ ui, app }) {
 export function LightListActions({ ui, app }) {
   const isPart = ui.solo.length > 0 || ui.mute.length > 0;
   if (ui.mix && !isPart) {
-    const whose = comparedAnswer(ui)?.name ?? 'the answer (not shown)';
-    return html`<${TruncatedText} class="whose" text=${`of ${whose}`} most=${20} />`;
+    const look = comparedAnswer(ui)?.name ?? 'the answer (not shown)';
+    return html`<${TruncatedText} class="whose" text=${`of ${look}`} most=${20} />`;
   }
-  const held = lockedLights(ui).length;
-  if (!isPart && held < 2) return null;
+  const locked = lockedLights(ui).length;
+  if (!isPart && locked < 2) return null;
   if (!isPart) {
     return html`<${Button} label="Unlock all" class="of-all" act=${() => app.session.unlockAll()}
-      tip=${`${held} lights are locked or off. Let the solve set them again.`} />`;
+      tip=${`${locked} lights are locked or off. Let the solve set them again.`} />`;
   }
   return html`<${Button} label="Show all" class="of-all"
     tip="Solo or mute hides some lights. The answer has them all."

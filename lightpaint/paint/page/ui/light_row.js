@@ -32,7 +32,7 @@ export class LightRow extends Component {
   shouldComponentUpdate(next) {
     const keys = /** @type {(keyof Props)[]} */ (Object.keys({ ...this.props, ...next }));
     return keys.some((key) =>
-      key === 'here' ? heard(this.props.here) !== heard(next.here) : next[key] !== this.props[key],
+      key === 'here' ? shareText(this.props.here) !== shareText(next.here) : next[key] !== this.props[key],
     );
   }
 
@@ -151,13 +151,13 @@ const END_LENGTH = 9;
  * @param {{name: string}} props */
 function Name({ name }) {
   const line = name.replace(/\s+/g, ' ');
-  const found = line.length < 14 ? line.length : line.search(END);
-  const at = found < 0 ? line.length - END_LENGTH : found;
-  return html`<span class="name-start">${line.slice(0, at)}</span><span>${line.slice(at)}</span>`;
+  const end = line.length < 14 ? line.length : line.search(END);
+  const split = end < 0 ? line.length - END_LENGTH : end;
+  return html`<span class="name-start">${line.slice(0, split)}</span><span>${line.slice(split)}</span>`;
 }
 
 /** @param {number | undefined} share */
-const heard = (share) => (share === undefined ? '' : percent(share));
+const shareText = (share) => (share === undefined ? '' : percent(share));
 
 /** @param {{share: number, here?: number}} props */
 function Share({ share, here }) {
@@ -172,16 +172,16 @@ function Share({ share, here }) {
  * @param {{light: Light, lit?: LightAnswer, asked?: Constraints, tied?: string[]}} props */
 function Badge(props) {
   const { lit, asked = {}, tied } = props;
-  const said = notes(props);
-  if (!said.length) return null;
+  const remarks = notes(props);
+  if (!remarks.length) return null;
   // What is asked of all lights, as their colours, says nothing of this one.
   const isAsked = Boolean(tied ?? asked.limits ?? colourOf(asked));
   const isBack = Boolean(lit?.held) && isAsked && asked.lock === undefined && !asked.off;
-  const words = said.map(([, its]) => `${its}.`);
+  const words = remarks.map(([, text]) => `${text}.`);
   if (isBack) words.push('This keeps it from what the painting asks for.');
-  const more = said.length > 1 ? ` +${said.length - 1}` : '';
+  const more = remarks.length > 1 ? ` +${remarks.length - 1}` : '';
   return html`<span class=${`badge ${isBack ? 'is-back' : ''}`} data-tip=${words.join(' ')}
-    >${isBack ? 'held back' : `${said[0][0]}${more}`}</span>`;
+    >${isBack ? 'held back' : `${remarks[0][0]}${more}`}</span>`;
 }
 
 /** @param {import("./ui_state.js").UiStore} store @param {number} k */

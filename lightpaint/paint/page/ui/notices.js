@@ -37,14 +37,14 @@ function stale(unheard) {
 /** Over the pictures; in the middle where there are none. @param {{ui: Ui, app: App}} props */
 export function Banner({ ui, app }) {
   const { closed, connection, isSilent } = ui;
-  const said = (/** @type {string} */ text, /** @type {any} */ more = null) =>
+  const banner = (/** @type {string} */ text, /** @type {any} */ more = null) =>
     html`<div class=${`banner ${ui.ready ? '' : 'is-alone'}`} role="alert">
       <${Icon} name="warn" /><span>${text}</span>${more}</div>`;
-  if (isSilent) return said(SILENT);
+  if (isSilent) return banner(SILENT);
   if (closed && connection !== 'stale')
-    return said(closed.text, html`<${ReconnectButton} ui=${ui} app=${app} />`);
-  if (connection === 'lost') return said(LOST);
-  if (connection === 'stale') return said(stale(ui.unheard));
+    return banner(closed.text, html`<${ReconnectButton} ui=${ui} app=${app} />`);
+  if (connection === 'lost') return banner(LOST);
+  if (connection === 'stale') return banner(stale(ui.unheard));
   return null;
 }
 

@@ -67,25 +67,25 @@ const boxes = new WeakMap();
 
 /** @param {Objects} objects @param {number} object @returns {Box | undefined} in picture pixels */
 function boxOf({ data, width, height }, object) {
-  let known = boxes.get(data);
-  if (!known) {
-    known = new Map();
+  let boxByObject = boxes.get(data);
+  if (!boxByObject) {
+    boxByObject = new Map();
     // By runs of pixels, of which there are few: pictures have millions of pixels.
     for (let y = 0, row = 0; y < height; y += 1, row += width)
       for (let x = 0, end = 0; x < width; x = end) {
-        const its = data[row + x];
-        while (end < width && data[row + end] === its) end += 1;
-        const box = known.get(its);
-        if (!box) known.set(its, [x, y, end, y + 1]);
+        const value = data[row + x];
+        while (end < width && data[row + end] === value) end += 1;
+        const box = boxByObject.get(value);
+        if (!box) boxByObject.set(value, [x, y, end, y + 1]);
         else {
           box[0] = Math.min(box[0], x);
           box[2] = Math.max(box[2], end);
           box[3] = y + 1;
         }
       }
-    boxes.set(data, known);
+    boxes.set(data, boxByObject);
   }
-  return known.get(object);
+  return boxByObject.get(object);
 }
 
 /** A pane's part of the outline, a line of so many device pixels on both sides of the edge.

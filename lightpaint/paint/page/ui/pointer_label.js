@@ -37,8 +37,8 @@ function place(element, rings, engine, ui) {
   const right = Math.min(pane.x + pane.width, pane.left + columns * pane.scale) - width;
   const bottom = Math.min(pane.y + pane.height, pane.top + rows * pane.scale) - height;
   const isAbove = y - gap - height >= top;
-  const beside = x - gap - width >= left ? x - gap - width : x + gap;
-  const across = within(isAbove ? x - width / 2 : beside, left, right);
+  const sideways = x - gap - width >= left ? x - gap - width : x + gap;
+  const across = within(isAbove ? x - width / 2 : sideways, left, right);
   const down = within(isAbove ? y - gap - height : y - height / 2, top, bottom);
   element.style.transform = `translate(${Math.round(across)}px, ${Math.round(down)}px)`;
 }

@@ -81,12 +81,12 @@ export class SessionController extends SessionLink {
   /** Unlock all lights in one step, and restore their earlier constraints. */
   unlockAll() {
     const { lights, asked } = this.store.value;
-    const held = lockedLights(this.store.value);
-    const unlocked = held.map((k) => [
+    const locked = lockedLights(this.store.value);
+    const unlocked = locked.map((k) => [
       lights[k].name,
       this.unlockedConstraints.get(k) ?? withoutLevel(asked[lights[k].name]),
     ]);
-    for (const k of held) {
+    for (const k of locked) {
       this.moves.delete(k);
       this.unlockedConstraints.delete(k);
     }

@@ -236,10 +236,10 @@ function Wipe({ ui, app }) {
     onKeyDown=${press}><i></i></div>`;
 }
 
-/** @param {HTMLElement | null} element @param {(width: number, height: number) => void} tell */
-function watch(element, tell) {
+/** @param {HTMLElement | null} element @param {(width: number, height: number) => void} resized */
+function watch(element, resized) {
   if (!element) return undefined;
-  const observer = new ResizeObserver(() => tell(element.clientWidth, element.clientHeight));
+  const observer = new ResizeObserver(() => resized(element.clientWidth, element.clientHeight));
   observer.observe(element);
   return () => observer.disconnect();
 }

@@ -19,8 +19,8 @@ export function useStageInput(frame, pointer, app) {
     if (!element) return undefined;
     const { store } = app;
     const ends = new AbortController();
-    const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ hear) =>
-      element.addEventListener(name, hear, { signal: ends.signal, passive: false });
+    const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ listener) =>
+      element.addEventListener(name, listener, { signal: ends.signal, passive: false });
     // Whoever came by a pointer sees where they are; the outline is for the keyboard.
     on('pointerdown', (event) => {
       element.dataset.by = 'pointer';
@@ -46,7 +46,7 @@ export function useStageInput(frame, pointer, app) {
       pointer.isSpace = isSpace;
       element.classList.toggle('is-panning', isSpace);
     };
-    const over = (/** @type {KeyboardEvent} */ event) => {
+    const onSpace = (/** @type {KeyboardEvent} */ event) => {
       const inner = /** @type {HTMLElement} */ (event.composedPath()[0]);
       if (event.code !== 'Space' || isTyping(event)) return;
       const isHere = element.matches(':hover') || inner === element;
@@ -55,8 +55,8 @@ export function useStageInput(frame, pointer, app) {
     };
     // On its way there, since the painter keeps its keys from what is around it.
     const early = { signal: ends.signal, capture: true };
-    window.addEventListener('keydown', over, early);
-    window.addEventListener('keyup', over, early);
+    window.addEventListener('keydown', onSpace, early);
+    window.addEventListener('keyup', onSpace, early);
     // Where the key is let go in another window, this one does not hear of it.
     window.addEventListener('blur', () => pan(false), { signal: ends.signal });
     return () => ends.abort();
@@ -84,7 +84,10 @@ function byKeys(event, pointer, app) {
   const y = Number(rings.dataset.y ?? pane.y + pane.height / 2) + (way ? way[1] * step : 0);
   pointer.moved(x, y);
   if (event.key === 'Enter' && store.value.pointing) {
-    const its = paneAt(engine, x, y);
-    pointLamp(app, its && { x: (x - its.left) / its.scale, y: (y - its.top) / its.scale });
+    const target = paneAt(engine, x, y);
+    pointLamp(
+      app,
+      target && { x: (x - target.left) / target.scale, y: (y - target.top) / target.scale },
+    );
   } else if (event.key === 'Enter') pointer.dab(x, y, event.shiftKey);
 }

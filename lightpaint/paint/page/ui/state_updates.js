@@ -30,7 +30,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
   const isBack = before.connection !== 'open' || before.closed !== null;
   const views = message.views ?? [];
   const view = before.view < views.length ? before.view : 0;
-  const { lights, asked, ties, settings, meant, poses, history, looks, resources, basis } = message;
+  const { lights, asked, ties, settings, resolved, poses, history, looks, resources, basis } = message;
   return {
     ready: true,
     state: stateOfView(message, view),
@@ -41,7 +41,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
     asked: asked ?? {},
     ties: ties ?? [],
     settings: settings ?? {},
-    meant: meant ?? {},
+    resolved: resolved ?? {},
     poses: poses ?? {},
     history,
     looks: looks ?? [],
@@ -106,12 +106,12 @@ function answerFields(answer, before) {
   if (headline !== undefined)
     Object.assign(made, { ofViews }, closenessUpdate({ ...answer, ofViews }, before));
   // Without paint there is nothing to be sure of, or to be held back from.
-  const known = made.deltaE === null && !ofViews ? UNKNOWN : {};
+  const unknown = made.deltaE === null && !ofViews ? UNKNOWN : {};
   if (lights) {
     made.shares = shares;
     made.lit = lights.map((/** @type {any} */ one, /** @type {number} */ k) => ({
       ...before.lit[k],
-      ...known,
+      ...unknown,
       ...one,
       share: shares?.[before.view]?.[k] ?? one.share,
     }));
@@ -201,7 +201,7 @@ export function answerUpdate(message, ui) {
   if (message.version < ui.version) return {};
   const made = /** @type {Partial<Ui>} */ (weightsOf(message));
   made.version = message.version ?? ui.version;
-  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'meant', 'poses'])) {
+  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'resolved', 'poses'])) {
     if (message[key]) made[key] = message[key];
   }
   if (message.lights) Object.assign(made, answerFields(message, ui));

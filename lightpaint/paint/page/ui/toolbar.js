@@ -47,12 +47,12 @@ const PAINT_AS = [
 /** @param {{ui: Ui, app: App}} props */
 export function ToolBar({ ui, app }) {
   const { store } = app;
-  const both = { ...ui, ...ui.second };
+  const second = { ...ui, ...ui.second };
   const style = {
     '--first': toHex(ui.colour),
     '--first-shown': shownAs(ui, app),
-    '--second': toHex(both.colour),
-    '--second-shown': shownAs(both, app),
+    '--second': toHex(second.colour),
+    '--second-shown': shownAs(second, app),
   };
   return html`<nav class="tools" aria-label="Tools">
     ${TOOLS.map(
@@ -151,7 +151,7 @@ export function Ask({ ui, app }) {
   ];
   const set = (/** @type {Partial<Ui['inNumbers']>} */ changed) =>
     store.set((now) => ({ inNumbers: { ...now.inNumbers, ...changed } }));
-  const ask = (/** @type {MouseEvent} */ event) => {
+  const adjust = (/** @type {MouseEvent} */ event) => {
     store.set({ hint: false });
     engine.adjust({ stops, mired, object: object === null ? null : objects.indexOf(object) });
     // Who has clicked looks at the pictures next, and has their keys again.
@@ -164,7 +164,7 @@ export function Ask({ ui, app }) {
       change=${(/** @type {number} */ to) => set({ stops: to })} />
     <${NumberField} label="Warmer" value=${mired} least=${-300} most=${300} step=${5} digits=${0}
       unit="mired" change=${(/** @type {number} */ to) => set({ mired: to })} />
-    <${Button} label="Apply" disabled=${isMissing || (!stops && !mired)} act=${ask}
+    <${Button} label="Apply" disabled=${isMissing || (!stops && !mired)} act=${adjust}
       tip="Applied as one stroke, which can be undone" />
   </div>`;
 }

@@ -137,8 +137,8 @@ export function rememberPaint(store) {
 
 /** Each once, and no more than there is room for. @param {Paint[]} paints the latest first */
 export function distinctPaints(paints) {
-  const once = paints.filter((one, k) => !paints.slice(0, k).some((other) => isSame(one, other)));
-  return once.slice(0, MAX_RECENT);
+  const distinct = paints.filter((one, k) => !paints.slice(0, k).some((other) => isSame(one, other)));
+  return distinct.slice(0, MAX_RECENT);
 }
 
 /** @param {Paint} one @param {Paint} other */

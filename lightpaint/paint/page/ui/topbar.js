@@ -82,13 +82,13 @@ function ViewChoice({ ui, app }) {
 
 /** @param {string} name */
 function spoken(name) {
-  const known = /** @type {Record<string, string>} */ ({
+  const labels = /** @type {Record<string, string>} */ ({
     srgb: 'sRGB',
     linear: 'Linear',
     filmic: 'Filmic',
     agx: 'AgX',
   });
-  return known[name] ?? name.replace(/^ocio:/, '').replace('/', ' · ');
+  return labels[name] ?? name.replace(/^ocio:/, '').replace('/', ' · ');
 }
 
 /** Which two pictures are compared. @param {{ui: Ui, app: App}} props */

@@ -63,7 +63,7 @@ import { ofKelvin } from './paint_colour.js';
  *   it points at
  * @property {Pointing | null} pointing what the next click on a picture does to that light
  * @property {Record<string, any>} settings
- * @property {Record<string, any>} meant
+ * @property {Record<string, any>} resolved
  * @property {{undo: string[], redo: string[], count?: number}} history labels of the last steps,
  *   and how many there are
  * @property {Look[]} looks
@@ -172,7 +172,7 @@ export function initialState() {
     dragged: null,
     pointing: null,
     settings: {},
-    meant: {},
+    resolved: {},
     history: { undo: [], redo: [] },
     looks: [],
     lastLook: null,

@@ -137,7 +137,7 @@ export class FakeHost {
       asked: this.asked,
       ties: this.ties,
       settings: this.settings,
-      meant: { space: 'display', hold: 3, colors: 'gentle' },
+      resolved: { space: 'display', hold: 3, colors: 'gentle' },
       history: {
         undo: this.steps.map(({ label }) => label),
         redo: this.undone.map(({ label }) => label),
