@@ -123,14 +123,33 @@ def test_what_follows_the_current_look_follows_its_average(rng: np.random.Genera
     assert np.abs(gradient).max() < 1e-5 * np.abs(smooth.equations.b).max()
 
 
+def test_several_views_are_averaged_each_by_itself(rng: np.random.Generator):
+    """Twice the same view asks for what it asks for once, and one with less noise for its own."""
+    target, expected = painting(rng)
+    basis, cleaner = noisy_basis(rng), noisy_basis(rng, noise=0.5)
+    # Solves stop at 1e-6 or so of a weight.
+    once, twice = (
+        correct_noise(solve([basis] * k, [target] * k), share=1.0).weights for k in (1, 2)
+    )
+    np.testing.assert_allclose(twice, once, rtol=0, atol=1e-4)
+    both = solve([basis, cleaner], [target] * 2)
+    alone = [on_smooth_light(solve(x, target)).equations for x in (basis, cleaner)]
+    joint = on_smooth_light(both).equations
+    for name in ("M", "b"):
+        summed = sum(getattr(x, name) for x in alone)
+        np.testing.assert_allclose(getattr(joint, name), summed, rtol=1e-9)
+    assert error(correct_noise(both).weights, expected) < error(both.weights, expected)
+
+
 def test_few_lights_and_unknown_surfaces_are_solved_as_they_were_rendered(
     rng: np.random.Generator,
 ):
     basis = noisy_basis(rng)
     assert basis.features is not None
-    assert can_smooth(basis)
-    assert not can_smooth(replace(basis, indirect=None))
-    assert not can_smooth(replace(basis, features=replace(basis.features, position=None)))
+    assert can_smooth([basis])
+    assert not can_smooth([replace(basis, indirect=None)])
+    assert not can_smooth([basis, replace(basis, indirect=None)])
+    assert not can_smooth([replace(basis, features=replace(basis.features, position=None))])
     few = slice(None, smooth_light.MIN_LIGHTS - 1)
     parts = basis.indirect
     assert parts is not None
@@ -143,4 +162,4 @@ def test_few_lights_and_unknown_surfaces_are_solved_as_they_were_rendered(
             as_planes(parts.planes.array()[few]), as_planes(parts.noise.array()[few])
         ),
     )
-    assert not can_smooth(fewer)
+    assert not can_smooth([fewer])

@@ -65,7 +65,7 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
     if share is None and _has_noise_of_target(solution, noise):
         return _solved(solution, e, 0.0)
     base = e
-    if can_smooth(basis):
+    if can_smooth(solution.problem.views.bases):
         smooth = on_smooth_light(solution)
         base, noise = smooth.equations, noise_sums(smooth)
     least = denoised_matrix(base, noise.power)

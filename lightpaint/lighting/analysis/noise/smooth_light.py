@@ -10,6 +10,7 @@ changes beyond it: t = V / (V + B), as for pictures. So with more samples the su
 the basis, and reflections or caustics stay as they are once they are clean.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
@@ -22,6 +23,7 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.images.surface_filter import SurfaceFilter
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.views import joint_basis
 
 #: Lights from which on sums are of averaged light: with a dozen the basis is as good.
 MIN_LIGHTS = 64
@@ -36,21 +38,17 @@ WINDOW_RADIUS = 3
 MAX_BYTES = 2**29
 
 
-def can_smooth(basis: Basis) -> bool:
-    """Return True for many lights whose indirect light and surfaces are known."""
-    height, width = basis.size
-    size = 2 * 12 * len(basis.lights) * height * width
-    is_known = basis.indirect is not None and basis.surface_filter is not None
-    return len(basis.lights) >= MIN_LIGHTS and is_known and size <= MAX_BYTES
+def can_smooth(views: Sequence[Basis]) -> bool:
+    """Return True for many lights whose indirect light and surfaces are known, in all views."""
+    lights, pixels = len(views[0].lights), sum(basis.emitters_seen.size for basis in views)
+    is_known = all(x.indirect is not None and x.surface_filter is not None for x in views)
+    return lights >= MIN_LIGHTS and is_known and 2 * 12 * lights * pixels <= MAX_BYTES
 
 
 def on_smooth_light(solution: Solution) -> Solution:
     """Return a solution with the same weights, whose equations and noise are of averaged planes."""
     basis, problem = solution.basis, solution.problem
-    if basis.planes not in _averaged:
-        _averaged[basis.planes] = _average(basis)
-    planes, noise = _averaged[basis.planes]
-    smooth = replace(basis, planes=planes, noise=noise, indirect=None)
+    smooth, _ = joint_basis([_smooth(view) for view in problem.views.bases])
     # Where the goal is the current look, it is that of the same planes.
     moved = problem.squares.share * (smooth.present_look - basis.present_look)
     squares = replace(problem.squares, image=problem.squares.image + moved)
@@ -58,6 +56,14 @@ def on_smooth_light(solution: Solution) -> Solution:
     return replace(
         solution, problem=replace(problem, basis=smooth, squares=squares, equations=equations)
     )
+
+
+def _smooth(basis: Basis) -> Basis:
+    """Return the basis of a view with averaged planes."""
+    if basis.planes not in _averaged:
+        _averaged[basis.planes] = _average(basis)
+    planes, noise = _averaged[basis.planes]
+    return replace(basis, planes=planes, noise=noise, indirect=None)
 
 
 #: Averaged planes and their noise, by the planes of a basis, as long as these are there.
