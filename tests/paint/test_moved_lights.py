@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from renderer import write_room
+from renderer import LIGHTS, write_room
 
 import lightpaint as lp
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.protocol import Message
+from lightpaint.paint.rig.rig_state import rig_state
 from lightpaint.paint.store.store import Store
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
@@ -31,10 +32,10 @@ BALL = (0.3, 0.3, 0.2)
 class Moving:
     """A studio of the test room, and all that it says."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, lights: str | None = None) -> None:
         self.folder = folder
         path = folder / "room.xml"
-        self.scene = load_scene(path if path.exists() else write_room(folder))
+        self.scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
         subject = Subject(
             "room", folder, scene=self.scene, settings=Settings(spp=16, use_cache=False)
         )
@@ -221,7 +222,7 @@ def pointed(moving: Moving, name: str, how: Any, at: Any, **more: Any) -> Any:
     opened_rig(moving)
     light = moving.light(name)
     moving.send(protocol.PointLight(light, how, pixel_of(moving, at), **more))
-    return moving.studio.rig.state(moving.studio.session.requests.poses).lights[light]
+    return rig_state(moving.studio.rig, moving.studio.session.requests.poses).lights[light]
 
 
 def test_pages_see_points_where_the_camera_does(moving: Moving) -> None:
@@ -280,3 +281,71 @@ def test_clicks_that_point_no_light(
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)
     assert moving.studio.session.requests.poses == {}
+
+
+def exact(moving: Moving) -> Any:
+    """The exact answer to what was done last, and what is said of it."""
+
+    def is_it(fields: Any) -> bool:
+        return "delta_e" in fields and fields["version"] == moving.studio.session.version
+
+    return moving.wait(
+        lambda: next(
+            (m.fields for m in moving.messages if m.kind == "answer" and is_it(m.fields)), None
+        )
+    )
+
+
+def placed(moving: Moving) -> Any:
+    return moving.wait(
+        lambda: next((m.fields for m in moving.messages if m.kind == "placed"), None), 200
+    )
+
+
+@pytest.fixture
+def dim(tmp_path: Path) -> Iterator[Moving]:
+    """The room with a bulb, and a sky that shows what is in it."""
+    made = Moving(tmp_path, LIGHTS["bulb"].replace("0.5 0.6 0.7", "5 6 7") + LIGHTS["sky"])
+    yield made
+    made.close()
+
+
+def test_lights_that_may_move_come_closer_in_one_step(dim: Moving) -> None:
+    """The painting is the look with the bulb elsewhere."""
+    moving = dim
+    session = moving.studio.session
+    there = (-0.1, 1.2, 0.6)
+    moved = moving.scene.moved({"bulb": lp.Pose(position=there)})
+    wanted = lp.render_basis(moved, spp=256, seed=5)
+    look = wanted.mix(wanted.present_weights)
+    whole = (0, look.shape[0], 0, look.shape[1])
+    moving.send(
+        protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
+    )
+    before = exact(moving)
+    moving.send(protocol.PlaceLights())
+    result = placed(moving)
+    assert "bulb" in result["names"], result
+    after = exact(moving.rendered())
+    assert after["delta_e"] < 0.7 * before["delta_e"]
+    assert session.store.position == 2
+    moving.send(protocol.Undo())
+    assert session.requests.poses == {}
+
+
+def test_a_search_for_places_can_be_stopped(moving: Moving) -> None:
+    stroke(moving)
+    moving.send(protocol.PlaceLights())
+    moving.send(protocol.PlaceLights(run=False))
+    assert placed(moving)["text"] == "Stopped. No light was moved."
+    assert moving.studio.session.requests.poses == {}
+
+
+def test_what_cannot_be_placed_is_said(moving: Moving) -> None:
+    with pytest.raises(LightpaintError, match="nothing is painted yet"):
+        moving.send(protocol.PlaceLights())
+    stroke(moving)
+    held = {name: {"lock": True} for name in ("bulb", "beam", "sun")}
+    moving.send(protocol.AskAll(held))
+    with pytest.raises(LightpaintError, match="no light is free to move"):
+        moving.send(protocol.PlaceLights())

@@ -12,6 +12,7 @@ import { LookStrip } from './ui/look_strip.js';
 import { storedTool, storeChanges, storedFolds, storedBrushSize } from './ui/browser_storage.js';
 import { initialState } from './ui/ui_state.js';
 import { Banner, Tips, Toasts, RunningTasks } from './ui/notices.js';
+import { RoomPlan } from './ui/room_plan.js';
 import { SessionController } from './ui/session_controller.js';
 import { SettingsPanel } from './ui/settings_panel.js';
 import { SkipLinks } from './ui/skip_links.js';
@@ -174,6 +175,7 @@ function Side({ ui, app }) {
       html`<${LightList} ui=${ui} app=${app} />`,
       html`<${LightListActions} ui=${ui} app=${app} />`,
     )}
+    ${ui.lamps && fold('plan', 'Plan', html`<${RoomPlan} ui=${ui} app=${app} />`)}
     ${fold('truth', 'Analysis', html`<${AnalysisPanel} ui=${ui} app=${app} />`)}
   </aside>`;
 }

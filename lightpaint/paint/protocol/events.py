@@ -188,7 +188,7 @@ class LookList(Message, kind="looks"):
 class TaskStarted(Message, kind="started"):
     """Notice that a long task has started. what: the request, or `stop`."""
 
-    what: Literal["export", "verify", "explain", "preview", "rig", "stop"]
+    what: Literal["export", "verify", "explain", "preview", "rig", "place", "stop"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -256,6 +256,17 @@ class Rig(Message, kind="rig"):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class PlacingResult(Message, kind="placed"):
+    """The result of a search for places of lights. Unasked.
+
+    text: what was moved, and what for; or why nothing was. names: of lights that were moved.
+    """
+
+    text: str
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Notice(Message, kind="say"):
     """A sentence for people. Unasked. what: the task that it ends."""
 
@@ -306,6 +317,7 @@ EVENTS: Mapping[str, type[Any]] = {
         Explanation,
         PreviewResult,
         Rig,
+        PlacingResult,
         Notice,
         Failure,
         Closing,

@@ -144,8 +144,9 @@ class ResolvedFit:
 class Advice:
     """A constraint that keeps the lights from the paint and can be loosened.
 
-    kind: of the constraint. names: its lights. closes: share of the miss that goes without it; null
-    where it takes more than that. hold: the weaker hold to set.
+    kind: of the constraint; `reach` where none does, but lights that move may. names: its lights.
+    closes: share of the miss that goes without it; null where it takes more than that. hold: the
+    weaker hold to set.
     """
 
     kind: str

@@ -95,8 +95,8 @@ class MoveLights(Message, kind="move"):
     """Places, targets and cones of lights from now on, by name. Answered by `answer`; `rig`
     follows.
 
-    poses: as of `lightpaint.Pose`: of position, target, cutoff and beam those that are not as in
-    the scene; an empty object puts a light back. done: whether it becomes a step; false while a
+    poses: as of `lightpaint.Pose`: of position, target, cutoff and beam those that change; an empty
+    object puts a light back where the scene has it. done: whether it becomes a step; false while a
     light is dragged.
     """
 
@@ -127,6 +127,15 @@ class ShowRig(Message, kind="show_rig"):
     """A request for where all lights hang, and of `rig` after every move from now on. Answered by
     `started`, later by `rig`.
     """
+
+
+@dataclass(frozen=True)
+class PlaceLights(Message, kind="place"):
+    """A request to find places, directions and cones of lights that come closest to the paintings,
+    or to stop that. Answered by `started`, later by `placed`; what is found is one step.
+    """
+
+    run: bool = True
 
 
 @dataclass(frozen=True)
@@ -290,6 +299,7 @@ AnyRequest = (
     | AskAll
     | MoveLights
     | PointLight
+    | PlaceLights
     | ShowRig
     | TieLights
     | Set

@@ -1,5 +1,7 @@
 """The rays of a camera: what each pixel sees, as a page draws lamps with it, and first hits."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +26,17 @@ class FirstHit:
     eye: Doubles
     point: Doubles
     normal: Doubles
+
+
+@contextmanager
+def in_this_thread() -> Iterator[None]:
+    """Hold Mitsuba, and let this thread use what another one has loaded or traced."""
+    import drjit as dr
+    import mitsuba as mi
+
+    with tracing():
+        dr.detail.new_scope(dr.backend_v(mi.Float))
+        yield
 
 
 def camera_of(scene: Scene, loaded: Any) -> Camera | None:

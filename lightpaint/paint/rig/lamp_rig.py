@@ -2,8 +2,7 @@
 
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import RLock
@@ -14,17 +13,20 @@ import numpy as np
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.paint.protocol import LightPlace, PointLight, Rig
-from lightpaint.paint.rig.cameras import FirstHit, camera_of, first_hit, free_length, up_axis
+from lightpaint.paint.protocol import PointLight
+from lightpaint.paint.rig.cameras import FirstHit, first_hit, free_length, in_this_thread
 from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
 from lightpaint.paint.rig.pointing import aimed, with_highlight, with_shadow
 from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Poses
 from lightpaint.paint.subject import Subject
+from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import SEARCHED
+from lightpaint.placement.rigging.rigged_lights import freedoms_of
+from lightpaint.placement.rigging.rigging import rigging_of
 from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
-from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
+from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.surfaces import render_features
 
@@ -49,14 +51,19 @@ class LampRig:
 
     Scene and paths are loaded when somebody first asks for them. Bases are of all views, in which
     every light is where the scene has it.
+
+    Attributes:
+        views: The views of the loaded scene; None before it is loaded.
+        bounds: Corners of a box with all that is seen; None if that is not known.
     """
 
     def __init__(self, subjects: Sequence[Subject]) -> None:
         self._subjects = tuple(subjects)
         self._lock = RLock()
-        self._views: tuple[RigView, ...] | None = None
+        self.views: tuple[RigView, ...] | None = None
         self._rendered = OrderedDict[PoseKey, list[Basis]]()
-        self._bounds: tuple[Doubles, Doubles] | None = None
+        self.bounds: tuple[Doubles, Doubles] | None = None
+        self._freedoms: Mapping[str, Freedom] | None = None
 
     @property
     def scene(self) -> Scene:
@@ -66,16 +73,29 @@ class LampRig:
         return self._subjects[0].loaded_scene
 
     @property
+    def freedoms(self) -> Mapping[str, Freedom]:
+        """Freedom of the lights that the lights file lets move, by name."""
+        if self._freedoms is None:
+            self._freedoms = freedoms_of(rigging_of(self.scene.requests), self.scene)
+        return self._freedoms
+
+    @property
+    def extent(self) -> float:
+        """Length of the diagonal of all that is seen; 1 before the rig is open."""
+        low, high = self.bounds or (np.zeros(3), np.ones(3) / 3**0.5)
+        return float(np.linalg.norm(high - low))
+
+    @property
     def is_open(self) -> bool:
         """True if scene and paths are loaded."""
-        return self._views is not None
+        return self.views is not None
 
     def open(self, bases: Sequence[Basis]) -> None:
         """Load scene and paths, unless they are loaded."""
         with self._lock:
-            if self._views is None:
-                with _in_this_thread():
-                    self._views = tuple(map(self._open_view, self._subjects, bases))
+            if self.views is None:
+                with in_this_thread():
+                    self.views = tuple(map(self._open_view, self._subjects, bases))
 
     def _open_view(self, subject: Subject, basis: Basis) -> RigView:
         scene = subject.loaded_scene
@@ -87,12 +107,12 @@ class LampRig:
         seen = features.position[features.normal.any(axis=-1)]
         if len(seen):
             corners = [seen.min(axis=0), seen.max(axis=0)]
-            if self._bounds is not None:
+            if self.bounds is not None:
                 corners = [
-                    np.minimum(corners[0], self._bounds[0]),
-                    np.maximum(corners[1], self._bounds[1]),
+                    np.minimum(corners[0], self.bounds[0]),
+                    np.maximum(corners[1], self.bounds[1]),
                 ]
-            self._bounds = corners[0].astype(float), corners[1].astype(float)
+            self.bounds = corners[0].astype(float), corners[1].astype(float)
         quick = None if scene.has_media else QuickPlanes(scene, loaded, features)
         return RigView(scene, loaded, quick)
 
@@ -159,12 +179,12 @@ class LampRig:
                 self._rendered.move_to_end(key)
                 return rendered
         self.open(bases)
-        assert self._views is not None
+        assert self.views is not None
         site, made = self.site(name, values), []
-        for view, basis in zip(self._views, bases, strict=True):
+        for view, basis in zip(self.views, bases, strict=True):
             assert view.quick is not None
             light = basis.lights[basis.names.index(name)]
-            with _in_this_thread():
+            with in_this_thread():
                 plane = view.quick.plane(site)
             made.append(one_light_basis(basis, replace(light, identity=""), plane))
         return made
@@ -215,11 +235,11 @@ class LampRig:
 
     def pointed(self, request: PointLight, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the pose of a light after a request to point it, from its present pose."""
-        with _in_this_thread():
+        with in_this_thread():
             return {**values, **self._pointing(request, name, self.site(name, values))}
 
     def _pointing(self, request: PointLight, name: str, site: Site) -> dict[str, Any]:
-        view = self._view(request.view)
+        view = self.view(request.view)
         hit = self._hit(view, request.at)
         length = partial(free_length, view.loaded)
         if request.how == "aim":
@@ -230,11 +250,12 @@ class LampRig:
             raise PaintError("a shadow needs two places: the edge that casts it, and where it ends")
         return with_shadow(name, site, self._hit(view, request.edge), hit, length)
 
-    def _view(self, number: int) -> RigView:
-        assert self._views is not None
-        if number >= len(self._views):
-            raise PaintError(f"no view {number}: there are {len(self._views)}")
-        return self._views[number]
+    def view(self, number: int) -> RigView:
+        """Return a view of the open rig. Raises PaintError if there is none."""
+        assert self.views is not None
+        if number >= len(self.views):
+            raise PaintError(f"no view {number}: there are {len(self.views)}")
+        return self.views[number]
 
     def _hit(self, view: RigView, at: tuple[float, float]) -> FirstHit:
         height, width = view.scene.size
@@ -244,62 +265,6 @@ class LampRig:
         if hit is None:
             raise PaintError("nothing is seen there: click on a surface")
         return hit
-
-    def state(self, poses: Poses) -> Rig:
-        """Return where all lights are, for pages. The rig is open."""
-        assert self._views is not None
-        with _in_this_thread():
-            places = tuple(
-                self._place(light.name, poses.get(light.name, {})) for light in self.scene.lights
-            )
-            cameras = [camera_of(view.scene, view.loaded) for view in self._views]
-        hung = [np.array(place.position) for place in places if place.position is not None]
-        low, high = self._bounds or (np.zeros(3), np.ones(3))
-        low, high = np.min([low, *hung], axis=0), np.max([high, *hung], axis=0)
-        return Rig(
-            lights=places,
-            cameras=tuple(cameras),
-            up=up_axis(cameras),
-            low=tuple(map(float, low)),
-            high=tuple(map(float, high)),
-        )
-
-    def _place(self, name: str, values: Mapping[str, Any]) -> LightPlace:
-        reason = self.why_not(name)
-        light = self.scene.light(name)
-        site = self.site(name, values) if not reason else light.members[0].site
-        if reason and len(light.members) > 1:
-            site = Site()
-        target = values.get("target") or self._target(site)
-        return LightPlace(
-            position=site.position,
-            direction=site.direction,
-            target=None if target is None else tuple(map(float, target)),
-            cutoff=site.cutoff,
-            beam=site.beam,
-            rail=None,
-            why_not=reason,
-        )
-
-    def _target(self, site: Site) -> Doubles | None:
-        """Return the point of the first surface along a light's axis."""
-        if site.position is None or site.direction is None:
-            return None
-        place, way = np.array(site.position), np.array(site.direction)
-        length = free_length(self._view(0).loaded, place + 1e-3 * way, way)
-        low, high = self._bounds or (np.zeros(3), np.ones(3))
-        return np.asarray(place + min(length, float(np.linalg.norm(high - low))) * way)
-
-
-@contextmanager
-def _in_this_thread() -> Iterator[None]:
-    """Hold Mitsuba, and let this thread use what another one has loaded or traced."""
-    import drjit as dr
-    import mitsuba as mi
-
-    with tracing():
-        dr.detail.new_scope(dr.backend_v(mi.Float))
-        yield
 
 
 def _pose(name: str, values: Mapping[str, Any]) -> Pose:

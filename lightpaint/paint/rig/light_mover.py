@@ -24,6 +24,7 @@ from lightpaint.paint.protocol import (
     TaskStarted,
 )
 from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.rig.rig_state import rig_state
 from lightpaint.paint.session.moved_lights import Poses
 from lightpaint.paint.session.picture_table import Picture, PictureTable, plane_thumbnail
 from lightpaint.paint.session.session import Session
@@ -83,7 +84,7 @@ class LightMover:
 
     def _publish_rig(self) -> None:
         if self._shows_rig and self.rig.is_open:
-            self._host.publish(self.rig.state(self._host.session.requests.poses))
+            self._host.publish(rig_state(self.rig, self._host.session.requests.poses))
 
     def move_of(self, request: PointLight) -> MoveLights:
         """Return the move that a request to point a light comes to. Raises LightpaintError."""

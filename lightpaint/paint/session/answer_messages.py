@@ -261,7 +261,8 @@ def removable_reason(appearance: Appearance) -> Reason | None:
 def advice(appearance: Appearance) -> Advice | None:
     """Return the same for a page, whose button it is: what to let go of, and what that brings."""
     if (cause := removable_reason(appearance)) is None:
-        return None
+        is_missed = not appearance.is_close and appearance.place is not None
+        return Advice("reach", (), None, None) if is_missed and not appearance.causes else None
     kind, names = cause.kind, tuple(cause.names)
     if kind != "hold":
         return Advice(kind, names, None if cause.is_joint else cause.share, None)

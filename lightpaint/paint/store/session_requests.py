@@ -69,9 +69,11 @@ class SessionRequests:
         return replace(self, lights=_hold_once(lights, (name, *tied)))
 
     def with_poses(self, poses: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
-        """Return these requests with these poses of lights; an empty one is that of the scene."""
-        merged = {**self.poses, **poses}
-        return replace(self, poses={name: dict(pose) for name, pose in merged.items() if pose})
+        """Return these requests with changed poses of lights; an empty change puts one back."""
+        merged = dict(self.poses)
+        for name, change in poses.items():
+            merged[name] = {**merged.get(name, {}), **change} if change else {}
+        return replace(self, poses={name: pose for name, pose in merged.items() if pose})
 
     def with_ties(self, ties: Sequence[Sequence[str]]) -> "SessionRequests":
         """Return these requests with these dimmers; the first held light of each holds it."""

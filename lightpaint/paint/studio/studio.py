@@ -37,6 +37,7 @@ from lightpaint.paint.protocol import (
 )
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.light_mover import LightMover
+from lightpaint.paint.rig.light_placer import LightPlacer
 from lightpaint.paint.session.look_library import LookLibrary
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
@@ -95,6 +96,7 @@ class Studio:
         self._threads = BackgroundThreads(self.publish)
         self._jobs = BackgroundJobs(self, self._threads)
         self._mover = LightMover(self, LampRig(self.subjects), self._threads)
+        self._placer = LightPlacer(self, self._mover.rig, self._threads)
 
     @property
     def session(self) -> Session:
@@ -199,6 +201,8 @@ class Studio:
                     return self._jobs.start_preview(message, session.preview_requests(message))
                 case protocol.ShowRig():
                     return self._mover.show_rig()
+                case protocol.PlaceLights():
+                    return self._placer.handle(message)
                 case protocol.PointLight():
                     messages = session.handle(self._mover.move_of(message), arrays)
                 case protocol.LoadLook():

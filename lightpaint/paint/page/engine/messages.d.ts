@@ -136,8 +136,9 @@ export interface ResolvedFit {
 /**
  * A constraint that keeps the lights from the paint and can be loosened.
  *
- * kind: of the constraint. names: its lights. closes: share of the miss that goes without it; null
- * where it takes more than that. hold: the weaker hold to set.
+ * kind: of the constraint; `reach` where none does, but lights that move may. names: its lights.
+ * closes: share of the miss that goes without it; null where it takes more than that. hold: the
+ * weaker hold to set.
  */
 export interface Advice {
   kind: string;
@@ -381,7 +382,7 @@ export interface ProgressReport {
 export interface TaskStarted {
   kind: 'started';
   reply?: number;
-  what: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'stop';
+  what: 'export' | 'verify' | 'explain' | 'preview' | 'rig' | 'place' | 'stop';
   arrays: {  };
 }
 
@@ -470,6 +471,19 @@ export interface Rig {
   up: number;
   low: number[];
   high: number[];
+  arrays: {  };
+}
+
+/**
+ * The result of a search for places of lights. Unasked.
+ *
+ * text: what was moved, and what for; or why nothing was. names: of lights that were moved.
+ */
+export interface PlacingResult {
+  kind: 'placed';
+  reply?: number;
+  text: string;
+  names: string[];
   arrays: {  };
 }
 
@@ -584,8 +598,8 @@ export interface AskAll {
  * Places, targets and cones of lights from now on, by name. Answered by `answer`; `rig`
  * follows.
  *
- * poses: as of `lightpaint.Pose`: of position, target, cutoff and beam those that are not as in
- * the scene; an empty object puts a light back. done: whether it becomes a step; false while a
+ * poses: as of `lightpaint.Pose`: of position, target, cutoff and beam those that change; an empty
+ * object puts a light back where the scene has it. done: whether it becomes a step; false while a
  * light is dragged.
  */
 export interface MoveLights {
@@ -608,6 +622,14 @@ export interface PointLight {
   edge?: [number, number] | null;
   view?: number;
   done?: boolean;
+}
+
+/**
+ * A request to find places, directions and cones of lights that come closest to the paintings,
+ * or to stop that. Answered by `started`, later by `placed`; what is found is one step.
+ */
+export interface PlaceLights {
+  run?: boolean;
 }
 
 /**
@@ -776,6 +798,7 @@ export interface Events {
   explained: Explanation;
   previewed: PreviewResult;
   rig: Rig;
+  placed: PlacingResult;
   say: Notice;
   failed: Failure;
   closed: Closing;
@@ -793,6 +816,7 @@ export interface Requests {
   ask_all: AskAll;
   move: MoveLights;
   point: PointLight;
+  place: PlaceLights;
   show_rig: ShowRig;
   tie: TieLights;
   set: Set;

@@ -84,6 +84,7 @@ function without(name, keys, ui, session) {
 /** @param {{ui: Ui, app: App}} props */
 export function AdviceButton({ ui, app }) {
   const { help } = ui;
+  if (help?.kind === 'reach') return html`<${MoveButton} ui=${ui} app=${app} />`;
   const change = help && changeOf(help, ui, app.session);
   if (!help || !change) return null;
   const name = nameOf(help);
@@ -91,6 +92,14 @@ export function AdviceButton({ ui, app }) {
   return html`<${Button} label=${`${nameOf(help, BUTTON_CHARACTERS)}${closes}`} class="help"
     tip=${`${name}${closes}. Shows a preview first.`}
     act=${() => app.session.preview(titleOf(help, name), change)} />`;
+}
+
+/** Let lights move, where lights as they hang come no closer. @param {{ui: Ui, app: App}} props */
+export function MoveButton({ ui, app }) {
+  if (!ui.state?.can_render || ui.placing) return null;
+  return html`<${Button} label="Let lights move" class="help"
+    tip="Search for places and directions of the lights that come closer. One step that undo takes back."
+    act=${() => app.session.placeLights()} />`;
 }
 
 /** The answer as it is and as it would be, before anything is done. @param {{ui: Ui, app: App}}

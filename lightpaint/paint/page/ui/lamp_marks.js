@@ -19,7 +19,7 @@ const MARGIN = 14;
 export function LampMarks({ ui, app, panes }) {
   const camera = ui.lamps && ui.rig ? ui.rig.cameras[ui.view] : null;
   if (!camera) return null;
-  return html`<div class=${`lamps ${ui.pointing ? 'is-pointing' : ''}`}>
+  return html`<div class=${`lamps ${ui.pointing ? 'is-pointing' : ''} ${ui.placing ? 'is-placing' : ''}`}>
     ${apart(panes).map(
       (pane, k) => html`<${PaneMarks} key=${k} ui=${ui} app=${app} pane=${pane} camera=${camera}
       isTwin=${k > 0} />`,
@@ -62,6 +62,7 @@ function PaneMarks({ ui, app, pane, camera, isTwin }) {
   });
   const places = /** @type {LightPlace[]} */ (ui.rig?.lights ?? []);
   return html`
+    <${Ghosts} ui=${ui} camera=${camera} box=${box} onPage=${onPage} />
     ${ui.lamp !== null && html`<${Beam} place=${placeOf(ui, ui.lamp)} camera=${camera} box=${box} onPage=${onPage} />`}
     ${places.map((_, k) => {
       const place = placeOf(ui, k);
@@ -162,6 +163,26 @@ function AimHandle({ ui, app, light, pane, camera, inner, onPage, isTwin }) {
     onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
 }
 
+/** Where lights hung before a search moved them. @param {{ui: Ui, camera: Camera, box: Box,
+ *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
+function Ghosts({ ui, camera, box, onPage }) {
+  const { left, top, right, bottom } = box;
+  const style = { left: `${left}px`, top: `${top}px` };
+  const moves = ui.lights.flatMap(({ name }, k) => {
+    const [before, now] = [ui.ghosts[name], placeOf(ui, k).position];
+    if (!before || !now || !(name in ui.poses)) return [];
+    const [from, to] = [before, now].map((point) => onPage(seenAt(camera, point)));
+    return from.isAhead && to.isAhead ? [{ name, from, to }] : [];
+  });
+  if (!moves.length) return null;
+  return html`<svg class="lamp-beam is-ghost" style=${style} width=${right - left}
+    height=${bottom - top} aria-hidden="true">${moves.map(
+      ({ name, from, to }) => html`<g key=${name}>
+        <line x1=${from.x - left} y1=${from.y - top} x2=${to.x - left} y2=${to.y - top} />
+        <circle cx=${from.x - left} cy=${from.y - top} r="7" /></g>`,
+    )}</svg>`;
+}
+
 /** The line from a light to what it points at. @param {{place: LightPlace, camera: Camera, box: Box,
  *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
 function Beam({ place, camera, box, onPage }) {
@@ -218,7 +239,7 @@ function useDrag(app, pane, of) {
     its.isMoved = true;
     its.last = made.asked;
     app.store.set({ dragged: { light: its.light, place: made.place, at: made.at } });
-    app.session.lampMoves.ask(its.light, withPose(app, its.light, made.asked), false);
+    app.session.lampMoves.ask(its.light, made.asked, false);
   };
   const up = (/** @type {PointerEvent} */ event) => {
     const its = start.current;
@@ -226,16 +247,8 @@ function useDrag(app, pane, of) {
     event.stopPropagation();
     start.current = null;
     if (its.isMoved && its.last)
-      app.session.lampMoves.ask(its.light, withPose(app, its.light, its.last), true);
+      app.session.lampMoves.ask(its.light, its.last, true);
     app.store.set({ dragged: null });
   };
   return { down, move, up };
-}
-
-/** A move, with what else is asked of the light. @param {App} app @param {number} light
- * @param {import("./lamp_moves.js").Asked} asked @returns {import("./lamp_moves.js").Asked} */
-function withPose(app, light, asked) {
-  if (asked.kind === 'point') return asked;
-  const { poses, lights } = app.store.value;
-  return { ...asked, pose: { ...poses[lights[light].name], ...asked.pose } };
 }

@@ -98,6 +98,12 @@ function worksOf(ui, { session }) {
       progress: verifying,
       stop: () => void session.verify(false),
     });
+  if (ui.placing)
+    works.push({
+      name: 'Placing the lights',
+      progress: ui.placing,
+      stop: () => void session.placeLights(false),
+    });
   if (ui.explaining && !isOpen) works.push({ name: 'Finding reasons', progress: endless });
   if (basis)
     works.push({ name: 'Rendering the lights', progress: basis, text: 'You can paint already.' });

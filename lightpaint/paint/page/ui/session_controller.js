@@ -169,9 +169,21 @@ export class SessionController extends SessionLink {
   /** Move a light. @param {number} light @param {Record<string, any>} change of its pose
    * @param {boolean} [done] false while it is dragged */
   moveLamp(light, change, done = true) {
-    const { poses, lights } = this.store.value;
-    const before = poses[lights[light].name] ?? {};
-    this.lampMoves.ask(light, { kind: 'move', pose: { ...before, ...change } }, done);
+    this.lampMoves.ask(light, { kind: 'move', pose: change }, done);
+  }
+
+  /** Let the painting place the lights, or stop that. @param {boolean} [run] */
+  placeLights(run = true) {
+    const { rig, lights, lamps } = this.store.value;
+    if (!run) return this.send('place', { run });
+    if (!lamps) this.toggleLamps();
+    /** @type {Record<string, number[]>} */
+    const ghosts = {};
+    rig?.lights.forEach(({ position, why_not: whyNot }, k) => {
+      if (position && !whyNot) ghosts[lights[k].name] = position;
+    });
+    this.store.set({ placing: { what: 'place', done: 0, total: 0, unit: 'steps' }, ghosts });
+    return this.send('place', { run });
   }
 
   /** Put a light back where the scene has it. @param {number} light */

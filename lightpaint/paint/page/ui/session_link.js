@@ -30,6 +30,7 @@ const EVENT_KINDS = [
   'patch',
   'renewed',
   'rig',
+  'placed',
   'progress',
   'stopped',
   'say',
@@ -107,6 +108,7 @@ export class SessionLink {
         resources: { ...this.store.value.resources, ...m.resources },
       }),
       rig: (/** @type {HostEvents['rig']} */ m) => ({ rig: m }),
+      placed: (/** @type {HostEvents['placed']} */ m) => this.placingEnded(m),
       progress: (/** @type {HostEvents['progress']} */ m) => progressUpdate(m, this.store.value),
       stopped: (/** @type {HostEvents['stopped']} */ m) => this.taskEnded(m.what),
       say: (/** @type {HostEvents['say']} */ m) => this.showNotice(m),
@@ -182,6 +184,13 @@ export class SessionLink {
     const names = files.map((/** @type {string} */ file) => within(file, state?.folder ?? ''));
     if (dialog !== 'export') this.toast(writtenText(names, Boolean(isStopped)));
     return { exported: message, ...TASK_ENDED.export };
+  }
+
+  /** A search for places has ended: what it did, and where lights hung before.
+   * @param {HostEvents["placed"]} message @returns {Partial<Ui>} */
+  placingEnded({ text }) {
+    this.toast(text);
+    return TASK_ENDED.place;
   }
 
   /** Export files, or stop the export. @param {Requests["export"]["what"]} what empty to stop */

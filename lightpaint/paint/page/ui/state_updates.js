@@ -15,6 +15,7 @@ export const TASK_ENDED = {
   verify: { verifying: null },
   explain: { explaining: false },
   preview: { preview: null },
+  place: { placing: null },
 };
 
 /** When nothing is known to be under way. */
@@ -23,6 +24,7 @@ export const IDLE = {
   ...TASK_ENDED.verify,
   ...TASK_ENDED.explain,
   ...TASK_ENDED.preview,
+  ...TASK_ENDED.place,
 };
 
 /** @param {Events["state"]} message @returns {Partial<Ui>} */
@@ -225,6 +227,7 @@ export function answerUpdate(message, ui) {
 export function progressUpdate({ what, done, total, unit }, ui) {
   const made = { what, done, total, unit };
   if (what === 'export') return { writing: timed(made, ui.writing), isWriting: true };
+  if (what === 'place') return ui.placing ? { placing: timed(made, ui.placing) } : {};
   if (/verif/i.test(what)) return { verifying: timed(made, ui.verifying) };
   return { basis: total && done >= total ? null : timed(made, ui.basis) };
 }

@@ -61,6 +61,8 @@ import { ofKelvin } from './paint_colour.js';
  * @property {{light: number, place: Partial<import("../engine/messages.js").LightPlace>,
  *   at?: [number, number]} | null} dragged where a light is that the pointer drags; at: the pixel that
  *   it points at
+ * @property {Progress | null} placing how far a search for places of the lights is
+ * @property {Record<string, number[]>} ghosts places of lights before a search has moved them, by name
  * @property {Pointing | null} pointing what the next click on a picture does to that light
  * @property {Record<string, any>} settings
  * @property {Record<string, any>} resolved
@@ -170,6 +172,8 @@ export function initialState() {
     lamps: false,
     lamp: null,
     dragged: null,
+    placing: null,
+    ghosts: {},
     pointing: null,
     settings: {},
     resolved: {},
@@ -213,7 +217,7 @@ export function initialState() {
     pointed: null,
     fit: null,
     mix: null,
-    open: { colour: true, lights: true, truth: false },
+    open: { colour: true, lights: true, plan: true, truth: false },
     side: true,
     panel: null,
     dialog: null,

@@ -1,0 +1,127 @@
+/** A small plan of the room from above, as the camera looks into it, with the lights to be dragged. */
+
+import { html, useRef } from '../vendor/preact.js';
+import { MoveButton } from './advice.js';
+import { dot, minus, plus, unit } from './lamp_geometry.js';
+import { placeOf } from './lamp_marks.js';
+import { atFull, luminance, toHex } from './paint_colour.js';
+
+/** @typedef {import("./ui_state.js").Ui} Ui */
+/** @typedef {import("./shortcuts.js").App} App */
+/** @typedef {import("./lamp_geometry.js").Vector} Vector */
+
+/** Height of the plan, and room around it, in CSS pixels; its width follows from the panel. */
+const [WIDTH, HEIGHT, MARGIN] = [270, 130, 10];
+
+/** Length of the arrow of a light's direction, in CSS pixels. */
+const ARROW = 16;
+
+/** Where points are in the plan: to the right and away from the camera, along the floor.
+ * @param {Ui} ui @returns {{of: (point: number[]) => [number, number],
+ *   back: (x: number, y: number, height: number) => Vector, way: (v: number[]) => [number, number]} | null} */
+function planOf({ rig, view, state }) {
+  const camera = rig?.cameras[view] ?? rig?.cameras[0];
+  if (!rig || !camera) return null;
+  const [height, width] = state.size;
+  const middle = plus(plus(camera.ahead, camera.across, width / 2), camera.down, height / 2);
+  const level = (/** @type {number[]} */ v) => {
+    const made = /** @type {Vector} */ ([...v]);
+    made[rig.up] = 0;
+    return unit(made);
+  };
+  const away = level(camera.is_parallel ? camera.ahead : middle);
+  const right = level(minus(camera.across, away.map((x) => x * dot(camera.across, away))));
+  const corners = [0, 1, 2, 3].map((k) => {
+    const corner = [...rig.low];
+    const [a, b] = [0, 1, 2].filter((axis) => axis !== rig.up);
+    if (k & 1) corner[a] = rig.high[a];
+    if (k & 2) corner[b] = rig.high[b];
+    return corner;
+  });
+  const flat = corners.map((corner) => [dot(corner, right), dot(corner, away)]);
+  const [xs, ys] = [0, 1].map((c) => flat.map((one) => one[c]));
+  const [left, far] = [Math.min(...xs), Math.max(...ys)];
+  const scale = Math.min(
+    (WIDTH - 2 * MARGIN) / (Math.max(...xs) - left || 1),
+    (HEIGHT - 2 * MARGIN) / (far - Math.min(...ys) || 1),
+  );
+  const shift = (WIDTH - scale * (Math.max(...xs) - left)) / 2;
+  return {
+    of: (point) => [
+      shift + scale * (dot(point, right) - left),
+      MARGIN + scale * (far - dot(point, away)),
+    ],
+    back: (x, y, at) => {
+      const across = left + (x - shift) / scale;
+      const deep = far - (y - MARGIN) / scale;
+      const made = plus(plus([0, 0, 0], right, across), away, deep);
+      made[rig.up] = at;
+      return made;
+    },
+    way: (v) => [dot(v, right), -dot(v, away)],
+  };
+}
+
+/** @param {{ui: Ui, app: App}} props */
+export function RoomPlan({ ui, app }) {
+  const frame = useRef(/** @type {SVGElement | null} */ (null));
+  const held = useRef(/** @type {number | null} */ (null));
+  const plan = planOf(ui);
+  if (!plan || !ui.rig) return html`<p class="faint">Loading the scene …</p>`;
+  const { rig } = ui;
+  const [a, b] = [0, 1, 2].filter((axis) => axis !== rig.up);
+  const corner = (/** @type {number} */ x, /** @type {number} */ z) => {
+    const made = [0, 0, 0];
+    made[a] = x;
+    made[b] = z;
+    return plan.of(made).join(',');
+  };
+  const { low, high } = rig;
+  const outline = [
+    corner(low[a], low[b]),
+    corner(high[a], low[b]),
+    corner(high[a], high[b]),
+    corner(low[a], high[b]),
+  ].join(' ');
+  const moved = (/** @type {PointerEvent} */ event, /** @type {boolean} */ done) => {
+    const light = held.current;
+    if (light === null || !frame.current) return;
+    const box = frame.current.getBoundingClientRect();
+    const place = rig.lights[light];
+    if (!place.position) return;
+    const zoom = WIDTH / box.width;
+    const [x, y] = [(event.clientX - box.left) * zoom, (event.clientY - box.top) * zoom];
+    const position = plan.back(x, y, place.position[rig.up]);
+    app.store.set({ dragged: done ? null : { light, place: { position } } });
+    app.session.moveLamp(light, { position }, done);
+  };
+  const up = (/** @type {PointerEvent} */ event) => {
+    if (app.store.value.dragged) moved(event, true);
+    held.current = null;
+  };
+  return html`<div class="room-plan">
+    <svg ref=${frame} viewBox=${`0 0 ${WIDTH} ${HEIGHT}`} role="group"
+      aria-label="Plan of the room from above" onPointerMove=${(/** @type {any} */ e) => moved(e, false)}
+      onPointerUp=${up} onPointerCancel=${up}>
+      <polygon class="room" points=${outline} />
+      ${rig.lights.map((_, k) => {
+        const place = placeOf(ui, k);
+        if (!place.position) return null;
+        const [x, y] = plan.of(place.position);
+        const [dx, dy] = place.direction ? plan.way(place.direction) : [0, 0];
+        const rgb = ui.weights[k] ?? ui.lights[k].present;
+        const { label } = ui.lights[k];
+        return html`<g key=${k} class=${`${ui.lamp === k ? 'is-chosen' : ''} ${place.why_not ? 'is-fixed' : ''}`}>
+          <line x1=${x} y1=${y} x2=${x + ARROW * dx} y2=${y + ARROW * dy} />
+          <circle cx=${x} cy=${y} r="5" fill=${luminance(rgb) > 0 ? toHex(atFull(rgb)) : 'none'}
+            data-tip=${label} onPointerDown=${(/** @type {PointerEvent} */ event) => {
+              app.store.set({ lamp: k });
+              if (place.why_not || place.rail) return;
+              held.current = k;
+              frame.current?.setPointerCapture(event.pointerId);
+            }}><title>${label}</title></circle></g>`;
+      })}
+    </svg>
+    <${MoveButton} ui=${ui} app=${app} />
+  </div>`;
+}

@@ -1,0 +1,78 @@
+"""The message that tells pages where all lights hang, and how the cameras see them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import Doubles
+from lightpaint.paint.protocol import LightPlace, Place, Rig
+from lightpaint.paint.rig.cameras import camera_of, free_length, in_this_thread, up_axis
+from lightpaint.paint.rig.lamp_rig import LampRig
+from lightpaint.paint.session.moved_lights import Poses
+from lightpaint.scene.properties.pose import Site
+
+
+def rig_state(rig: LampRig, poses: Poses) -> Rig:
+    """Return where all lights are, for pages. The rig is open."""
+    views = rig.views
+    assert views is not None
+    with in_this_thread():
+        places = tuple(
+            _place(rig, light.name, poses.get(light.name, {})) for light in rig.scene.lights
+        )
+        cameras = [camera_of(view.scene, view.loaded) for view in views]
+    hung = [np.array(place.position) for place in places if place.position is not None]
+    low, high = rig.bounds or (np.zeros(3), np.ones(3))
+    low, high = np.min([low, *hung], axis=0), np.max([high, *hung], axis=0)
+    return Rig(
+        lights=places,
+        cameras=tuple(cameras),
+        up=up_axis(cameras),
+        low=tuple(map(float, low)),
+        high=tuple(map(float, high)),
+    )
+
+
+def _place(rig: LampRig, name: str, values: Mapping[str, Any]) -> LightPlace:
+    reason = rig.why_not(name)
+    light = rig.scene.light(name)
+    site = rig.site(name, values) if not reason else light.members[0].site
+    if reason and len(light.members) > 1:
+        site = Site()
+    target = values.get("target") or _target(rig, site)
+    return LightPlace(
+        position=site.position,
+        direction=site.direction,
+        target=None if target is None else tuple(map(float, target)),
+        cutoff=site.cutoff,
+        beam=site.beam,
+        rail=_rail(rig, name, site),
+        why_not=reason,
+    )
+
+
+def _rail(rig: LampRig, name: str, site: Site) -> tuple[Place, Place] | None:
+    """Return the ends of the rail that a light hangs on, of those in the lights file."""
+    freedom = rig.freedoms.get(name)
+    if freedom is None or not freedom.all_rails or site.position is None:
+        return None
+    here = np.array(site.position)
+    return min(freedom.all_rails, key=lambda rail: _distance_to(here, rail))
+
+
+def _target(rig: LampRig, site: Site) -> Doubles | None:
+    """Return the point of the first surface along a light's axis."""
+    if site.position is None or site.direction is None:
+        return None
+    place, way = np.array(site.position), np.array(site.direction)
+    length = free_length(rig.view(0).loaded, place + 1e-3 * way, way)
+    low, high = rig.bounds or (np.zeros(3), np.ones(3))
+    return np.asarray(place + min(length, float(np.linalg.norm(high - low))) * way)
+
+
+def _distance_to(point: Doubles, rail: tuple[Place, Place]) -> float:
+    """Return the distance of a point from a rail."""
+    start, end = (np.array(x) for x in rail)
+    share = (point - start) @ (end - start) / ((end - start) @ (end - start))
+    return float(np.linalg.norm(point - start - np.clip(share, 0, 1) * (end - start)))
