@@ -40,6 +40,10 @@ class SceneError(LightpaintError):
     """A scene that cannot be loaded, or that lacks something it was asked for."""
 
 
+class NoPlaceError(SceneError):
+    """A new light for which no place is free and sees anything of the picture."""
+
+
 class ImageError(LightpaintError):
     """An image file that is missing, damaged, or of a kind that is not supported."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpaint.basis.lights import BasisLight
-from lightpaint.errors import SceneError
+from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_light import FreeLight, places_of
 from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
@@ -189,7 +189,7 @@ def _template(scene: Scene, light: NewLight, paths: SearchPaths, seed: int) -> F
     freedom = group.freedom
     if not freedom.slides:
         if not len(space.places):
-            raise SceneError(f"{scene.path} has no free place that sees anything of the picture")
+            raise NoPlaceError(f"{scene.path} has no free place that sees anything of the picture")
         low, high = space.places.min(axis=0), space.places.max(axis=0)
         freedom = replace(freedom, box=(as_position(low), as_position(high)))
         places: Places = BoxOfPlaces(low, high, space.places)
@@ -205,7 +205,7 @@ def _template(scene: Scene, light: NewLight, paths: SearchPaths, seed: int) -> F
     if not group.in_view:
         is_free &= ~paths.in_view(tested)
     if not is_free.any():
-        raise SceneError(
+        raise NoPlaceError(
             f"new light {light.name!r} has no free place that sees anything of the picture: give "
             "it more freedom"
         )

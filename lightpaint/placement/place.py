@@ -8,7 +8,7 @@ import numpy as np
 
 from lightpaint.arrays import as_rgb
 from lightpaint.basis.basis import Basis
-from lightpaint.errors import SceneError
+from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
@@ -27,7 +27,7 @@ from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.new_lights import MirroredPair, NewLights
 from lightpaint.placement.placement import AddedLight, Move, Placement
 from lightpaint.placement.placement_fit import fit_of
-from lightpaint.placement.search.judgement import Found, PlacementJudge, PoseError
+from lightpaint.placement.search.judgement import Found, Growth, PlacementJudge, PoseError
 from lightpaint.placement.search.new_light_search import NewLightSearch
 from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_search import TURNS, PoseSearch
@@ -103,7 +103,7 @@ def place(
     def search(loaded: Any) -> _Result:
         paths = SearchPaths(small, loaded, seed=seed)
         if not len(paths.space.points):
-            raise SceneError(f"the camera of {scene.path} sees nothing that light falls on")
+            raise NoPlaceError(f"the camera of {scene.path} sees nothing that light falls on")
         movables = movables_of(scene, names, freedoms, pairs, paths, seed=seed)
         slots = new_movables_of(scene, lights, len(names), paths, seed=seed)
         fit = fit_of(
@@ -115,10 +115,13 @@ def place(
         )
         poses = PoseSearch(fit, paths, PoseRules(paths), seed=seed)
         found = _searched(poses, movables, slots, progress)
-        errors = PlacementJudge(fit, poses.steps, paths).errors(found.arrangement)
+        judge = PlacementJudge(fit, poses.steps, paths)
+        errors = judge.errors(found.arrangement)
+        order = _additions(found)
+        growth = judge.growth(found.arrangement, order) if order else []
         places = [x.position or (0.0, 0.0, 0.0) for x in found.arrangement.sites]
         seen = pixels_of(small[0], loaded, np.array(places, dtype=float).reshape(-1, 3))
-        return _Result(found, errors, seen, paths.space.spread or 1.0)
+        return _Result(found, errors, seen, growth, paths.space.spread or 1.0, small[0].size)
 
     result = small[0].while_loaded(search, views=small[1:])
     return _placement([x for x, _ in views], result, lights, len(names))
@@ -126,18 +129,40 @@ def place(
 
 @dataclass(frozen=True)
 class _Result:
-    """The result of a search. errors, seen: of each movable; its place in the first picture."""
+    """The result of a search on small films, the first one of `size`.
+
+    errors, seen: of each movable, and its place in the first picture. growth: the best lighting
+    with none, one … of the new lights, the one that gives most first.
+    """
 
     found: Found
     errors: list[PoseError]
     seen: Sequence[tuple[float, float] | None]
+    growth: list[Growth]
     spread: float
+    size: tuple[int, int]
 
     def is_hardly_visible(self, k: int) -> bool:
         """Return whether the picture hardly tells where movable `k` is."""
         its = self.errors[k]
         is_long = its.place is not None and its.place > LONG_ERROR * self.spread
         return is_long or (its.turn is not None and its.turn > WIDE_ERROR)
+
+    def grown(self, k: int) -> dict[str, Any]:
+        """Return what is known of the `k`-th new light: the pictures without and with it."""
+        pixels = self.size[0] * self.size[1]
+        pictures = [its.picture[:pixels].reshape(*self.size, 3) for its in self.growth[k : k + 2]]
+        return {
+            "missed_share": self.growth[k + 1].missed,
+            "without": pictures[0],
+            "with_it": pictures[1],
+        }
+
+
+def _additions(found: Found) -> list[int]:
+    """Return the places of the new lights among the movables, the one that gives most first."""
+    new = [k for k, movable in enumerate(found.arrangement.movables) if movable.group is not None]
+    return sorted(new, key=lambda k: -found.gains[k])
 
 
 def _searched(
@@ -169,7 +194,7 @@ def _placement(
 ) -> Placement:
     """Return the placement of what was found. first: the index of the first new light's column."""
     found, moves, additions, poses = result.found, [], [], {}
-    arrangement = found.arrangement
+    arrangement, order = found.arrangement, _additions(found)
     for k, (movable, site) in enumerate(zip(arrangement.movables, arrangement.sites, strict=True)):
         about: dict[str, Any] = {
             "gain_share": found.gains[k],
@@ -180,6 +205,7 @@ def _placement(
         if movable.group is not None:
             weight = arrangement.fitted.weights[movable.columns[0]]
             emitter = _emitter(lights[movable.columns[0] - first], site, weight)
+            about |= result.grown(order.index(k))
             additions.append(AddedLight(emitter, **about, seen_at=result.seen[k]))
         elif site != movable.light.site:
             names = [movable.light.name]

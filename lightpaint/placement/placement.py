@@ -1,11 +1,11 @@
 """Better places of lights: what was moved, what was added, and what it gives."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from lightpaint.arrays import RGB
+from lightpaint.arrays import RGB, Floats
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.keywords import keywords
 from lightpaint.placement.free_space import as_position
@@ -99,6 +99,9 @@ class AddedLight:
         turn_error: The same of its direction, in degrees; None if it has none.
         is_hardly_visible: Whether the picture hardly tells where it is.
         seen_at: Its place in the first picture, from (0, 0) top left to (1, 1); None if outside.
+        missed_share: The share of ‖Ψ‖² that is missed with it and the additions before it.
+        without: (h, w, 3) linear, the best lighting before this light, small.
+        with_it: (h, w, 3), the same with it.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
@@ -113,6 +116,9 @@ class AddedLight:
     turn_error: float | None = None
     is_hardly_visible: bool = False
     seen_at: tuple[float, float] | None = None
+    missed_share: float = 0.0
+    without: Floats | None = field(default=None, repr=False, compare=False)
+    with_it: Floats | None = field(default=None, repr=False, compare=False)
 
     @property
     def name(self) -> str:

@@ -153,7 +153,8 @@ class PlacementFit:
             root, weights = self._root[:, c], fitted.weights[:, c]
             each = slopes[:, :, c] * (root * 1.0) * weights[list(owners)][:, None]
             jacobian = np.zeros((count, each.shape[1]))
-            np.add.at(jacobian, list(numbers), each)
+            for number, row in zip(numbers, each, strict=True):
+                jacobian[number] += row
             matrix += jacobian @ jacobian.T
             gradient += jacobian @ residual[:, c]
             active = (fitted.columns[self._free(weights), :, c] * root).astype(np.float64)

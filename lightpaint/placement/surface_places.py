@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Doubles
-from lightpaint.errors import SceneError
+from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_space import CLEARANCE, FreeSpace
 from lightpaint.placement.permitted_places import Triangles
 from lightpaint.scene.scene import Scene
@@ -45,7 +45,7 @@ def places_on(
     is_free = votes.max(axis=0) > 0
     if not is_free.any():
         listed = some_names(surfaces)
-        raise SceneError(
+        raise NoPlaceError(
             f"no place {distance:.3g} from {listed} is free and sees anything of the picture"
         )
     front = np.where(votes[0] >= votes[1], 1, -1)[:, None]

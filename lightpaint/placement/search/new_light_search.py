@@ -21,6 +21,10 @@ WORTH, SURE = 0.01, 3.0
 #: Least fall of what is missed for which a new light goes elsewhere once all are there.
 WORTH_AGAIN = 0.05
 
+#: Pixels whose noise one light explains by chance, of many places that it is tried at; and the
+#: share of pixels whose miss is no more than the noise of a pixel where nothing else is missed.
+BY_CHANCE, USUAL_SHARE = 24, 0.9
+
 #: Steps of all lights together, after each one that is added.
 STEPS = 6
 
@@ -109,7 +113,10 @@ class NewLightSearch:
             SURE * standard_error(gain),
             NOTHING * self._fit.norm2,
         )
-        # Noise of the painting, which no other paths can tell, is that of single pixels.
+        # Noise of painting and basis, which no other paths can tell, is that of single pixels: a
+        # search fits some of them by chance.
+        usual = np.sort(maps[0][1])[: max(1, round(USUAL_SHARE * len(maps[0][1])))]
+        least = max(least, BY_CHANCE * float(usual.mean()))
         return float(gain[1].sum() - gain[1].max()) >= least
 
     def _without_off(self, found: Arrangement) -> Arrangement:

@@ -4,8 +4,10 @@ The sums that a ranking needs are inner products over visible points, so one mat
 all directions and cones of a light at one place, whose shadow rays they share.
 """
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -41,35 +43,39 @@ class PoseCandidates:
             for c in range(3)
         ]
 
-    def gains(self, light: FreeLight, places: Floats) -> Iterator[tuple[Doubles, list[Site]]]:
-        """Yield the gains of poses at each place, (k,), with these poses."""
+    def gains(
+        self, light: FreeLight, places: Floats
+    ) -> Iterator[tuple[Doubles, Callable[[int], Site]]]:
+        """Yield the gains of poses at each place, (k,), with what makes the k-th pose."""
+        directions, cones = light.directions(APART), light.cones(CONES).tolist()
         if light.site.position is None:
             yield from self._suns(light)
             return
-        directions, cones = light.directions(APART), light.cones(CONES)
         for place in places:
             here = replace(light.site, position=as_position(place))
             added = self._paths.contributions(Site(here.position))[::THINNING]
             if light.site.direction is None:
-                yield self._gains(added, None), [here]
+                yield self._gains(added, None), partial(_aimed, here, None)
                 continue
             cosine = directions.astype(np.float32) @ away_from(place, self._points).T
             if isinstance(here, PanelSite):
                 # Seen from afar a panel is a point whose light falls with the cosine.
                 gains = self._gains(added * here.side**2, np.maximum(cosine, 0))
-                yield gains, [replace(here, direction=as_position(d)) for d in directions]
+                yield gains, partial(_aimed, here, directions)
                 continue
-            angle = np.degrees(np.arccos(np.clip(cosine, -1, 1, out=cosine)))
-            for cutoff, beam in cones.tolist():
-                share = (np.float32(cutoff) - angle) * np.float32(1 / max(cutoff - beam, 1e-6))
+            for cutoff, beam in cones:
+                # Linear in the cosine instead of the angle, which ranks as well.
+                edge, full = (math.cos(math.radians(angle)) for angle in (cutoff, beam))
+                share = (cosine - np.float32(edge)) * np.float32(1 / max(full - edge, 1e-6))
                 opened = replace(here, cutoff=cutoff, beam=beam)
-                sites = [replace(opened, direction=as_position(d)) for d in directions]
-                yield self._gains(added, np.clip(share, 0, 1, out=share)), sites
+                gains = self._gains(added, np.clip(share, 0, 1, out=share))
+                yield gains, partial(_aimed, opened, directions)
 
-    def _suns(self, light: FreeLight) -> Iterator[tuple[Doubles, list[Site]]]:
-        sites = [replace(light.site, direction=as_position(d)) for d in light.directions(APART / 2)]
-        for site in sites:
-            yield self._gains(self._paths.contributions(site)[::THINNING], None), [site]
+    def _suns(self, light: FreeLight) -> Iterator[tuple[Doubles, Callable[[int], Site]]]:
+        for direction in light.directions(APART / 2):
+            site = replace(light.site, direction=as_position(direction))
+            added = self._paths.contributions(site)[::THINNING]
+            yield self._gains(added, None), partial(_aimed, site, None)
 
     def _gains(self, added: Floats, shares: Floats | None) -> Doubles:
         """Return gains of what is added at first hits, (v, 3), by shares of it, (k, v)."""
@@ -89,14 +95,20 @@ class PoseCandidates:
         return gains
 
 
+def _aimed(site: Site, directions: Floats | None, k: int) -> Site:
+    """Return a pose that points along the k-th direction."""
+    return site if directions is None else replace(site, direction=as_position(directions[k]))
+
+
 def best_poses(
-    found: Iterator[tuple[Doubles, Sequence[Site]]], count: int
+    found: Iterator[tuple[Doubles, Callable[[int], Site]]], count: int
 ) -> list[tuple[float, Site]]:
     """Return the `count` poses with the largest gains, the best first."""
-    best: list[tuple[float, Site]] = []
-    for gains, sites in found:
+    best: list[tuple[float, Callable[[int], Site], int]] = []
+    for gains, make in found:
         order = np.argsort(-gains)[:count]
-        best += [(float(gains[k]), sites[k]) for k in order if gains[k] > 0]
+        best += [(float(gains[k]), make, int(k)) for k in order if gains[k] > 0]
         if len(best) > 4 * count:
             best = sorted(best, key=lambda its: -its[0])[:count]
-    return sorted(best, key=lambda its: -its[0])[:count]
+    ordered = sorted(best, key=lambda its: -its[0])[:count]
+    return [(gain, make(k)) for gain, make, k in ordered]

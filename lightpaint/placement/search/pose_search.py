@@ -20,8 +20,8 @@ from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.placement.view_paths import SearchPaths
 from lightpaint.scene.properties.pose import Site
 
-#: Places that each light is tried at, if all of them are along lines, and if not.
-PLACES_ON_LINES, PLACES = 24, 64
+#: Places that each light is tried at, if all of them are along lines, and if not; and new ones.
+PLACES_ON_LINES, PLACES, PLACES_OF_NEW = 24, 64, 112
 
 #: Places near which more are tried, and how many.
 BESIDE, AROUND = 6, 8
@@ -127,7 +127,7 @@ class PoseSearch:
             return light.some_places(1, self._rng)
         count = PLACES_ON_LINES if light.freedom.all_rails else PLACES
         if movable.group is not None:
-            count = 2 * PLACES
+            count = PLACES_OF_NEW
         places = light.some_places(count, self._rng)
         its = self._is_permitted(others, movable, places)
         if movable.group is None:

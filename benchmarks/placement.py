@@ -1,0 +1,281 @@
+"""How well unknown lights are found: closed rooms by seed, `lp.place`, and rivals in the same run.
+
+    python benchmarks/placement.py [--rooms 10] [--first 100] [--kinds point,spot,panel]
+        [--rivals] [--behind] [--gallery]
+
+Each room is painted by a plain render with 1 to 3 lights that the search does not know (one, for
+panels). Missed shares are Σ (Ψ − picture)² / Σ Ψ²: of the room as it is known, of the scene that
+was found by an independent plain render, and between two plain renders of the truth, which is the
+noise floor. A room counts as found if the render of what was found misses less than FOUND above the
+floor. Seconds are of the processor, all threads. `--rivals` adds `lp.suggest_lights`, and Adam
+through Mitsuba's differentiable path integrator from random starts.
+"""
+
+import argparse
+import math
+import resource
+import statistics
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from closed_rooms import ClosedRoom
+
+import lightpaint as lp
+from lightpaint.arrays import Floats
+from lightpaint.scene.scene import Scene
+
+ROOT = Path(__file__).parent.parent
+
+#: Share of ‖Ψ‖² above the noise floor up to which a room counts as found.
+FOUND = 0.005
+
+#: Samples of paintings and verifications, of bases, and size of the pictures.
+SPP, BASIS_SPP, SIZE = 256, 64, (160, 90)
+
+#: Steps and starts of the rival.
+STEPS, STARTS = 60, 2
+
+
+def main() -> None:
+    """Print one line for each room, and the sums."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rooms", type=int, default=10)
+    parser.add_argument("--first", type=int, default=100)
+    parser.add_argument("--kinds", default="point,spot,panel")
+    for name in ("rivals", "behind", "gallery"):
+        parser.add_argument(f"--{name}", action="store_true")
+    options = parser.parse_args()
+    if options.behind:
+        show_behind()
+    if options.gallery:
+        show_gallery()
+    kinds = options.kinds.split(",")
+    lines = []
+    print("room   lights     known  floor  found  excess  cpu s  / render  off       turned")
+    for k in range(options.rooms):
+        kind = kinds[k % len(kinds)]
+        with tempfile.TemporaryDirectory() as folder:
+            seed = options.first + k
+            lines.append(one_room(Path(folder), kind, seed, with_rivals=options.rivals))
+    found = sum(excess < FOUND for excess, _ in lines)
+    if lines:
+        seconds = [its for _, its in lines]
+        print(
+            f"{found} of {len(lines)} found; median {statistics.median(seconds):.0f} s, "
+            f"most {max(seconds):.0f} s"
+        )
+
+
+def one_room(folder: Path, kind: str, seed: int, *, with_rivals: bool) -> tuple[float, float]:
+    """Print the line of a room; return the share above the floor, and seconds."""
+    room = ClosedRoom(seed)
+    count = 1 if kind == "panel" else 1 + seed % 3
+    true = getattr(room, f"{kind}s")(count)
+    scene = lp.load_scene(room.write(folder / "room.xml", [], size=SIZE))
+    truth = lp.load_scene(room.write(folder / "true.xml", true, size=SIZE))
+    start = cpu_s()
+    painted = rendered(truth, seed=1)
+    render_s = cpu_s() - start
+    floor = missed(rendered(truth, seed=2), painted)
+    basis = lp.render_basis(scene, spp=BASIS_SPP, seed=3)
+    solution = lp.solve(basis, lp.Target.of(painted), space="linear", hold=0)
+    start = cpu_s()
+    new = [lp.NewLights(kind, count=3)]
+    placement = lp.place(scene, basis, solution, new=new, seed=seed)
+    seconds = cpu_s() - start
+    verified = missed(verification(placement.scene, solution, folder), painted)
+    off, turned = distances(truth, placement)
+    known = sum(solution.certificate.objective) / float(solution.norm2.sum())
+    print(
+        f"{seed:4d}   {count} {kind:8s} {known:6.3f} {floor:6.4f} {verified:6.4f}"
+        f" {verified - floor:7.4f} {seconds:6.1f} {seconds / render_s:9.1f}"
+        f"  {listed(off, '.2f'):9s} {listed(turned, '.0f')}",
+        flush=True,
+    )
+    if with_rivals:
+        show_rivals(folder, scene, basis, solution, placement, painted, seed)
+    return verified - floor, seconds
+
+
+def verification(scene: Scene, solution: lp.Solution, folder: Path) -> Floats:
+    """Return a plain render of the written scene, its lights solved for with an exact basis."""
+    basis = lp.render_basis(scene, spp=BASIS_SPP, seed=11)
+    target = solution.problem.views.targets[0]
+    lighting = lp.solve(basis, target, space="linear", hold=0).lighting
+    return rendered(lp.relight(scene, lighting, folder / "relit" / "relit.xml"), seed=12)
+
+
+def rendered(scene: Scene, *, seed: int, spp: int = SPP) -> Floats:
+    """Return a render by plain Mitsuba, (h, w, 3) linear."""
+    import mitsuba as mi
+
+    loaded = mi.load_file(str(scene.path))
+    sensor = loaded.sensors()[scene.sensor]
+    return np.array(mi.render(loaded, sensor=sensor, spp=spp, seed=seed))[..., :3]
+
+
+def missed(picture: Floats, painted: Floats) -> float:
+    """Return Σ (Ψ − picture)² / Σ Ψ²."""
+    return float(np.square(painted - picture).sum() / np.square(painted).sum())
+
+
+def distances(truth: Scene, placement: lp.Placement) -> tuple[list[float], list[float]]:
+    """Return how far each true light is from its nearest found one, and degrees between them."""
+    off, turned = [], []
+    for emitter in truth.emitters:
+        if not emitter.name.startswith("true") or emitter.site.position is None:
+            continue
+        found = [
+            (math.dist(x.site.position or (0, 0, 0), emitter.site.position), x.site)
+            for x in placement.additions
+        ]
+        away, site = min(found, key=lambda its: its[0], default=(math.inf, emitter.site))
+        off.append(away)
+        if emitter.site.direction is not None and site.direction is not None:
+            cosine = float(np.dot(emitter.site.direction, site.direction))
+            turned.append(math.degrees(math.acos(min(1, max(-1, cosine)))))
+    return off, turned
+
+
+def show_rivals(
+    folder: Path,
+    scene: Scene,
+    basis: lp.Basis,
+    solution: lp.Solution,
+    placement: lp.Placement,
+    painted: Floats,
+    seed: int,
+) -> None:
+    """Print what `suggest_lights` and Adam leave of the same room."""
+    start = cpu_s()
+    suggested = lp.suggest_lights(scene, basis, solution, count=3, seed=seed)
+    seconds = cpu_s() - start
+    lights = [
+        lp.NewEmitter(x.name, "point", lp.Pose(position=x.position), emission=x.emission)
+        for x in suggested
+    ]
+    with_them = scene.with_new_emitters(lights) if lights else scene
+    left = missed(verification(with_them, solution, folder / "suggested"), painted)
+    print(f"         suggest_lights: {left:.4f} in {seconds:.1f} s", flush=True)
+    kinds = {light.emitter.kind for light in placement.additions}
+    if kinds <= {"point", "spot"} and kinds:
+        best, seconds = adam(scene, kinds.pop(), len(placement.additions), painted, seed)
+        print(f"         Adam, {STARTS} starts: {best:.4f} in {seconds:.1f} s", flush=True)
+
+
+def adam(scene: Scene, kind: Any, count: int, painted: Floats, seed: int) -> tuple[float, float]:
+    """Return what the best of some starts misses, and seconds. The number of lights is given."""
+    import drjit as dr
+    import mitsuba as mi
+
+    rng, best, start = np.random.default_rng(seed), math.inf, cpu_s()
+    target = mi.TensorXf(painted)
+    for _ in range(STARTS):
+        lights = []
+        for k in range(count):
+            place = tuple(rng.uniform((-2, 0.5, -2), (2, 2.5, 3)))
+            pose = lp.Pose(position=place, target=tuple(rng.uniform((-2, 0, -2), (2, 1.5, 2))))
+            lights.append(lp.NewEmitter(f"guess_{k}", kind, pose, emission=(3, 3, 3)))
+        loaded = scene.with_new_emitters(lights).load()
+        parameters = mi.traverse(loaded)
+        optimiser = mi.ad.Adam(lr=0.05)
+        chosen = [key for key, _ in parameters if key.startswith("guess_")]
+        chosen = [key for key in chosen if key.endswith(("position", "intensity.value"))]
+        for key in chosen:
+            optimiser[key] = parameters[key]
+        parameters.update(optimiser)
+        integrator = mi.load_dict({"type": "path", "max_depth": 6})
+        for step in range(STEPS):
+            image = mi.render(loaded, parameters, integrator=integrator, spp=4, seed=step)
+            loss = dr.sum(dr.square(image - target)) / dr.sum(dr.square(target))
+            dr.backward(loss)
+            optimiser.step()
+            for key in chosen:
+                if key.endswith("value"):
+                    optimiser[key] = dr.maximum(optimiser[key], 0)
+            parameters.update(optimiser)
+        image = np.array(mi.render(loaded, spp=64, seed=99))[..., :3]
+        best = min(best, missed(image, painted))
+    return best, cpu_s() - start
+
+
+def show_behind() -> None:
+    """Print where a light behind the camera is found by one view, and by two."""
+    room = ClosedRoom(7)
+    true = np.array([0.6, 2.0, 4.3])
+    from closed_rooms import point
+
+    lights = [point("true_0", true, np.full(3, 4.0))]
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [
+            room.write(Path(folder) / name, its, size=SIZE, views=2)
+            for name, its in (("room.xml", []), ("true.xml", lights))
+        ]
+        scenes, truths = (
+            [lp.load_scene(path, sensor=k) for k in ("camera", "other")] for path in paths
+        )
+        bases = [lp.render_basis(x, spp=BASIS_SPP, seed=3 + k) for k, x in enumerate(scenes)]
+        targets = [lp.Target.of(rendered(x, seed=1 + k)) for k, x in enumerate(truths)]
+        for count in (1, 2):
+            solution = lp.solve(bases[:count], targets[:count], space="linear", hold=0)
+            new = [lp.NewLights("point", count=1)]
+            placement = lp.place(scenes[:count], bases[:count], solution, new=new)
+            for light in placement.additions:
+                off = math.dist(light.site.position or (0, 0, 0), true)
+                print(f"behind the camera, {count} views: {off:.3f} off; {light}", flush=True)
+
+
+def show_gallery() -> None:
+    """Print what the gallery's evening misses with fixed, moved and new spots."""
+    scene = lp.load_scene(ROOT / "scenes" / "gallery" / "scene.xml").reduced("1/2")
+    target = lp.read_target(ROOT / "targets" / "gallery" / "evening.exr")
+    spots = [light.name for light in scene.lights if light.plugin == "spot"]
+    basis = lp.render_basis(scene, spp=BASIS_SPP)
+    solution = lp.solve(basis, target, space="linear", hold=0, resize=True)
+    print(f"gallery evening, fixed: {share(solution):.3f}")
+    rails = {name: rail_of(scene, name) for name in spots}
+    freedoms = {name: lp.Freedom(line=rail, aim=True) for name, rail in rails.items()}
+    for new in ([], [lp.NewLights("spot", count=2, freedom=lp.Freedom(surfaces=("ceiling",)))]):
+        start = cpu_s()
+        placement = lp.place(scene, basis, solution, freedoms, new=new)
+        seconds = cpu_s() - start
+        again = lp.solve(
+            lp.render_basis(placement.scene, spp=BASIS_SPP, seed=5),
+            target,
+            space="linear",
+            hold=0,
+            resize=True,
+        )
+        print(
+            f"  {len(placement.additions)} new: {share(again):.3f} in {seconds:.0f} s", flush=True
+        )
+        for change in (*placement.moves, *placement.additions):
+            print(f"    {change}")
+
+
+def rail_of(scene: Scene, name: str) -> Any:
+    """Return the track that a spot of the gallery hangs on: along z, through its place."""
+    x, y, _ = scene.light(name).members[0].site.position or (0, 0, 0)
+    return (x, y, 0.6), (x, y, 6.0)
+
+
+def share(solution: lp.Solution) -> float:
+    """Return the root of the missed share of ‖Ψ‖²."""
+    return math.sqrt(sum(solution.certificate.objective) / float(solution.norm2.sum()))
+
+
+def listed(values: list[float], form: str) -> str:
+    """Return numbers in a row."""
+    return " ".join(f"{value:{form}}" for value in values)
+
+
+def cpu_s() -> float:
+    """Return the processor's seconds of this process."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+if __name__ == "__main__":
+    main()
