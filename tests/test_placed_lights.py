@@ -236,3 +236,29 @@ def test_lights_that_cannot_be_added_say_so_before_a_sample(
     target = lp.Target.of(np.ones((*room.size, 3), np.float32))
     with pytest.raises(LightpaintError, match=words):
         lp.Job((room,), (target,), tmp_path / "a", rigging=lp.Rigging.of(new=[new]))
+
+
+def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
+    room: Scene, tmp_path: Path
+) -> None:
+    target = painted(room)
+    look = lp.paint_with_light(
+        room,
+        target,
+        tmp_path / "answer",
+        spp=128,
+        space="linear",
+        hold=0,
+        suggest=1,
+        verify=False,
+        command="lightpaint solve room.xml p.exr --suggest 1 --spp 128",
+    )
+    turn = look.move_suggestion
+    assert turn is not None
+    assert turn.name == "beam"
+    assert turn.option == f"--aim beam={5 * np.ceil((turn.turn + 10) / 5):.0f}"
+    off = [float(np.square(x - target.image).sum()) for x in (turn.without, turn.with_it)]
+    assert off[1] < 0.5 * off[0]
+    page = (tmp_path / "answer" / "report.html").read_text()
+    assert f"lightpaint solve room.xml p.exr --spp 128 {turn.option}" in page
+    assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"

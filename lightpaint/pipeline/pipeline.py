@@ -12,6 +12,7 @@ from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job_bases import obtain_bases_of, view_listener
+from lightpaint.pipeline.move_advice import suggest_move
 from lightpaint.pipeline.needed_samples import add_needed_samples, problem_of, without_noise
 from lightpaint.pipeline.placed_lights import place_lights
 from lightpaint.pipeline.results.answer_folder import (
@@ -119,7 +120,7 @@ def _finish_view(
     folder = answer.path / view.folder.relative_to(job.folder)
     folder.mkdir(exist_ok=True)
     predicted = basis.predict(solution.weights)
-    verification, suggestions, budget, relit = None, None, None, None
+    verification, suggestions, turn, budget, relit = None, None, None, None, None
     if scene is not None:
         relit = answer.seen_through(scene.sensor)
         budget = _budget(settings, basis, relit)
@@ -143,6 +144,8 @@ def _finish_view(
         suggestions = suggest_lights(
             scene, basis, solution, count=settings.suggest, seed=settings.seed, progress=listen
         )
+        if not job.all_rigging:
+            turn = suggest_move(job, view, solution, listen)
         listen.note("lights suggested")
     look = Look(
         target=view.target,
@@ -154,6 +157,7 @@ def _finish_view(
         analysis=analysis,
         suggestions=suggestions,
         placement=placement,
+        move_suggestion=turn,
     )
     write_report(folder, look, command=settings.command, is_shown=settings.report)
     listen.note("report written")

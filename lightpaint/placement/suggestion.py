@@ -47,3 +47,30 @@ class Suggestion:
         flux = point_flux()
         unit_flux = (flux, flux, flux)
         return photometry(self.emission, unit=UNIT, unit_flux=unit_flux, cd_per_unit=cd_per_unit)
+
+
+@keywords()
+@dataclass(frozen=True)
+class MoveSuggestion:
+    """A light of the scene to turn, instead of a new one.
+
+    Attributes:
+        name: The light.
+        turn: Degrees that it turns.
+        gain_share: The share of the error (energy) that the turn removes, as the search found it.
+        option: The option of `lightpaint solve` that lets it turn.
+        without: (h, w, 3) linear, the solved picture, small.
+        with_it: (h, w, 3), the same after the turn, with all lights solved again.
+
+    Examples:
+        >>> look = lp.paint_with_light("room.xml", "painting.exr", "evening", spp=4, suggest=1)
+        >>> look.move_suggestion is None
+        True
+    """
+
+    name: str
+    turn: float
+    gain_share: float
+    option: str
+    without: Floats = field(repr=False, compare=False)
+    with_it: Floats = field(repr=False, compare=False)

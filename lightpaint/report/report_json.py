@@ -22,7 +22,7 @@ from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.suggestion import Suggestion
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.detection_power import ERROR
 from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import (
@@ -65,6 +65,7 @@ def report_numbers(
     diagnosis: Diagnosis | None = None,
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
+    turn: MoveSuggestion | None = None,
     hung: HungLights | None = None,
     appearance: Appearance | None = None,
     color_choices: Choices = (),
@@ -96,6 +97,7 @@ def report_numbers(
         "uncertainty": None if uncertainty is None else _uncertainty(basis, solution, uncertainty),
         "verification": None if verification is None else verification_numbers(verification),
         "suggestions": _suggestion_list(suggestions, solution.lighting.cd_per_unit),
+        "turn": None if turn is None else _turn(turn),
         "placement": None if hung is None else _placement(hung),
     }
     return json.dumps(finite(numbers), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -272,6 +274,10 @@ def verification_numbers(v: Verification) -> dict[str, Any]:
         "delta_e_95": v.delta_e_95,
         "power": None if v.power is None else {"error": ERROR, "lights": dict(v.power)},
     }
+
+
+def _turn(turn: MoveSuggestion) -> dict[str, Any]:
+    return {name: getattr(turn, name) for name in ("name", "turn", "gain_share", "option")}
 
 
 def _placement(hung: HungLights) -> dict[str, Any]:

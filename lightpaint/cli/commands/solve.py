@@ -12,6 +12,7 @@ from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
 from lightpaint.relit.export.exports import EXPORTS
+from lightpaint.report.page.suggestion_section import spoken_turn
 from lightpaint.screen import some_of
 
 if TYPE_CHECKING:
@@ -80,6 +81,9 @@ def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
             terminal.write("")
             terminal.write(f"{look.basis.origin.sensor}:")
         show_look(look, view.folder, table=table)
+        if look.move_suggestion is not None:
+            text = spoken_turn(look.move_suggestion)
+            terminal.write(f"{text} Let it turn: {look.move_suggestion.option}")
         if look.suggestions is not None:
             tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
     if job.groups is not None:

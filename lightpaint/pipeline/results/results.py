@@ -21,7 +21,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.placement import HARDLY_VISIBLE, AddedLight, Move, Placement
-from lightpaint.placement.suggestion import Suggestion
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
@@ -84,6 +84,8 @@ class Look:
         analysis: How certain the lights are, and why the answer is not closer.
         suggestions: Lights that would help most; None if not requested.
         placement: The places that were found for lights; None if none may move.
+        move_suggestion: The turn of a spot that would help most, if suggestions were requested and
+            one surely helps.
 
     Examples:
         >>> look = lp.paint_with_light(None, "painting.exr", "evening", basis="room.basis.exr")
@@ -100,6 +102,7 @@ class Look:
     analysis: Analysis
     suggestions: tuple[Suggestion, ...] | None = None
     placement: Placement | None = None
+    move_suggestion: MoveSuggestion | None = None
 
     def __repr__(self) -> str:
         return f"Look(of {self.target.name}: {self.verdict})"
@@ -244,6 +247,7 @@ def _report_arguments(look: Look, command: str) -> dict[str, Any]:
         "diagnosis": look.diagnosis,
         "unconstrained": look.analysis.unconstrained,
         "suggestions": look.suggestions,
+        "turn": look.move_suggestion,
         "hung": None if look.placement is None else hung_of(look.placement, look.lighting),
         "appearance": look.analysis.appearance,
         "color_choices": look.analysis.color_choices,

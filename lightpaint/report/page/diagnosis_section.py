@@ -92,6 +92,14 @@ def _steps(solution: Solution) -> str:
     return f"<p>{text[0].upper()}{text[1:]}.</p>" if text else ""
 
 
+#: What can be done about light that no dimmer gives.
+OTHER_PLACES = (
+    "What no dimmer reaches, a light that hangs or points elsewhere may: <code>--suggest</code> "
+    "looks for the best turn and the best new light, with a picture and the line to paste; "
+    "<code>--aim</code>, <code>--move</code> and <code>--add</code> let lights be placed."
+)
+
+
 def missed_section(
     solution: Solution,
     diagnosis: Diagnosis | None,
@@ -99,11 +107,17 @@ def missed_section(
     *,
     transform: ViewTransform,
     appearance: Appearance | None = None,
+    can_place: bool = False,
 ) -> str:
-    """Return the section on the error: sentences, shares, maps and bounds."""
+    """Return the section on the error: sentences, shares, maps and bounds.
+
+    can_place: whether lights of the scene could hang elsewhere, which nobody has asked for yet.
+    """
     if diagnosis is None:
         return ""
     sentences = "".join(f"<p>{escape(text)}</p>" for text in error_sentences(diagnosis, appearance))
+    if can_place and appearance is not None and appearance.is_out_of_reach:
+        sentences += f"<p>{OTHER_PLACES}</p>"
     return (
         f'<section><h2>The difference</h2><div class="explained"><div>{sentences}</div>'
         f"{_shares(diagnosis)}</div>"

@@ -24,7 +24,7 @@ from lightpaint.lighting.analysis.appearance.color_choices import Choices
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.suggestion import Suggestion
+from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
 from lightpaint.relit.verification import Verification
 from lightpaint.report.answer_pictures import (
     Residual,
@@ -62,6 +62,7 @@ def report_page(
     diagnosis: Diagnosis | None = None,
     unconstrained: Solution | None = None,
     suggestions: Sequence[Suggestion] | None = None,
+    turn: MoveSuggestion | None = None,
     hung: HungLights | None = None,
     appearance: Appearance | None = None,
     looks: CleanLooks | None = None,
@@ -100,7 +101,13 @@ def report_page(
         ),
         "wipe": partial(_wipe, target, solution, looks, raw, transform=transform),
         "missed": partial(
-            missed_section, solution, diagnosis, current, transform=transform, appearance=appearance
+            missed_section,
+            solution,
+            diagnosis,
+            current,
+            transform=transform,
+            appearance=appearance,
+            can_place=suggestions is None and hung is None and basis.origin.scene.endswith(".xml"),
         ),
         "constraints": partial(
             constraints_section, basis, solution, unconstrained, transform=transform, looks=looks
@@ -119,6 +126,8 @@ def report_page(
         places=placement_section(hung, to_8_bit(transform.encode(looks.predicted)), basis.features),
         suggestions=suggestion_section(
             suggestions,
+            turn=turn,
+            command=command,
             transform=transform,
             cd_per_unit=solution.lighting.cd_per_unit,
             is_clean=looks.is_clean,

@@ -1,0 +1,93 @@
+"""The best turn of a light that is there, suggested where lights as they hang miss the painting."""
+
+import math
+from dataclasses import replace
+from shlex import quote
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.basis.render.basis_render import render_basis
+from lightpaint.errors import SceneError
+from lightpaint.images.estimate import Estimate
+from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
+from lightpaint.pipeline.job.job import Job, PaintedView
+from lightpaint.placement.freedom import Freedom
+from lightpaint.placement.lights_to_place import free_light
+from lightpaint.placement.place import on_small_film, place
+from lightpaint.placement.suggestion import MoveSuggestion
+from lightpaint.progress import Listener
+from lightpaint.scene.scene import Scene
+
+#: Degrees that spots are tried to turn by, and that the option adds to what they turn.
+TURN, MARGIN = 45.0, 10.0
+
+#: Most pixels of the preview, camera samples of all of them, and most of one.
+PIXELS, SAMPLES, MAX_SPP = 2**14, 2**19, 512
+
+#: Relative error below which nothing is suggested.
+NOTHING_MISSED = 0.01
+
+
+def suggest_move(
+    job: Job, view: PaintedView, solution: Solution, listen: Listener
+) -> MoveSuggestion | None:
+    """Return the turn of one spot that helps most; None if none surely does."""
+    scene, basis = view.scene, solution.basis
+    assert scene is not None
+    freedoms = _turns(scene)
+    norm2 = float(solution.norm2.sum())
+    if not freedoms or sum(solution.certificate.objective) <= NOTHING_MISSED**2 * norm2:
+        return None
+    try:
+        placement = place(
+            scene,
+            basis,
+            solution,
+            freedoms,
+            seed=job.settings.seed,
+            progress=lambda label, done, total, unit="": listen(label, done, total, "steps"),
+        )
+    except SceneError:
+        return None  # in fog, say: suggestions of new lights tell why
+    if not placement.moves:
+        return None
+    best = placement.moves[0]
+    without, with_it = _pictures(job, view, solution, scene.moved({best.name: best.pose}), basis)
+    degrees = 5 * math.ceil((best.turn + MARGIN) / 5)
+    option = f"--aim {quote(f'{best.name}={degrees}')}"
+    return MoveSuggestion(best.name, best.turn, best.gain_share, option, without, with_it)
+
+
+def _turns(scene: Scene) -> dict[str, Freedom]:
+    """Return spots of `scene` that may be turned."""
+    freedoms = {}
+    for light in scene.lights:
+        if light.plugin != "spot":
+            continue
+        try:
+            free_light(scene, light.name, Freedom(aim=TURN))
+        except SceneError:
+            continue
+        freedoms[light.name] = Freedom(aim=TURN)
+    return freedoms
+
+
+def _pictures(
+    job: Job, view: PaintedView, solution: Solution, moved: Scene, basis: Basis
+) -> tuple[Floats, Floats]:
+    """Return the picture as solved, and after the move, on a small film."""
+    small = on_small_film(moved, basis, PIXELS)
+    factor = basis.size[0] // small.size[0]
+    before = block_mean(basis.predict(solution.weights).image, factor)
+    look = block_mean(basis.present_look, factor), block_mean(basis.present_noise, factor)
+    spp = min(MAX_SPP, SAMPLES // (small.size[0] * small.size[1]))
+    rendered = render_basis(small, spp=spp, seed=job.settings.seed)
+    rendered = replace(rendered, former=Estimate(*look))
+    height, width = (factor * n for n in small.size)
+    target = view.target.cropped(height, width).reduced(factor)
+    problem = Problem.of(rendered, target, constraints=job.all_constraints, fit=job.fit)
+    again = solution_of(problem)
+    return before[: small.size[0], : small.size[1]], rendered.mix(again.weights)
