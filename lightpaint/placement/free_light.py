@@ -53,12 +53,12 @@ class FreeLight:
     def __post_init__(self) -> None:
         its, site = self.freedom, self.site
         for is_asked, has_it, what in (
-            (its.slides, site.position is not None, "a place that could change"),
-            (its.turn > 0, site.direction is not None, "a direction that could change"),
-            (its.cone is not None, site.cutoff is not None, "a cone"),
+            (its.slides, site.position is not None, "place that could change"),
+            (its.turn > 0, site.direction is not None, "direction that could change"),
+            (its.cone is not None, site.cutoff is not None, "cone"),
         ):
             if is_asked and not has_it:
-                raise SceneError(f"light {self.name!r} has not {what}: leave that freedom out")
+                raise SceneError(f"light {self.name!r} has no {what}: leave that freedom out")
         if self.places is None and site.position is not None:
             here = np.array(site.position, dtype=float)
             object.__setattr__(self, "places", places_of(its, here))

@@ -84,9 +84,9 @@ class NewLights:
     def check_kind(self, kind: NewKind) -> None:
         """Raise SceneError for a freedom that lights of this kind do not have."""
         if self.freedom.cone is not None and kind != "spot":
-            raise SceneError(f"a new {kind} has not a cone: leave that freedom out")
+            raise SceneError(f"a new {kind} has no cone: leave that freedom out")
         if self.freedom.aim and kind == "point":
-            raise SceneError("a new point has not a direction: leave aim out")
+            raise SceneError("a new point has no direction: leave aim out")
         if self.size is not None and kind != "panel":
             raise SceneError(f"a new {kind} has no size: leave it out")
 

@@ -133,9 +133,7 @@ def _headline_start(appearance: Appearance) -> str:
 
 
 def spoken_missing(appearance: Appearance) -> str:
-    """Return the main error as a phrase, `brighter light on the floor`. The answer must have a
-    place. Of an answer that has such a place.
-    """
+    """Return the main error in words: `brighter light on the floor`. It must have a place."""
     assert appearance.place is not None
     change = spoken_difference(appearance.place.painted, appearance.place.reached)
     light = "shade" if is_darker(appearance) else "light"

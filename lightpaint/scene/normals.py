@@ -14,7 +14,7 @@ from lightpaint.scene.runtime.kernel_threads import kernels
 NORMAL_TOLERANCE = 1e-5
 
 
-def settle_normals(scene: Any) -> None:
+def make_normals_reproducible(scene: Any) -> None:
     """Compute the normals again on one thread, which adds in the same order each time.
 
     Normals from a file stay, unless they equal the computed ones. scene: a `mi.Scene`.

@@ -17,7 +17,7 @@ from lightpaint.errors import SceneError
 from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.required import check_required
 from lightpaint.scene.checks.xml_limits import check_nodes, check_xml
-from lightpaint.scene.normals import settle_normals
+from lightpaint.scene.normals import make_normals_reproducible
 from lightpaint.scene.properties.emission import EmitterSetting, child_named, set_emission
 from lightpaint.scene.properties.film import Film
 from lightpaint.scene.properties.integrator import (
@@ -160,7 +160,7 @@ class ParsedScene:
             props["film"] = film.load()
         with self._resolving(), mitsuba_errors(self.path, self.instead):
             scene = mi.parser.instantiate(self.config, state)
-        settle_normals(scene)
+        make_normals_reproducible(scene)
         return scene
 
     def shape_plugin(self, emitter: int) -> str:

@@ -72,9 +72,9 @@ def test_nothing_moves_where_nothing_is_missed(room: Scene) -> None:
     [
         ("panel", lp.Freedom(within=1), "'panel' is of the kind area"),
         ("sky", lp.Freedom(aim=True), "'sky' is of the kind constant"),
-        ("bulb", lp.Freedom(aim=10), "'bulb' has not a direction"),
-        ("bulb", lp.Freedom(cone=(10, 20)), "'bulb' has not a cone"),
-        ("sun", lp.Freedom(within=1), "'sun' has not a place"),
+        ("bulb", lp.Freedom(aim=10), "'bulb' has no direction"),
+        ("bulb", lp.Freedom(cone=(10, 20)), "'bulb' has no cone"),
+        ("sun", lp.Freedom(within=1), "'sun' has no place"),
         ("lamp", lp.Freedom(within=1), "no light 'lamp'"),
     ],
 )

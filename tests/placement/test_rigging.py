@@ -80,9 +80,7 @@ def test_freedoms_follow_from_names_and_patterns(room: Scene) -> None:
         on={"track": {"line": [[-1, 1.8, 0], [1, 1.8, 0]]}},
     )
     # `aim` of the pattern is for the spot alone: the bulb points nowhere.
-    with pytest.raises(
-        ConstraintError, match=r"light\.\*ulb\.aim: light 'bulb' has not a direction"
-    ):
+    with pytest.raises(ConstraintError, match=r"light\.\*ulb\.aim: light 'bulb' has no direction"):
         freedoms_of(lp.Rigging.of({"*ulb": {"aim": 20}}), room)
     freedoms = freedoms_of(rigging, room)
     assert freedoms["beam"] == lp.Freedom(rails=(((-1, 1.8, 0), (1, 1.8, 0)),), aim=20)
@@ -162,7 +160,7 @@ def test_a_wrong_value_is_one_line_with_its_file_and_key(
         ({"lamp": {"aim": 10}}, "light.lamp: no light 'lamp'; there are panel, bulb"),
         ({"beem": {"aim": 10}}, "did you mean 'beam'"),
         ({"sky": {"move": 1}}, "light.sky.move: light 'sky' is of the kind constant"),
-        ({"bulb": {"cone": [10, 20]}}, "light.bulb.cone: light 'bulb' has not a cone"),
+        ({"bulb": {"cone": [10, 20]}}, "light.bulb.cone: light 'bulb' has no cone"),
         ({"beam": {"move": {"on": "track"}}}, r"move.on: no rail, surface or shape 'track'"),
     ],
 )

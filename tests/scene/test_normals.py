@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from lightpaint.scene.normals import settle_normals
+from lightpaint.scene.normals import make_normals_reproducible
 from lightpaint.scene.runtime.kernel_threads import limit_threads
 from lightpaint.scene.runtime.variant import use_variant
 
@@ -49,15 +49,15 @@ def normals(scene: object) -> np.ndarray:
 def test_what_was_computed_is_computed_again() -> None:
     reference, scene = ball(), ball(off=2e-7)
     # A mesh that is loaded while other threads are at work may have sums in another order.
-    settle_normals(reference)
+    make_normals_reproducible(reference)
     expected = normals(reference)
     assert (normals(scene) != expected).any()
-    settle_normals(scene)
+    make_normals_reproducible(scene)
     np.testing.assert_array_equal(normals(scene), expected)
 
 
 def test_those_of_a_file_stay() -> None:
     scene = ball(factor=-1.0)
     before = normals(scene)
-    settle_normals(scene)
+    make_normals_reproducible(scene)
     np.testing.assert_array_equal(normals(scene), before)

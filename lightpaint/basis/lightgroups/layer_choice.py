@@ -27,14 +27,14 @@ ONE_FILE_PER_LIGHT = "one file per light"
 class LayerChoice:
     """The roles of layers.
 
-    lights: name of the light → name of its layer. beside: the same, of layers that may or may
+    lights: name of the light → name of its layer. optional: the same, of layers that may or may
     not be part of the sum. whole: the same, of the group whose name says that it is all of them,
     which the sum shows. beauty: name of its layer; None if none is known by its name.
     """
 
     renderer: str
     lights: Mapping[str, str]
-    beside: Mapping[str, str] = field(default_factory=dict)
+    optional: Mapping[str, str] = field(default_factory=dict)
     whole: Mapping[str, str] = field(default_factory=dict)
     beauty: str | None = None
     view: str = ""
@@ -124,14 +124,14 @@ def _by_convention(
     whole = {n: x for n, x in lights.items() if n == convention.whole and len(lights) > 1}
     lights = {name: layer for name, layer in lights.items() if name not in whole}
     rest = [name for name in layers if name not in [*lights.values(), *whole.values()]]
-    beside = [name for name in rest if name.casefold() in convention.beside]
+    optional = [name for name in rest if name.casefold() in convention.optional]
     first = convention.beauty.replace("{view}", f"{view}." if view else "")
     return LayerChoice(
         convention.renderer,
         lights,
-        {name: name for name in beside if name not in lights},
+        {name: name for name in optional if name not in lights},
         whole,
-        beauty_name((name for name in rest if name not in beside), first=first),
+        beauty_name((name for name in rest if name not in optional), first=first),
         view,
         tuple(remarks),
     )

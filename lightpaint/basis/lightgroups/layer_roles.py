@@ -59,7 +59,7 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
         else:
             remarks.append(f"{layer}: taken for the sum of all lights, and left out")
     in_order = {n: x for layer in read for n, x in lights.items() if x is layer}
-    for name, layer in choice.beside.items():
+    for name, layer in choice.optional.items():
         # Whether a renderer counts these among its groups depends on version and settings.
         if beauty is None or _improves_sum(layers[layer], list(in_order.values()), beauty):
             in_order[name] = layers[layer]

@@ -28,7 +28,7 @@ class Convention:
     `prefix` what tells apart lights of one name.
     beauty: name of the picture that they add up to, before BEAUTIES are tried.
     whole: name of the group that is all of them, where a renderer calls one so.
-    beside: layers that add to it too, in some versions and settings (in lower case).
+    optional: layers that add to it too, in some versions and settings (in lower case).
     light: what the light is called.
     """
 
@@ -36,7 +36,7 @@ class Convention:
     layer: re.Pattern[str]
     beauty: str = ""
     whole: str | None = None
-    beside: tuple[str, ...] = ()
+    optional: tuple[str, ...] = ()
     light: str = NAME_FIELD
 
 
@@ -64,13 +64,13 @@ CONVENTIONS = (
         "V-Ray or Corona",
         re.compile(PREFIX_PATTERN + r"(?:VRay)?LightSelect_(?P<name>.+)", re.I),
         "RGBA",
-        beside=("environment", "self illumination", "self_illumination", "selfillum", "rest"),
+        optional=("environment", "self illumination", "self_illumination", "selfillum", "rest"),
     ),
     Convention(
         "Octane",
         re.compile(r"Light(?:[ _]?pass)?[ _](?P<name>\d+)", re.I),
         "Main",
-        beside=("ambient light", "ambient_light", "sunlight"),
+        optional=("ambient light", "ambient_light", "sunlight"),
         light="light_{name}",
     ),
 )

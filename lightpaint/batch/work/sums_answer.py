@@ -19,6 +19,7 @@ from lightpaint.pipeline.results.answer_folder import new_answer
 
 def sums_of_rows(item: SumsOfRows, cache: WorkerCache) -> list[Sums]:
     """Return the sums with each painting over some rows.
+
     The images are those that a whole basis has in these rows, to the last bit.
     """
     renderer, scene = cache.renderer(item), cache.film(item.film)

@@ -81,7 +81,7 @@ def test_each_renderer_by_its_names(
 def test_layers_that_may_belong_to_the_sum_are_told_apart():
     found = _choose("", "LightSelect_key", "Environment", "Self Illumination", "Rest", "Reflection")
     assert found.lights == {"key": "LightSelect_key"}
-    assert sorted(found.beside) == ["Environment", "Rest", "Self Illumination"]
+    assert sorted(found.optional) == ["Environment", "Rest", "Self Illumination"]
 
 
 def test_of_several_view_layers_the_first():
