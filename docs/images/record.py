@@ -1,13 +1,15 @@
-"""Records sessions of the painter: the moving picture of the README, and two that stand still.
+"""Records sessions of the painter: moving pictures, and some that stand still.
 
     pip install '.[test]'
-    python docs/images/record.py [--spp 64] [--port 8431] [--only painting|views]
+    python docs/images/record.py [--spp 64] [--port 8431] [--only painting|views|lights]
 
 writes beside itself
 
     painting.webp   somebody paints the gallery: a warm wall, a cool one, light on a figure
     painter.jpg     the painter when that is done
     painter-views.jpg   the stage, painted from the balcony and from a box
+    lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move
+    painter-lights.jpg  the painter when that is done
 
 The painter's own server, with new sessions in folders that are removed, and headless Chromium.
 A basis is rendered once, and kept where all bases are. Nothing is sped up but the waiting.
@@ -165,6 +167,35 @@ def from_two_seats(hand: Hand) -> None:
     hand.wait()
 
 
+def moving_lights(hand: Hand) -> None:
+    """A spot that is dragged and aimed; then a wish that lights answer by moving."""
+    on, page = hand.of_painting, hand.page
+    page.keyboard.press("d")
+    page.locator(".lamp").first.wait_for(timeout=120_000)
+    hand.see(10)
+    box = page.locator('.lamp[data-lamp="spot_figure"]').first.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    hand.drag((x, y), (x + 60, y - 4), (x + 110, y + 2), moves=10)
+    hand.wait()
+    row = page.locator('[data-light="spot_figure"]')
+    row.get_by_role("button", name="spot_figure", exact=True).first.click()
+    aim = row.get_by_role("button", name="Aim here")
+    aim.scroll_into_view_if_needed()
+    aim.click()
+    hand.see(6)
+    hand.go(on(0.61, 0.55))
+    page.mouse.click(*hand.at)
+    hand.wait()
+    row.get_by_role("button", name="spot_figure", exact=True).first.click()
+    hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41), on(0.1, 0.37))
+    hand.wait()
+    page.get_by_role("button", name="Let lights move").first.click()
+    hand.see(8)
+    page.locator(".working").filter(has_text="Placing").wait_for(state="detached", timeout=600_000)
+    hand.wait(24)
+
+
 def load(page: Page) -> None:
     """Until all is rendered, and clean: nothing that is published has grain."""
     page.wait_for_function(
@@ -224,24 +255,29 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    parser.add_argument("--only", choices=("painting", "views"))
+    parser.add_argument("--only", choices=("painting", "views", "lights"))
     asked = parser.parse_args()
-    if asked.only != "painting":
+    if asked.only in (None, "lights"):
+        with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
+            moving_lights(hand)
+            hand.page.screenshot(path=HERE / "painter-lights.jpg", type="jpeg", quality=88)
+        _write(hand, HERE / "lights.webp")
+    if asked.only in (None, "views"):
         seats = ("--sensor=balcony", "--sensor=box", "--resolution=1/2")
         with painter("stage", asked.spp, asked.port, *seats) as url, using(url) as hand:
             from_two_seats(hand)
             hand.page.screenshot(path=HERE / "painter-views.jpg", type="jpeg", quality=88)
-    if asked.only != "views":
+    if asked.only in (None, "painting"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             session(hand)
             hand.page.screenshot(path=HERE / "painter.jpg", type="jpeg", quality=88)
-        _write(hand)
+        _write(hand, HERE / "painting.webp")
 
 
-def _write(hand: Hand) -> None:
+def _write(hand: Hand, path: Path) -> None:
     first, *others = (frame.resize(SIZE, Image.Resampling.LANCZOS) for frame in hand.frames)
     first.save(
-        HERE / "painting.webp",
+        path,
         save_all=True,
         append_images=others,
         duration=hand.times,
@@ -249,7 +285,7 @@ def _write(hand: Hand) -> None:
         quality=60,
         method=4,
     )
-    print(f"{len(hand.frames)} frames, {(HERE / 'painting.webp').stat().st_size / 1e6:.1f} MB")
+    print(f"{len(hand.frames)} frames, {path.stat().st_size / 1e6:.1f} MB")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """What follows the brush is, after any strokes, what the painting as a whole would have made."""
 
+from dataclasses import replace
 from functools import reduce
 from operator import add
 from typing import Any
@@ -10,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.planes import MemoryPlanes
+from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.fit import Fit, resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
@@ -162,3 +165,30 @@ def test_rounds_under_a_brush_come_to_the_answer_of_a_display(make_basis: Any) -
     problem = Problem.of(brush.basis, brush.target, fit=meant)
     exact = problem.objective(solution_of(problem).weights).sum()
     assert problem.objective(answer).sum() <= 1.001 * exact
+
+
+@pytest.mark.parametrize("space", ["display", "linear"])
+@pytest.mark.parametrize("views", [1, 2])
+def test_planes_that_are_replaced_answer_as_if_they_had_been_there(
+    make_basis: Any, space: Any, views: int
+) -> None:
+    """And what is not painted is held near the look of before."""
+    brushes = _painted(make_basis, 5, views, 4)
+    meant = _meant([brush.target for brush in brushes], space=space)
+    live = LiveSolver([b.view for b in brushes], fit=meant, constraints=Constraints())
+    start = live.answer(brushes[0].basis.present_weights)
+    fresh = []
+    for brush in brushes:
+        basis, rng = brush.basis, np.random.default_rng(3)
+        plane = rng.random((*basis.size, 3)).astype(np.float32) ** 2
+        former = Estimate(basis.present_look, basis.present_noise)
+        moved = replace(
+            basis, planes=MemoryPlanes(basis.images.copy()).replaced({1: plane}), former=former
+        )
+        brush.view.replace_planes(moved, [1])
+        fresh.append(LiveView(moved, brush.image, brush.importance))
+    live.follow_planes()
+    anew = LiveSolver(fresh, fit=meant, constraints=Constraints())
+    followed, expected = live.answer(start), anew.answer(start)
+    np.testing.assert_allclose(followed, expected, rtol=1e-9, atol=1e-12)  # of float64 sums
+    assert not np.allclose(followed, start)

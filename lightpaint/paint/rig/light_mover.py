@@ -1,7 +1,7 @@
 """Lights that a session moves: their pictures at once, and their planes rendered behind."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any, Protocol
 
@@ -14,6 +14,7 @@ from lightpaint.basis.cache.denoised_planes import (
     denoise_to_halves,
     scale_of,
 )
+from lightpaint.errors import LightpaintError
 from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
 from lightpaint.paint.protocol import (
     Message,
@@ -138,11 +139,15 @@ class LightMover:
             if not self._is_open or host.session.requests.poses != poses:
                 raise StoppedError
 
-        with suppress(StoppedError):
+        try:
             self.finish(poses, check)
             for name in poses:
                 check()
                 self._denoise(name)
+        except StoppedError:
+            pass
+        except LightpaintError as error:  # the next move is rendered again
+            host.publish(Notice(text=str(error), tone="warn"))
 
     def finish(self, poses: Poses, check: Callable[[], None]) -> None:
         """Render the quick planes of these poses. check: raises to stop."""

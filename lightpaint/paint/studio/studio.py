@@ -175,6 +175,7 @@ class Studio:
         with self._lock:
             if self._session is not None and self._session.is_open:
                 self._session.client_left(with_stroke=not is_back)
+                self._mover.follow()
                 self._exact_answers.notify()
             state = self.state()
             return replace(state, is_back=is_back)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from axe import violations
 from renderer import write_room
 
 from lightpaint.paint.server.server import Server
@@ -119,9 +120,11 @@ def test_lights_are_marked_dragged_and_taken_back(room: Room) -> None:
     until(lambda: room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1))
 
 
-def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: Room) -> None:
+def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: Room, axe: str) -> None:
     row = room.page.locator('[data-light="beam"]')
     row.get_by_role("button", name="beam", exact=True).first.click()
+    room.page.evaluate(axe)
+    assert violations(room.page, ".lightpaint") == []
     row.get_by_role("button", name="Aim here").click()
     room.page.mouse.click(*room.seen((-0.4, 0, 0.3)))
     target = until(lambda: room.poses.get("beam"))["target"]
