@@ -81,7 +81,6 @@ if TYPE_CHECKING:
     from lightpaint.pipeline.templates import render_template as render_template
     from lightpaint.pipeline.templates import template_of_basis as template_of_basis
     from lightpaint.placement.freedom import Freedom as Freedom
-    from lightpaint.placement.light_search import suggest_lights as suggest_lights
     from lightpaint.placement.new_lights import MirroredPair as MirroredPair
     from lightpaint.placement.new_lights import NewLights as NewLights
     from lightpaint.placement.place import place as place
@@ -89,7 +88,8 @@ if TYPE_CHECKING:
     from lightpaint.placement.placement import Move as Move
     from lightpaint.placement.placement import Placement as Placement
     from lightpaint.placement.rigging.rigging import Rigging as Rigging
-    from lightpaint.placement.suggestion import Suggestion as Suggestion
+    from lightpaint.placement.suggestions.light_search import suggest_lights as suggest_lights
+    from lightpaint.placement.suggestions.suggestion import Suggestion as Suggestion
     from lightpaint.relit.export.exports import write_exports as write_exports
     from lightpaint.relit.relight import relight as relight
     from lightpaint.relit.verification import Verification as Verification
@@ -135,7 +135,7 @@ _HOMES = {
     "Appearance": "lighting.analysis.appearance.appearance",
     "Settings": "pipeline.job.settings",
     "Solution": "lighting.solution",
-    "Suggestion": "placement.suggestion",
+    "Suggestion": "placement.suggestions.suggestion",
     "Target": "target.target",
     "TransformChoice": "colour.display.view_transform",
     "Uncertainty": "lighting.analysis.noise.uncertainty",
@@ -162,7 +162,7 @@ _HOMES = {
     "template_of_basis": "pipeline.templates",
     "run": "pipeline.pipeline",
     "solve": "lighting.solve",
-    "suggest_lights": "placement.light_search",
+    "suggest_lights": "placement.suggestions.light_search",
     "use_variant": "scene.runtime.variant",
     "verdict": "report.verdict",
     "verify": "relit.verification_render",

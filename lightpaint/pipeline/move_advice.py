@@ -17,7 +17,7 @@ from lightpaint.pipeline.job.job import Job, PaintedView
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import free_light
 from lightpaint.placement.place import on_small_film, place
-from lightpaint.placement.suggestion import MoveSuggestion
+from lightpaint.placement.suggestions.suggestion import MoveSuggestion
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
 

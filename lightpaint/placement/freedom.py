@@ -9,7 +9,7 @@ import numpy as np
 from lightpaint.arrays import Position
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
-from lightpaint.placement.free_space import as_position
+from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import FARTHEST
 
 #: Least width of a beam's soft edge, in degrees.

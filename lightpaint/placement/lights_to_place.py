@@ -9,14 +9,14 @@ import numpy as np
 from lightpaint.basis.lights import BasisLight
 from lightpaint.errors import NoPlaceError, SceneError
 from lightpaint.placement.free_light import FreeLight, places_of
-from lightpaint.placement.free_space import as_position
 from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.frozen_paths import PanelSite
 from lightpaint.placement.movable import Movable
 from lightpaint.placement.new_lights import NEW_CONE, MirroredPair, NewLights
-from lightpaint.placement.permitted_places import BoxOfPlaces, Places
-from lightpaint.placement.surface_places import places_on
-from lightpaint.placement.view_paths import SearchPaths
+from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.view_paths import SearchPaths
+from lightpaint.placement.space.free_space import as_position
+from lightpaint.placement.space.permitted_places import BoxOfPlaces, Places
+from lightpaint.placement.space.surface_places import places_on
 from lightpaint.scene.lights.light import Light, free_names
 from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewKind
 from lightpaint.scene.properties.emission import MULTIPLE, PLUGINS

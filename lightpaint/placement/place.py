@@ -13,9 +13,7 @@ from lightpaint.images.pixel_blocks import whole_factor
 from lightpaint.keywords import keywords
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.free_space import as_position, pixels_of
 from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.frozen_paths import PanelSite
 from lightpaint.placement.lights_to_place import (
     NewLight,
     free_light,
@@ -25,13 +23,15 @@ from lightpaint.placement.lights_to_place import (
 )
 from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.new_lights import MirroredPair, NewLights
+from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement import AddedLight, Move, Placement
 from lightpaint.placement.placement_fit import fit_of
 from lightpaint.placement.search.judgement import Found, Growth, PlacementJudge, PoseError
 from lightpaint.placement.search.new_light_search import NewLightSearch
 from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_search import TURNS, PoseSearch
-from lightpaint.placement.view_paths import SearchPaths
+from lightpaint.placement.space.free_space import as_position, pixels_of
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.film import reduction_to
@@ -64,7 +64,7 @@ def place(
 ) -> Placement:
     """Find places, directions and cones of lights that bring `solution` closest to its painting.
 
-    Light along frozen paths decides (placement/frozen_paths.py); render bases of the scenes that
+    Light along frozen paths decides (paths/frozen_paths.py); render bases of the scenes that
     are returned and solve again for exact images and weights. Constraints of the solution hold
     throughout.
 

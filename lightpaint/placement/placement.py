@@ -8,7 +8,7 @@ import numpy as np
 from lightpaint.arrays import RGB, Floats
 from lightpaint.colour.photometry import lambertian_flux, point_flux, spot_flux
 from lightpaint.keywords import keywords
-from lightpaint.placement.free_space import as_position
+from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from lightpaint.errors import SizeError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve
-from lightpaint.placement.additions import find_additions
-from lightpaint.placement.candidates import Candidates
+from lightpaint.placement.suggestions.additions import find_additions
+from lightpaint.placement.suggestions.candidates import Candidates
 from lightpaint.target.target import Target
 
 SIZE = (12, 10)

@@ -11,7 +11,7 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.errors import SceneError
-from lightpaint.placement.frozen_paths import FrozenPaths, falloff
+from lightpaint.placement.paths.frozen_paths import FrozenPaths, falloff
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

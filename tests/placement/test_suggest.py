@@ -19,12 +19,12 @@ from lightpaint.errors import SceneError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.solve import solve
-from lightpaint.placement.light_search import (
+from lightpaint.placement.suggestions.light_search import (
     check_suggestible,
     emitter_xml,
     suggest_lights,
 )
-from lightpaint.placement.suggestion import Suggestion
+from lightpaint.placement.suggestions.suggestion import Suggestion
 from lightpaint.report.page.suggestion_section import spoken_suggestions, suggestion_section
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from lightpaint.arrays import Floats
 from lightpaint.images.denoiser import DARKEST, Features
-from lightpaint.placement.frozen_paths import FrozenPaths
+from lightpaint.placement.paths.frozen_paths import FrozenPaths
 from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene

@@ -42,9 +42,9 @@ from lightpaint.pipeline.job.sources import (
 from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
-from lightpaint.placement.light_search import check_suggestible
 from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.placement.suggestions.light_search import check_suggestible
 from lightpaint.relit.export.nuke import spoken_unreadable
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene

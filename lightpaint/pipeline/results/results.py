@@ -21,7 +21,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.placement import HARDLY_VISIBLE, AddedLight, Move, Placement
-from lightpaint.placement.suggestion import MoveSuggestion, Suggestion
+from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification

@@ -13,10 +13,10 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.placement.movable import Arrangement, all_sites, by_column
+from lightpaint.placement.paths.view_paths import SearchPaths, ViewPaths
 from lightpaint.placement.placement_fit import PlacementFit
 from lightpaint.placement.search.new_light_search import SURE, WORTH, standard_error
 from lightpaint.placement.search.pose_steps import PoseSteps
-from lightpaint.placement.view_paths import SearchPaths, ViewPaths
 from lightpaint.scene.properties.pose import Site
 
 #: Steps of a fit along other paths, and the share of the first differences that they begin with.

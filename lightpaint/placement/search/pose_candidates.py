@@ -13,10 +13,10 @@ import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.placement.free_light import FreeLight
-from lightpaint.placement.free_space import as_position
-from lightpaint.placement.frozen_paths import PanelSite, away_from
+from lightpaint.placement.paths.frozen_paths import PanelSite, away_from
+from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Ranking
-from lightpaint.placement.view_paths import ViewPaths
+from lightpaint.placement.space.free_space import as_position
 from lightpaint.scene.properties.pose import Site
 from lightpaint.threads import one_thread
 

@@ -13,11 +13,11 @@ import numpy as np
 
 from lightpaint.arrays import Bools, Floats
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
+from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
 from lightpaint.placement.search.pose_candidates import PoseCandidates, best_poses
 from lightpaint.placement.search.pose_rules import PoseRules
 from lightpaint.placement.search.pose_steps import PoseSteps
-from lightpaint.placement.view_paths import SearchPaths
 from lightpaint.scene.properties.pose import Site
 
 #: Places that each light is tried at, if all of them are along lines, and if not; and new ones.

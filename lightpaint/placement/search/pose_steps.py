@@ -7,8 +7,8 @@ import numpy as np
 from lightpaint.arrays import Doubles, Floats
 from lightpaint.placement.free_light import FreeLight
 from lightpaint.placement.movable import Arrangement, Movable, all_sites, by_column
+from lightpaint.placement.paths.view_paths import ViewPaths
 from lightpaint.placement.placement_fit import Fitted, PlacementFit, with_columns
-from lightpaint.placement.view_paths import ViewPaths
 from lightpaint.scene.properties.pose import Site
 
 #: Lengths of a step, in those of its differences, that no number exceeds at once.

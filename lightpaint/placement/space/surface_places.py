@@ -7,8 +7,8 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.errors import NoPlaceError, SceneError
-from lightpaint.placement.free_space import CLEARANCE, FreeSpace
-from lightpaint.placement.permitted_places import Triangles
+from lightpaint.placement.space.free_space import CLEARANCE, FreeSpace
+from lightpaint.placement.space.permitted_places import Triangles
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 

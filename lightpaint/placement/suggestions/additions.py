@@ -18,7 +18,7 @@ from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.analysis.noise.noise import denoised_matrix, pseudo_inverse
 from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.unknowns.reduced_problem import ReducedProblem, reduced_problems
-from lightpaint.placement.candidates import Candidates
+from lightpaint.placement.suggestions.candidates import Candidates
 
 #: Most promising candidates that the problem is solved again for.
 SOLVED = 8

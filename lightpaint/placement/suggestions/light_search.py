@@ -18,11 +18,17 @@ from lightpaint.basis.render.integrators import why_not_one_pass
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.additions import Addition, find_additions
-from lightpaint.placement.candidates import Candidates
-from lightpaint.placement.free_space import FreeSpace, as_position, far_apart, free_space, pixels_of
 from lightpaint.placement.place import on_small_film
-from lightpaint.placement.suggestion import Suggestion
+from lightpaint.placement.space.free_space import (
+    FreeSpace,
+    as_position,
+    far_apart,
+    free_space,
+    pixels_of,
+)
+from lightpaint.placement.suggestions.additions import Addition, find_additions
+from lightpaint.placement.suggestions.candidates import Candidates
+from lightpaint.placement.suggestions.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.light import free_names

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats, Indices
-from lightpaint.placement.free_space import (
+from lightpaint.placement.paths.frozen_paths import FrozenPaths
+from lightpaint.placement.space.free_space import (
     CLEARANCE,
     FreeSpace,
     free_space,
     is_clear,
     seen_by_camera,
 )
-from lightpaint.placement.frozen_paths import FrozenPaths
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed

@@ -24,7 +24,7 @@ from lightpaint.arrays import Floats
 from lightpaint.errors import SceneError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.surface_filter import SurfaceFilter
-from lightpaint.placement.camera_paths import (
+from lightpaint.placement.paths.camera_paths import (
     Vertices,
     first_hits_of,
     later_vertices_of,

@@ -1,0 +1,1 @@
+"""Lights that are missing: where one more would help most."""
