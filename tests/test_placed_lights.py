@@ -10,7 +10,8 @@ import pytest
 from renderer import write_room
 
 import lightpaint as lp
-from lightpaint.errors import LightpaintError
+from lightpaint.batch.plan.planner import plan
+from lightpaint.errors import BatchError, LightpaintError
 from lightpaint.files import write_bytes
 from lightpaint.images.estimate import Estimate
 from lightpaint.images.formats.exr import write_rgb
@@ -262,3 +263,17 @@ def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     page = (tmp_path / "answer" / "report.html").read_text()
     assert f"lightpaint solve room.xml p.exr --spp 128 {turn.option}" in page
     assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"
+
+
+def test_sums_alone_are_refused_where_lights_may_move(tmp_path: Path) -> None:
+    path = write_room(tmp_path)
+    write_bytes(tmp_path / "room.lights.toml", b"[light.beam]\naim = 40\n")
+    scene = load_scene(path)
+    write_rgb(tmp_path / "p.exr", lp.render_basis(scene, spp=2).present_look)
+    look = 'scene = "room.xml"\npainting = "p.exr"\nwant = ["lights"]\n'
+    settings = '[look.settings]\nspace = "linear"\nliteral = true\n'
+    (tmp_path / "looks.toml").write_text(f"[[look]]\n{look}{settings}")
+    with pytest.raises(BatchError, match="lights may move in it, unless move_lights is false"):
+        plan(tmp_path / "looks.toml", tmp_path / "out")
+    (tmp_path / "looks.toml").write_text(f"[[look]]\n{look}{settings}move_lights = false\n")
+    assert not plan(tmp_path / "looks.toml", tmp_path / "out").looks[0].failure

@@ -249,5 +249,7 @@ def _check_by_sums(job: Job) -> None:
     reason = reason_against_sums(view.target, job.fit)
     if not reason and view.basis is None and view.scene is not None:
         reason = why_not_one_pass(view.scene) or ""
+    if job.all_rigging:
+        reason = "lights may move in it, unless move_lights is false"
     if reason:
         raise BatchError(f"want = ['lights'] takes sums alone, and {reason}: want 'solve' instead")
