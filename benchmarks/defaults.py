@@ -12,7 +12,8 @@ Seconds of the processor of whole processes, in turns with those of CHECKOUT, an
   look, denoised, has a mean ΔE of 3 or less to a long render.
 - weights: the mean relative error of the lights' weights, each with its share of the picture, by
   the samples that the version's demo takes, and the mean ΔE of the denoised prediction to the long
-  render at the same weights. On a quarter of the film, several seeds, against a long render.
+  render at the same weights. On a quarter of the film, several seeds, solved as `lightpaint solve`
+  does, noise corrected, against what the same version makes of a long render.
 """
 
 import argparse
@@ -73,9 +74,10 @@ except ImportError:  # an earlier version
 np.save(out, picture)
 """
 
-#: Weights for each painting and the denoised prediction of several seeds, as NumPy's arrays.
+#: Weights for each painting, of a long render and of several seeds, as `lightpaint solve` finds
+#: them; and the predictions denoised and by the long render, as NumPy's arrays.
 WEIGHTS = """
-import json, sys
+import json, sys, tempfile
 import numpy as np
 import lightpaint as lp
 from lightpaint.images.denoiser import denoised
@@ -84,15 +86,30 @@ try:
 except ImportError:
     def denoise_mix(basis, weights):
         return denoised(basis.mix(weights), basis.features)
-root, paintings, seeds, out = sys.argv[1:]
+root, paintings, seeds, long_spp, long_seed, out = sys.argv[1:]
 scene, found = lp.load_scene(root + "/scenes/gallery/scene.xml"), {}
-for seed in range(int(seeds)):
-    basis = lp.render_basis(scene.reduced("1/4"), spp=scene.spp, seed=seed + 1)
+small = scene.reduced("1/4")
+
+def answers(basis):
     for name, [file, *mask] in json.loads(paintings).items():
-        target = lp.read_target(file, mask=mask[0] if mask else None)
-        weights = lp.solve(basis, target).lighting.weights_for(basis)
+        with tempfile.TemporaryDirectory() as folder:
+            how = {"mask": mask[0]} if mask else {}
+            look = lp.paint_with_light(
+                None, file, folder + "/answer", basis=basis, verify=False, report=False, **how
+            )
+        yield name, look.lighting.weights_for(basis)
+
+long = lp.render_basis(small, spp=int(long_spp), seed=int(long_seed))
+for name, weights in answers(long):
+    lit = long.images * weights[:, None, None, :]
+    found[f"truth of {name}"] = weights
+    found[f"shares of {name}"] = np.einsum("nhwc,hwc->n", lit, lit.sum(axis=0), dtype=np.float64)
+for seed in range(int(seeds)):
+    basis = lp.render_basis(small, spp=scene.spp, seed=seed + 1)
+    for name, weights in answers(basis):
         found.setdefault(f"weights of {name}", []).append(weights)
         found.setdefault(f"pictures of {name}", []).append(denoise_mix(basis, weights))
+        found.setdefault(f"long pictures of {name}", []).append(long.mix(weights))
 np.savez(out, spp=scene.spp, **found)
 """
 
@@ -200,34 +217,26 @@ def first(checkouts: dict[str, Path], place: Path, long_spp: int) -> None:
 
 def weights(checkouts: dict[str, Path], place: Path, long_spp: int, seeds: int) -> None:
     """Measure errors of weights and pictures."""
-    import lightpaint as lp
-
     paintings = {
         name: [str(ROOT / "targets/gallery" / x) for x in files if "." in x]
         for name, files in PAINTINGS.items()
     }
-    scene = lp.load_scene(ROOT / GALLERY).reduced("1/4")
-    basis = lp.render_basis(scene, spp=long_spp, seed=LONG_SEED)
     found = {}
     for which, at in checkouts.items():
         out = place / f"{which}.npz"
-        arguments = ["-c", WEIGHTS, str(at), json.dumps(paintings), str(seeds), str(out)]
-        seconds_of(arguments, at, place / which)
+        how = str(at), json.dumps(paintings), str(seeds), str(long_spp), str(LONG_SEED), str(out)
+        seconds_of(["-c", WEIGHTS, *how], at, place / which)
         with np.load(out) as kept:
             found[which] = dict(kept)
-    for name, [file, *mask] in paintings.items():
-        target = lp.read_target(file, mask=mask[0] if mask else None)
-        truth = lp.solve(basis, target).lighting.weights_for(basis)
-        lit = basis.images * truth[:, None, None, :]
-        share = np.einsum("nhwc,hwc->n", lit, lit.sum(axis=0), dtype=np.float64)
+    for name in paintings:
         errors, notes = {}, []
         for which, its in found.items():
-            made = its[f"weights of {name}"]
-            off = np.abs(luminance(made - truth)) / np.maximum(luminance(truth), 1e-9)
+            truth, share = luminance(its[f"truth of {name}"]), its[f"shares of {name}"]
+            off = np.abs(luminance(its[f"weights of {name}"]) - truth) / np.maximum(truth, 1e-9)
             each = 100 * off @ share / share.sum()
             errors[which] = float(each.mean())
-            pairs = zip(its[f"pictures of {name}"], made, strict=True)
-            off_e = np.mean([delta_e_mean(x, basis.mix(w)) for x, w in pairs])
+            pairs = zip(its[f"pictures of {name}"], its[f"long pictures of {name}"], strict=True)
+            off_e = np.mean([delta_e_mean(picture, long) for picture, long in pairs])
             notes.append(f"± {each.std() / np.sqrt(seeds):.2f}, picture ΔE {off_e:.2f}")
         print_row(f"error of weights in %, {name}", errors, " / ".join(notes))
     print("samples: " + ", ".join(f"{its['spp']} {which}" for which, its in found.items()))
