@@ -102,15 +102,19 @@ def solution_of(problem: Problem, *, start: Doubles | None = None) -> Solution:
     if problem.dimming is not None or (dimming[problem.keeps_color] == 1).all():
         return solution
     dimmed = replace(solution.problem, dimming=dimming)
+    before, tried = solution.certificate, solution.tried
+    begin, reached = solution.weights, solution.reached
     if problem.is_linear:
-        nearer = _solve_under_reduction(dimmed, solution.weights)
+        nearer = _solve_under_reduction(dimmed, begin)
     else:
-        nearer = _descend(dimmed, solution.weights, solution.reached, blocks, is_near=True)
-    before = solution.certificate
+        # The squares of this solution are as large as several pictures, and others follow.
+        dimmed = replace(dimmed, squares=problem.squares)
+        del solution
+        nearer = _descend(dimmed, begin, reached, blocks, is_near=True)
     result = nearer.with_certificate_fields(
         curve=before.curve, rounds=before.rounds + nearer.certificate.rounds
     )
-    return replace(result, tried=solution.tried)
+    return replace(result, tried=tried)
 
 
 def _blocks_of(problem: Problem) -> BinnedPixels | None:
@@ -294,6 +298,7 @@ def _problem_of_blocks(problem: Problem, descent: Descent, blocks: BinnedPixels)
     x = LitPixels.whole(problem.basis, loss).predicted(weights)
     image, weight = loss.pixels.squares(x, from_clipping=False)
     parts = (image, weight, loss.pixels.shares(x, weight))
+    del x  # as large as the picture, while memory also has strips of planes
     squares = Squares(*(image_in_place(part, problem.basis.size) for part in parts))
     return replace(
         problem,
