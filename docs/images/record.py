@@ -1,15 +1,16 @@
 """Records sessions of the painter: moving pictures, and some that stand still.
 
     pip install '.[test]'
-    python docs/images/record.py [--spp 64] [--port 8431] [--only painting|views|lights]
+    python docs/images/record.py [--spp 64] [--port 8431] [--only painting|views|lights|places]
 
 writes beside itself
 
     painting.webp   somebody paints the gallery: a warm wall, a cool one, light on a figure
     painter.jpg     the painter when that is done
     painter-views.jpg   the stage, painted from the balcony and from a box
-    lights.webp     somebody drags a spot, aims it by a click, paints, and lets the lights move
+    lights.webp     somebody drags a spot, and aims it by a click
     painter-lights.jpg  the painter when that is done
+    places.webp     somebody paints, and lets the lights move
 
 The painter's own server, with new sessions in folders that are removed, and headless Chromium.
 A basis is rendered once, and kept where all bases are. Nothing is sped up but the waiting.
@@ -168,7 +169,7 @@ def from_two_seats(hand: Hand) -> None:
 
 
 def moving_lights(hand: Hand) -> None:
-    """A spot that is dragged and aimed; then a wish that lights answer by moving."""
+    """A spot that is dragged, and aimed by a click."""
     on, page = hand.of_painting, hand.page
     page.keyboard.press("d")
     page.locator(".lamp").first.wait_for(timeout=120_000)
@@ -185,9 +186,18 @@ def moving_lights(hand: Hand) -> None:
     aim.click()
     hand.see(6)
     hand.go(on(0.61, 0.55))
+    before = page.locator(".lamp-aim").first.get_attribute("style")
     page.mouse.click(*hand.at)
-    hand.wait()
-    row.get_by_role("button", name="spot_figure", exact=True).first.click()
+    while page.locator(".lamp-aim").first.get_attribute("style") == before:
+        page.wait_for_timeout(200)
+    hand.wait(24)
+
+
+def placed_lights(hand: Hand) -> None:
+    """A wish that lights answer by moving."""
+    on, page = hand.of_painting, hand.page
+    page.keyboard.press("d")
+    page.locator(".lamp").first.wait_for(timeout=120_000)
     hand.drag(on(0.03, 0.27), on(0.13, 0.34), on(0.25, 0.41), on(0.1, 0.37))
     hand.wait()
     page.get_by_role("button", name="Let lights move").first.click()
@@ -255,13 +265,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--port", type=int, default=8431)
-    parser.add_argument("--only", choices=("painting", "views", "lights"))
+    parser.add_argument("--only", choices=("painting", "views", "lights", "places"))
     asked = parser.parse_args()
     if asked.only in (None, "lights"):
         with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
             moving_lights(hand)
             hand.page.screenshot(path=HERE / "painter-lights.jpg", type="jpeg", quality=88)
         _write(hand, HERE / "lights.webp")
+    if asked.only in (None, "places"):
+        with painter("gallery", asked.spp, asked.port) as url, using(url) as hand:
+            placed_lights(hand)
+        _write(hand, HERE / "places.webp")
     if asked.only in (None, "views"):
         seats = ("--sensor=balcony", "--sensor=box", "--resolution=1/2")
         with painter("stage", asked.spp, asked.port, *seats) as url, using(url) as hand:
