@@ -15,6 +15,7 @@ from lightpaint.basis.basis import Basis
 from lightpaint.images.denoiser import Quality, denoised, oidn_is_installed
 from lightpaint.images.estimate import box_mean
 from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.images.stray_pixels import stray_pixels
 
 #: Pixels on either side over which noise and what a denoiser changed are averaged.
 RADIUS = 3
@@ -101,17 +102,20 @@ def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Float
 
     raw: (h, w, 3), whose `half_difference` tells its variance V. clean: the same, denoised, which
     has lost E[(clean − raw)²] − V =: B of it. All are averaged over a window of pixels and the
-    channels. With (1 − t) raw + t clean the error is (1 − t)² V + t² B, so t = V / (V + B).
+    channels. With (1 − t) raw + t clean the error is (1 − t)² V + t² B, so t = V / (V + B). Stray
+    pixels, whose halves agree by chance, do not count for B, and are taken from the denoised form.
     """
 
-    def pooled(values: Floats) -> Floats:
-        return box_mean(np.square(values, dtype=np.float64).mean(axis=-1), RADIUS)
+    def mean_square(values: Floats) -> Doubles:
+        return np.asarray(np.square(values, dtype=np.float64).mean(axis=-1), np.float64)
 
-    variance, change = pooled(half_difference), pooled(clean - raw)
-    lost = np.maximum(change - variance, 0)
+    is_stray = stray_pixels(raw, half_difference, clean)
+    noise, change = mean_square(half_difference), mean_square(clean - raw)
+    variance = box_mean(noise, RADIUS)
+    lost = np.maximum(box_mean(np.where(is_stray, 0, change - noise), RADIUS), 0)
     total = variance + lost
     share = np.divide(variance, total, out=np.zeros_like(total), where=total > 0)
-    return share[..., None].astype(np.float32)
+    return np.where(is_stray, 1, share)[..., None].astype(np.float32)
 
 
 def blend_by_grain(raw: Floats, clean: Floats) -> Floats:

@@ -15,7 +15,7 @@ import numpy as np
 from lightpaint.arrays import Floats
 from lightpaint.errors import SizeError
 from lightpaint.images.bands import LARGE_PICTURE
-from lightpaint.images.estimate import box_mean
+from lightpaint.images.estimate import box_mean, shifted
 from lightpaint.images.pixel_blocks import block_mean
 
 #: Key of the text of a denoised PNG that names the denoiser and the file of the raw render.
@@ -172,21 +172,13 @@ def _denoise_with_filter(image: Floats, features: Features | None) -> Floats:
     level = np.log(box_mean(light.mean(axis=-1), 1) + 1e-3).astype(np.float32)
     total, weights = np.zeros_like(light), np.zeros_like(level)
     for dy, dx in product(range(-RADIUS, RADIUS + 1), repeat=2):
-        weight = np.exp(-0.5 * np.square((_shifted(level, dy, dx) - level) / np.float32(RATIO)))
+        weight = np.exp(-0.5 * np.square((shifted(level, dy, dx) - level) / np.float32(RATIO)))
         weight *= np.float32(np.exp(-0.5 * (dy * dy + dx * dx) / NEAR**2))
         if features is not None:
-            cosine = (_shifted(features.normal, dy, dx) * features.normal).sum(axis=-1)
+            cosine = (shifted(features.normal, dy, dx) * features.normal).sum(axis=-1)
             # Background pixels have no normal: only their light is compared.
             has_normal = np.square(features.normal).sum(axis=-1) > 0
             weight *= np.where(has_normal, np.clip(cosine, 0, 1) ** SHARPNESS, 1)
         weights += weight
-        total += weight[..., None] * _shifted(light, dy, dx)
+        total += weight[..., None] * shifted(light, dy, dx)
     return np.asarray(total / weights[..., None] * albedo, np.float32)
-
-
-def _shifted(values: Floats, dy: int, dx: int) -> Floats:
-    """Return each pixel's neighbour at this offset; beyond the border, the last pixel."""
-    height, width = values.shape[:2]
-    y = np.clip(np.arange(height) + dy, 0, height - 1)
-    x = np.clip(np.arange(width) + dx, 0, width - 1)
-    return values[y[:, None], x]

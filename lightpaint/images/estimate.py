@@ -83,6 +83,14 @@ def box_mean(values: Floats, radius: int) -> Floats:
     return values
 
 
+def shifted(values: Floats, dy: int, dx: int) -> Floats:
+    """Return each pixel's neighbour at this offset; beyond the border, the last pixel."""
+    height, width = values.shape[:2]
+    y = np.clip(np.arange(height) + dy, 0, height - 1)
+    x = np.clip(np.arange(width) + dx, 0, width - 1)
+    return values[y[:, None], x]
+
+
 def write_estimate(path: Path, estimate: Estimate, attributes: dict[str, str]) -> None:
     """Write R, G, B, and the half difference as a separate layer, in float32."""
     channels = rgb_channels(estimate.image)

@@ -55,6 +55,34 @@ def test_the_share_is_that_of_the_least_error(offset: float, rng: np.random.Gene
     assert error < min(variance, lost)
 
 
+#: Pixels that one of two samples found bright, in two of the four windows around (12, 12).
+SINGLE_SAMPLES = ((6, 6), (17, 18))
+
+
+@pytest.mark.parametrize(
+    ("bright", "single", "stays"),
+    [
+        pytest.param([(12, 12)], SINGLE_SAMPLES, False, id="a stray pixel"),
+        pytest.param([(12, 12), (12, 13)], SINGLE_SAMPLES, False, id="two of them"),
+        pytest.param([(12, 12)], [], True, id="a highlight without noise around"),
+        pytest.param([(12, 12)], SINGLE_SAMPLES[:1], True, id="a highlight beside noise"),
+        pytest.param([(12, 12)], [(12, 12)], False, id="its own noise"),
+        pytest.param([(12, x) for x in range(24)], SINGLE_SAMPLES, True, id="a line"),
+    ],
+)
+def test_what_is_bright_by_chance_is_denoised(
+    bright: list[tuple[int, int]], single: list[tuple[int, int]], stays: bool
+):
+    """Both samples of a bright pixel agree, so it shows no noise, but single ones nearby do."""
+    a = np.ones((24, 24, 3), np.float32)
+    a[tuple(zip(*bright, strict=True))] = 10
+    clean, b = np.ones_like(a), a.copy()
+    for pixel in single:
+        a[pixel], b[pixel] = 19, 1
+    blended = blend_by_noise((a + b) / 2, (a - b) / 2, clean)
+    np.testing.assert_array_equal(blended[12, 12], 10 if stays else 1)
+
+
 def split_basis(direct: np.ndarray, indirect: np.ndarray, rng: np.random.Generator) -> Basis:
     """Return a basis of one light with clean direct light and indirect light of few samples."""
     a, b = (indirect * rng.exponential(size=(*SIZE, 1)).astype(np.float32) for _ in range(2))

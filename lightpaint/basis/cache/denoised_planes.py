@@ -29,7 +29,7 @@ from lightpaint.images.pixel_blocks import blocks_in
 from lightpaint.images.resampling import resampled
 from lightpaint.threads import parallel_map
 
-FORMAT, ARRAY_NAMES = "lightpaint-clean 2", ("halves", "scales", "present")
+FORMAT, ARRAY_NAMES = "lightpaint-clean 3", ("halves", "scales", "present")
 
 #: Pixels of all planes below which a sum is denoised as soon as planes are read.
 MIN_PIXELS = 2**18
