@@ -24,7 +24,8 @@ from lightpaint.placement.space.permitted_places import (
     Places,
     Rails,
 )
-from lightpaint.scene.properties.pose import Site, across, rotation_between
+from lightpaint.scene.properties.rotation import across, rotation_between
+from lightpaint.scene.properties.site import Site
 
 #: Degrees that count like a metre of sliding, for one step of a search: of the axis, of the cone;
 #: and the steps of a beam's share of its cone, and of the logarithm of a side.

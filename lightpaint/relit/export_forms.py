@@ -129,17 +129,31 @@ def _writer_of(
         return lambda: scene_patch(scene, lighting)
     emitters, name = emitters_of(scene, lighting), scene.files[0].name
     if form == "blender":
-        return lambda: scene_script(lighting.target, name, emitters)
+        return lambda: scene_script(
+            lighting.target, name, emitters, places=lighting.places, up=lighting.up
+        )
 
     def overrides() -> str:
         comment = f"lightpaint: the lights of {name} as solved for {lighting.target}"
-        text = usd_overrides(emitters, source.stage, folder, about=comment)
-        if text.left:
-            stage_name = source.stage or "USD"
+        made = usd_overrides(
+            emitters,
+            source.stage,
+            folder,
+            places=lighting.places,
+            up=lighting.up,
+            about=comment,
+        )
+        stage_name = source.stage or "USD"
+        if made.left:
             listen.say(
-                f"no one light of {stage_name} takes {some_names(text.left)}: set it by hand"
+                f"no one light of {stage_name} takes {some_names(made.left)}: set it by hand"
             )
-        return text.text
+        if made.unplaced:
+            listen.say(
+                f"{stage_name} has {some_names(made.unplaced)} elsewhere than the scene, or as a "
+                "mesh: place it by hand"
+            )
+        return made.text
 
     return overrides
 

@@ -4,14 +4,14 @@ import ast
 import math
 import shutil
 import subprocess
-import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from command import refused, run, succeed
+from fake_blender import fake_blender, run_in
 from light_groups import interleaved, pictures
 from renderer import LIGHTS, write_room
 
@@ -71,28 +71,24 @@ class _Socket:
     is_linked = False
 
 
-def _blender() -> ModuleType:
-    """As much of Blender as the script asks for: its lamps by type, a mesh, and a world."""
+def _blender() -> Any:
+    """A fake Blender with lamps by type, and a mesh."""
+    modules = fake_blender()
+    bpy, objects = modules[0], modules[0].data.objects
 
-    def lamp(kind: str, **how: Any) -> Any:
-        world = SimpleNamespace(to_scale=lambda: (2.0, 3.0, 1.0))
-        return SimpleNamespace(
-            type="LIGHT", data=SimpleNamespace(type=kind, **how), matrix_world=world
-        )
+    def lamp(name: str, kind: str, **how: Any) -> None:
+        item = objects.new(name, SimpleNamespace(type=kind, **how))
+        item.matrix_world = np.diag([2.0, 3.0, 1.0, 1.0])
 
     inputs = {name: _Socket() for name in ("Color", "Strength")}
     tree = SimpleNamespace(nodes=[SimpleNamespace(type="EMISSION", inputs=inputs)])
     material = SimpleNamespace(use_nodes=True, node_tree=tree)
-    mesh = SimpleNamespace(type="MESH", material_slots=[SimpleNamespace(material=material)])
-    made = ModuleType("bpy")
-    objects = {
-        "bulb": lamp("POINT"),
-        "sun": lamp("SUN"),
-        "panel": mesh,
-        "desk": lamp("AREA", size=0.5, size_y=1.0, shape="RECTANGLE"),
-    }
-    made.data = SimpleNamespace(objects=objects, worlds={})  # type: ignore[attr-defined]
-    return made
+    lamp("bulb", "POINT")
+    lamp("sun", "SUN")
+    lamp("desk", "AREA", size=0.5, size_y=1.0, shape="RECTANGLE")
+    panel = objects.new("panel", None)
+    panel.type, panel.material_slots = "MESH", [SimpleNamespace(material=material)]
+    return bpy, modules
 
 
 def test_blender_is_given_watts_of_the_same_light(here: Path, tmp_path: Path) -> None:
@@ -101,10 +97,9 @@ def test_blender_is_given_watts_of_the_same_light(here: Path, tmp_path: Path) ->
     wanted = elsewhere(here)
     text = (tmp_path / "set_scene.py").read_text()
     ast.parse(text)
-    blender = _blender()
+    blender, modules = _blender()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, "bpy", blender)
-        exec(compile(text, "set_scene.py", "exec"), {"__name__": "script"})
+        run_in(modules, text, patch)
     objects = blender.data.objects
     point = objects["bulb"].data
     # Intensity is flux over all directions, 4π; a sun's irradiance is its own.

@@ -1,5 +1,6 @@
 """An answer says where its lights are, and whoever applies it hangs them there."""
 
+import ast
 import csv
 import io
 import json
@@ -15,7 +16,9 @@ from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting_file import read_lighting, write_lighting
 from lightpaint.pipeline.results.answer_folder import with_places
+from lightpaint.progress import silent
 from lightpaint.relit.export.fixtures import fixtures_csv, pan_and_tilt
+from lightpaint.relit.export_forms import Source, names_of_forms, writers_of
 from lightpaint.relit.xml_patch import scene_patch
 from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.scene import Scene
@@ -75,6 +78,31 @@ def test_a_patch_moves_the_light(room: Scene) -> None:
     added = [line for line in patch.splitlines() if line.startswith("+") and "lookat" in line]
     assert len(added) == 1
     assert 'origin="0.5, 1.7, 1"' in added[0]
+
+
+def test_other_programs_hang_the_lights_too(room: Scene, tmp_path: Path) -> None:
+    pytest.importorskip("pxr.UsdLux", reason="usd-core")
+    from pxr import Usd, UsdLux
+
+    source = Source(scene=room)
+    lighting = answer_of(room.moved({"beam": TURNED}).with_new_emitters([NEW]))
+    names = names_of_forms(["usd", "blender"], source)
+    writers, _ = writers_of(names, lighting, source, tmp_path, silent)
+    script = {
+        target.id: ast.literal_eval(node.value)
+        for node in ast.parse(writers["set_scene.py"]()).body
+        if isinstance(node, ast.Assign) and isinstance(target := node.targets[0], ast.Name)
+        if target.id in ("MOVED", "ADDED", "PRESENT")
+    }
+    assert script["MOVED"]["beam"][0] == pytest.approx(TURNED.position)
+    assert script["ADDED"]["key"][:2] == ("SPOT", NEW.pose.position)
+    assert script["PRESENT"]["beam"] == (0.8, 1.8, 1.5)
+    (tmp_path / "lights.usda").write_text(writers["lights.usda"](), encoding="utf-8")
+    stage = Usd.Stage.Open(str(tmp_path / "lights.usda"))
+    key = UsdLux.SphereLight(stage.GetPrimAtPath("/lights/key"))
+    assert tuple(key.GetLocalTransformation().ExtractTranslation()) == NEW.pose.position
+    beam = stage.GetPrimAtPath("/lights/beam").GetAttribute("xformOp:transform").Get()
+    assert tuple(beam.ExtractTranslation()) == pytest.approx(TURNED.position)
 
 
 def test_no_lamp_travels_between_two_looks(room: Scene) -> None:

@@ -30,7 +30,8 @@ from lightpaint.placement.paths.camera_paths import (
     later_vertices_of,
     longest_path,
 )
-from lightpaint.scene.properties.pose import Site, across
+from lightpaint.scene.properties.rotation import across
+from lightpaint.scene.properties.site import Site
 from lightpaint.scene.runtime.render_lock import tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed

@@ -1,10 +1,23 @@
 """A Python script for Blender that sets the lights of a scene by their names."""
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from string import Template
+from typing import Any
 
-from lightpaint.arrays import RGB
+import numpy as np
+
+from lightpaint.arrays import RGB, Position
+from lightpaint.relit.export.export_places import (
+    SAME_PLACE,
+    axis_conversions,
+    conversion_of,
+    has_new_cone,
+    is_changed,
+    old_position,
+)
+from lightpaint.scene.properties.site import EmitterPlace
 
 #: Blender's quantity for each parameter of Mitsuba's emitters.
 KINDS = {
@@ -13,12 +26,25 @@ KINDS = {
     "irradiance": "irradiance",
 }
 
+#: Blender's type of each kind of new light.
+LAMPS = {"point": "POINT", "spot": "SPOT", "panel": "AREA"}
 
-def scene_script(target: str, source: str, emitters: Iterable[tuple[str, str, RGB]]) -> str:
-    """Return the script. emitters: name, Mitsuba's parameter and emission of each adjusted one.
-    emitters: name, Mitsuba's parameter and emission of each that is adjusted.
+#: Blender's axis that is up.
+UP = (0.0, 0.0, 1.0)
 
-    Emitters without a plain colour, like a scaled sky, are left to the user.
+
+def scene_script(
+    target: str,
+    source: str,
+    emitters: Iterable[tuple[str, str, RGB]],
+    *,
+    places: Sequence[EmitterPlace] = (),
+    up: Position = (0.0, 1.0, 0.0),
+) -> str:
+    """Return the script, which leaves emitters without a plain colour, like a sky, to the user.
+
+    emitters: name, Mitsuba's parameter and emission of each that is adjusted. places: of all
+    emitters in the answer. up: what is up in the scene.
     """
     rows, left = [], []
     for name, parameter, emission in emitters:
@@ -33,7 +59,42 @@ def scene_script(target: str, source: str, emitters: Iterable[tuple[str, str, RG
         source=_in_docstring(source),
         lights="{\n" + "".join(rows) + "}",
         left=repr(tuple(left)),
+        **_placed(places, up),
     )
+
+
+def _placed(places: Sequence[EmitterPlace], up: Position) -> dict[str, str]:
+    """Return the places as the script has them, in the scene's axes."""
+    rotations = axis_conversions(up, UP)
+    own = conversion_of(places, [np.eye(3)], {})
+    present = {place.name: old for place in places if (old := old_position(place)) is not None}
+    moved, added = {}, {}
+    for place in filter(is_changed, places):
+        cone = _cone(place) if has_new_cone(place) else None
+        if place.new:
+            axes = own.frame(place).tolist()
+            added[place.name] = (LAMPS[place.new], place.position, axes, cone, place.size)
+        else:
+            moved[place.name] = (place.position, place.direction, cone)
+    return {
+        "rotations": repr([np.round(rotation, 12).tolist() for rotation in rotations]),
+        "present": _table(present),
+        "same_place": repr(SAME_PLACE * own.size),
+        "moved": _table(moved),
+        "added": _table(added),
+    }
+
+
+def _cone(place: EmitterPlace) -> tuple[float, float]:
+    """Return Blender's spot_size and spot_blend: full up to `beam`, dark from `cutoff` on."""
+    assert place.cutoff is not None
+    outer = math.cos(math.radians(place.cutoff))
+    inner = math.cos(math.radians(place.beam or 0.0))
+    return 2 * math.radians(place.cutoff), (inner - outer) / (1 - outer)
+
+
+def _table(rows: Mapping[str, Any]) -> str:
+    return "{\n" + "".join(f"    {name!r}: {row!r},\n" for name, row in rows.items()) + "}"
 
 
 def _in_docstring(text: str) -> str:

@@ -1,4 +1,4 @@
-"""A lighting as a layer of USD that overrides lights of a stage, and nothing else.
+"""A lighting as a layer of USD that overrides lights of a stage, adds new ones, and nothing else.
 
 UsdLux's intensity is radiance; for lights that normalize it, the flux of their whole surface. So
 that neither radius nor size of a prim matter, panels and skies are written unnormalized, at their
@@ -7,14 +7,16 @@ times its visible disk, at four times its intensity.
 """
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightpaint.arrays import RGB
+from lightpaint.arrays import RGB, Position
 from lightpaint.errors import OutputError
 from lightpaint.files import one_line
+from lightpaint.relit.export.usd_places import UsdPlaces
+from lightpaint.scene.properties.site import EmitterPlace
 
 #: Whether the light is normalized, by Mitsuba's parameter.
 NORMALIZED = {"radiance": False, "irradiance": True, "intensity": True}
@@ -28,10 +30,14 @@ SCOPE = "/lights"
 
 @dataclass(frozen=True)
 class Overrides:
-    """The layer as text, and the names of lights that are not in it."""
+    """The layer as text, and the names of lights that are not in it.
+
+    unplaced: names of lights whose brightness is in it, and whose new place is not.
+    """
 
     text: str
     left: tuple[str, ...]
+    unplaced: tuple[str, ...] = ()
 
 
 def check_usd() -> None:
@@ -45,7 +51,13 @@ def check_usd() -> None:
 
 
 def usd_overrides(
-    emitters: Iterable[tuple[str, str, RGB]], stage: Path | None, folder: Path, *, about: str = ""
+    emitters: Iterable[tuple[str, str, RGB]],
+    stage: Path | None,
+    folder: Path,
+    *,
+    places: Sequence[EmitterPlace] = (),
+    up: Position = (0.0, 1.0, 0.0),
+    about: str = "",
 ) -> Overrides:
     """Return the layer.
 
@@ -55,34 +67,81 @@ def usd_overrides(
         stage: Any USD file with lights of these names: the layer lies over it. Without one they
             are prims below /lights.
         folder: The folder of the layer.
+        places: Of all emitters in the answer. Those that moved or are new are in the layer, in the
+            stage's axes and the scene's units.
+        up: What is up in the scene.
         about: A description for its comment.
 
     Raises OutputError if the library is not installed, or cannot read the stage.
     """
     check_usd()
-    from pxr import Sdf, Tf, Usd
+    from pxr import Sdf
 
-    stage_lights = None if stage is None else _lights_of(stage)
+    opened = None if stage is None else _opened(stage)
     layer = Sdf.Layer.CreateAnonymous(".usda")
-    override_stage = Usd.Stage.Open(layer)
     layer.comment = about
-    left = []
-    for name, parameter, emission in emitters:
-        identifier = Tf.MakeValidIdentifier(name)
-        places = {f"{SCOPE}/{identifier}": "SphereLight"}
-        if stage_lights is not None:
-            places = stage_lights.get(name) or stage_lights.get(identifier) or {}
-        if parameter not in NORMALIZED or len(places) != 1:
-            left.append(name)
-            continue
-        [(path, kind)] = places.items()
-        _override(override_stage.OverridePrim(path), kind, parameter, emission)
+    # The stage of the layer ends with this call: as soon as there are sublayers, an open one would
+    # look for them, from a layer that is nowhere yet.
+    left, unplaced = _write_lights(layer, opened, list(emitters), places, up)
     if stage is not None:
-        # As soon as it is there, an open stage would look for it, from a layer that is nowhere yet.
-        del override_stage
         layer.subLayerPaths.append(Path(os.path.relpath(stage, folder)).as_posix())
         _like(layer, stage)
-    return Overrides(layer.ExportToString(), tuple(left))
+    return Overrides(layer.ExportToString(), left, unplaced)
+
+
+def _write_lights(
+    layer: Any,
+    opened: Any,
+    emitters: Sequence[tuple[str, str, RGB]],
+    places: Sequence[EmitterPlace],
+    up: Position,
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Write all lights into the layer; return `left` and `unplaced`, as in `Overrides`."""
+    from pxr import Usd
+
+    layer_stage = Usd.Stage.Open(layer)
+    names = dict.fromkeys([*(name for name, _, _ in emitters), *(x.name for x in places)])
+    if opened is None:
+        new = {place.name for place in places if place.new}
+        prims = _assumed_prims(name for name in names if name not in new)
+    else:
+        prims = _prims_of(opened, names)
+    writer = UsdPlaces(layer_stage, opened, prims, places, up)
+    lit = {**prims, **writer.add_new(_scope(opened))}
+    left = []
+    for name, parameter, emission in emitters:
+        if parameter not in NORMALIZED or name not in lit:
+            left.append(name)
+            continue
+        path, kind = lit[name]
+        _override(layer_stage.OverridePrim(path), kind, parameter, emission)
+    return tuple(left), writer.move()
+
+
+def _assumed_prims(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Return path and type of lights without a stage."""
+    from pxr import Tf
+
+    return {name: (f"{SCOPE}/{Tf.MakeValidIdentifier(name)}", "SphereLight") for name in names}
+
+
+def _prims_of(opened: Any, names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Return path and type of the lights that the stage has exactly once."""
+    from pxr import Tf
+
+    stage_lights, prims = _lights_of(opened), {}
+    for name in names:
+        found = stage_lights.get(name) or stage_lights.get(Tf.MakeValidIdentifier(name)) or {}
+        if len(found) == 1:
+            [prims[name]] = found.items()
+    return prims
+
+
+def _scope(opened: Any) -> str:
+    """Return the path that new lights are below."""
+    if opened is None or not (root := opened.GetDefaultPrim()):
+        return SCOPE
+    return f"{root.GetPath()}{SCOPE}"
 
 
 def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
@@ -100,17 +159,23 @@ def _override(prim: Any, kind: str, parameter: str, emission: RGB) -> None:
     light.CreateNormalizeAttr(NORMALIZED[parameter])
 
 
-def _lights_of(stage: Path) -> Mapping[str, dict[str, str]]:
-    """Return the path and the type of each light of a stage, by name."""
-    from pxr import Tf, Usd, UsdLux
+def _opened(stage: Path) -> Any:
+    """Return the opened stage. Raises OutputError if it is none."""
+    from pxr import Tf, Usd
 
     if not stage.is_file():
         raise OutputError(f"no such stage: {stage}")
     try:
-        opened = Usd.Stage.Open(str(stage))
+        return Usd.Stage.Open(str(stage))
     except Tf.ErrorException as error:
         message = one_line(str(error), limit=200)
         raise OutputError(f"{stage} is no stage of USD: {message}") from None
+
+
+def _lights_of(opened: Any) -> Mapping[str, dict[str, str]]:
+    """Return the path and the type of each light of a stage, by name."""
+    from pxr import UsdLux
+
     by_path: dict[str, dict[str, str]] = {}
     for prim in opened.Traverse():
         if prim.HasAPI(UsdLux.LightAPI):

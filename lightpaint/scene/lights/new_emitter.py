@@ -21,9 +21,9 @@ from lightpaint.scene.properties.pose import (
     FARTHEST,
     Pose,
     Site,
-    across,
     pose_of,
 )
+from lightpaint.scene.properties.rotation import across
 from lightpaint.scene.properties.site import EmitterPlace
 from lightpaint.scene.properties.site import NewKind as NewKind
 from lightpaint.validation import MAX_NAME, is_amount

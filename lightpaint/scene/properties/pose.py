@@ -5,17 +5,17 @@ point at its target, so that a texture in its beam keeps its roll.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats, Position
+from lightpaint.arrays import Doubles, Position
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.properties.emission import ENVIRONMENTS
+from lightpaint.scene.properties.rotation import rotation_between, unit
 from lightpaint.scene.properties.site import Site as Site
 
 #: Mitsuba's default cutoff angle of a spot, in degrees, and the share of it that its beam is wide.
@@ -91,14 +91,14 @@ def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
         if shape_plugin not in _AIMED_SHAPES:
             return Site(middle)
         # A normal is turned by the inverse transpose; what flips it is in the matrix.
-        return Site(middle, _unit(np.linalg.inv(_matrix(mi.traverse(shape)))[2, :3]))
+        return Site(middle, unit(np.linalg.inv(_matrix(mi.traverse(shape)))[2, :3]))
     parameters = mi.traverse(emitter)
     if "position" in parameters:
         return Site(_three(parameters["position"]))
     if "to_world" not in parameters:
         return Site()
     matrix = _matrix(parameters)
-    direction = _unit(matrix[:3, 2]) if plugin in _AIMED else None
+    direction = unit(matrix[:3, 2]) if plugin in _AIMED else None
     if plugin == "directional":
         return Site(None, direction)
     cutoff, beam = (
@@ -160,7 +160,7 @@ def motion_of(name: str, plugin: str, site: Site, pose: Pose) -> Motion:
         if not np.linalg.norm(way) > 0:
             raise SceneError(f"light {name!r} cannot point at its own place, {pose.target}")
         turn = rotation_between(direction, way)
-        direction = _unit(way)
+        direction = unit(way)
     matrix = np.eye(4)
     matrix[:3, :3] = turn
     if site.position is not None and position is not None:
@@ -251,27 +251,6 @@ def _texts(values: Doubles) -> list[str]:
     return [f"{v if abs(v) > least else 0.0:.9g}" for v in values]
 
 
-def rotation_between(old: Sequence[float], new: Sequence[float] | Doubles) -> Doubles:
-    """Return the smallest rotation, (3, 3), that turns the direction `old` into `new`."""
-    a, b = np.array(_unit(old)), np.array(_unit(new))
-    cosine = float(a @ b)
-    if cosine < -1 + 1e-12:
-        # Half a turn about any axis across it.
-        axis = across(a)[0]
-        return np.asarray(2 * np.outer(axis, axis) - np.eye(3))
-    v = np.cross(a, b)
-    cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
-    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + cosine))
-
-
-def across(direction: Sequence[float] | Doubles) -> Doubles:
-    """Return two unit vectors across a direction and each other, (2, 3)."""
-    axis = np.array(_unit(direction))
-    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    one /= np.linalg.norm(one)
-    return np.stack([one, np.cross(axis, one)])
-
-
 def _point(name: str, value: Any) -> Position:
     try:
         x, y, z = (float(v) for v in value)
@@ -295,10 +274,4 @@ def _angle(name: str, value: Any) -> float:
 def _three(values: Any) -> Position:
     """Return three numbers without the noise of single precision."""
     x, y, z = (float(f"{v:.7g}") for v in np.array(values, dtype=float).ravel()[:3])
-    return x, y, z
-
-
-def _unit(vector: Sequence[float] | Floats) -> Position:
-    values = np.asarray(vector, dtype=float)
-    x, y, z = (values / np.linalg.norm(values)).tolist()
     return x, y, z

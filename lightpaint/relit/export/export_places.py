@@ -1,0 +1,105 @@
+"""Places of moved and new lights in the axes of another program, where lights shine along -z."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpaint.arrays import Doubles, Position
+from lightpaint.scene.properties.rotation import across, rotation_between
+from lightpaint.scene.properties.site import EmitterPlace
+
+#: Distance of places that count as one, relative to the farthest coordinate of a light.
+SAME_PLACE = 1e-3
+
+_Y, _Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def old_position(place: EmitterPlace) -> Position | None:
+    """Return where a light is in the file of the scene; None for new ones, and at infinity."""
+    if place.new:
+        return None
+    return place.position if place.moved_from is None else place.moved_from.position
+
+
+def is_changed(place: EmitterPlace) -> bool:
+    """Return whether a light is new or elsewhere than in the file of the scene."""
+    return bool(place.new) or place.moved_from is not None
+
+
+def has_new_cone(place: EmitterPlace) -> bool:
+    """Return whether the cone of a spot is another than in the file of the scene."""
+    if place.cutoff is None or place.moved_from is None:
+        return bool(place.new) and place.cutoff is not None
+    old = place.moved_from
+    return (old.cutoff, old.beam) != (place.cutoff, place.beam)
+
+
+def axis_conversions(up: Position, program_up: Position) -> list[Doubles]:
+    """Return rotations from the scene's axes to a program's, (3, 3) each, the likeliest first.
+
+    A camera that looks straight down or stands on its head tells the wrong axis. So behind the
+    rotation from `up` to `program_up` come the same axes, y up to z up, and z up to y up.
+    """
+    return [
+        rotation_between(up, program_up),
+        np.eye(3),
+        rotation_between(_Y, _Z),
+        rotation_between(_Z, _Y),
+    ]
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """The way from a scene's places to a program's.
+
+    rotation: (3, 3), from the scene's axes to the program's. size: the scene's farthest coordinate
+    of a light. is_known: False if all lights that both have are elsewhere in the program.
+    """
+
+    rotation: Doubles
+    size: float
+    is_known: bool = True
+
+    def point(self, position: Position) -> Doubles:
+        """Return a point of the scene in the program."""
+        return np.asarray(self.rotation @ np.array(position))
+
+    def is_at(self, position: Position, point: Doubles) -> bool:
+        """Return whether `point` of the program is `position`, but for rounding."""
+        distance = np.linalg.norm(self.point(position) - point)
+        return bool(distance <= SAME_PLACE * self.size)
+
+    def frame(self, place: EmitterPlace, old_axes: Doubles | None = None) -> Doubles:
+        """Return the axes x, y and z of a light in the program, as the rows of (3, 3).
+
+        old_axes: of the light as it is there, whose length and roll stay; None for a new one.
+        """
+        if place.direction is None:
+            return np.eye(3) if old_axes is None else old_axes
+        way = self.rotation @ np.array(place.direction)
+        if old_axes is not None and old_axes[2].any():
+            return np.asarray(old_axes @ rotation_between((-old_axes[2]).tolist(), way).T)
+        # As in the element of a new panel: its height is along the first vector across.
+        up = self.rotation @ across(place.direction)[0]
+        return np.stack([np.cross(up, -way), up, -way])
+
+
+def conversion_of(
+    places: Sequence[EmitterPlace], rotations: Sequence[Doubles], present: Mapping[str, Doubles]
+) -> Conversion:
+    """Return the rotation by which most lights are where the scene has them, the first of equals.
+
+    present: positions of the lights in the program, by name.
+    """
+    known = [x for place in places for x in (old_position(place), place.position) if x is not None]
+    size = float(np.abs(known).max(initial=0.0))
+    pairs = [
+        (old, present[place.name])
+        for place in places
+        if place.name in present and (old := old_position(place)) is not None
+    ]
+    conversions = [Conversion(rotation, size) for rotation in rotations]
+    counts = [sum(way.is_at(a, b) for a, b in pairs) for way in conversions]
+    best = int(np.argmax(counts))
+    return replace(conversions[best], is_known=not pairs or counts[best] > 0)

@@ -1,0 +1,67 @@
+"""As much of Blender as set_scene.py asks for, where there is none."""
+
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+
+class FakeLamp(dict[str, Any]):
+    """An object with a lamp, and with custom properties."""
+
+    type = "LIGHT"
+
+    def __init__(self, name: str, data: Any) -> None:
+        super().__init__()
+        self.name, self.data, self._matrix = name, data, np.eye(4)
+
+    @property
+    def matrix_world(self) -> Any:
+        return FakeMatrix(self._matrix)
+
+    @matrix_world.setter
+    def matrix_world(self, rows: Any) -> None:
+        self._matrix = np.array(rows, float)
+
+
+class FakeMatrix(list[list[float]]):
+    """A matrix as Blender has it: a sequence of its rows."""
+
+    def __init__(self, rows: Any) -> None:
+        super().__init__(np.array(rows, float).tolist())
+
+    def to_scale(self) -> Any:
+        return np.linalg.norm(np.array(self)[:3, :3], axis=0)
+
+
+class FakeObjects(dict[str, Any]):
+    """The objects of a file."""
+
+    def new(self, name: str, data: Any) -> Any:
+        self[name] = FakeLamp(name, data)
+        return self[name]
+
+    def remove(self, item: Any) -> None:
+        del self[item.name]
+
+
+def fake_blender() -> tuple[ModuleType, ModuleType]:
+    """Return the modules bpy and mathutils."""
+    made, vectors = ModuleType("bpy"), ModuleType("mathutils")
+    lights = SimpleNamespace(new=lambda name, kind: SimpleNamespace(type=kind, users=1))
+    made.data = SimpleNamespace(objects=FakeObjects(), worlds={}, lights=lights)  # type: ignore[attr-defined]
+    nothing = SimpleNamespace(link=lambda item: None)
+    scene = SimpleNamespace(collection=SimpleNamespace(objects=nothing))
+    layer = SimpleNamespace(update=lambda: None)
+    made.context = SimpleNamespace(scene=scene, view_layer=layer)  # type: ignore[attr-defined]
+    vectors.Matrix = FakeMatrix  # type: ignore[attr-defined]
+    return made, vectors
+
+
+def run_in(modules: tuple[ModuleType, ModuleType], text: str, patch: Any) -> None:
+    """Run a script with them. patch: pytest's MonkeyPatch."""
+    import sys
+
+    for module in modules:
+        patch.setitem(sys.modules, module.__name__, module)
+    exec(compile(text, "set_scene.py", "exec"), {"__name__": "script"})

@@ -1,0 +1,188 @@
+"""Places in set_scene.py, whose lamps shine along their -z and whose z is up."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from blender import in_blender
+from fake_blender import FakeMatrix, fake_blender, run_in
+
+from lightpaint.relit.export.scene_script import scene_script
+from lightpaint.scene.properties.site import EmitterPlace, Site
+
+#: Blender's matrices and cones are float32.
+FLOAT32 = 1e-5
+
+RGB = (2.0, 1.0, 0.25)
+DOWN, WAY = (0.0, -1.0, 0.0), (0.6, -0.8, 0.0)
+
+#: A spot that moved and turned, a bulb that stayed, a sun that turned, and new lights; y is up.
+OLD = Site((1.0, 2.0, 3.0), DOWN, 30.0, 20.0)
+PLACES = (
+    EmitterPlace("spot", (1.5, 2.5, 3.0), WAY, 40.0, 10.0, moved_from=OLD),
+    EmitterPlace("bulb", (4.0, 1.0, -2.0)),
+    EmitterPlace("sun", None, WAY, moved_from=Site(None, DOWN)),
+    EmitterPlace("key", (0.0, 3.0, 1.0), WAY, 25.0, 5.0, new="spot"),
+    EmitterPlace("fill", (0.5, 3.0, 1.0), new="point"),
+    EmitterPlace("window", (0.0, 2.0, -1.0), WAY, new="panel", size=(2.0, 0.5)),
+)
+STAYED = (EmitterPlace("spot", OLD.position, DOWN, 30.0, 20.0), PLACES[1])
+CONE = (math.radians(60), 0.25)
+
+
+def script(places: Any, up: Any = (0.0, 1.0, 0.0)) -> str:
+    emitters = [(place.name, "radiance" if place.size else "intensity", RGB) for place in places]
+    return scene_script("evening", "hall.xml", emitters, places=places, up=up)
+
+
+def z_up(point: Any) -> np.ndarray:
+    """A point of a scene whose y is up, in Blender."""
+    x, y, z = point
+    return np.array([x, -z, y])
+
+
+def lamps(scale: float = 1.0) -> dict[str, tuple[str, list[list[float]]]]:
+    """Type and matrix of the lamps in the file: they shine down, and are scaled and rolled."""
+    made = {}
+    for name, kind, point in (
+        ("spot", "SPOT", OLD.position),
+        ("bulb", "POINT", PLACES[1].position),
+        ("sun", "SUN", (8.0, 9.0, 9.0)),
+    ):
+        matrix = np.eye(4)
+        matrix[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
+        matrix[:3, :3] *= 2
+        matrix[:3, 3] = scale * z_up(point)
+        made[name] = (kind, matrix.tolist())
+    return made
+
+
+def fake_with(patch: Any, given: Any) -> Any:
+    """A fake Blender with these lamps."""
+    modules = fake_blender()
+    objects = modules[0].data.objects
+    for name, (kind, matrix) in given.items():
+        data = modules[0].data.lights.new(name, kind)
+        data.spot_size, data.spot_blend = CONE
+        objects.new(name, data).matrix_world = FakeMatrix(matrix)
+    return modules
+
+
+def hung_in(modules: Any) -> dict[str, Any]:
+    """The same as blender_hung.py prints."""
+    found = {}
+    for item in modules[0].data.objects.values():
+        data = item.data
+        cone = [data.spot_size, data.spot_blend] if data.type == "SPOT" else None
+        size = [data.size, data.size_y] if data.type == "AREA" else None
+        matrix = list(item.matrix_world)
+        found[item.name] = {"type": data.type, "matrix": matrix, "cone": cone, "size": size}
+    return found
+
+
+def assert_hangs(found: Any, position: Any, direction: Any) -> None:
+    matrix = np.array(found["matrix"])
+    np.testing.assert_allclose(matrix[:3, 3], z_up(position), atol=FLOAT32)
+    if direction is not None:
+        way = -matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+        np.testing.assert_allclose(way, z_up(direction), atol=FLOAT32)
+    assert np.linalg.det(matrix[:3, :3]) > 0
+
+
+def assert_cone(found: Any, cutoff: float, beam: float) -> None:
+    """Blender's spot is dark from half its size on, and full where the cosine is so much nearer."""
+    size, blend = found["cone"]
+    assert size == pytest.approx(2 * math.radians(cutoff), abs=FLOAT32)
+    edge = math.cos(size / 2)
+    inner = math.degrees(math.acos(edge + blend * (1 - edge)))
+    assert inner == pytest.approx(beam, abs=math.degrees(FLOAT32) * 10)
+
+
+def assert_all_hung(before: Any, first: Any, second: Any, again: Any) -> None:
+    """What a file has before, after the script, after it ran twice, and after another answer."""
+    assert_hangs(first["spot"], PLACES[0].position, WAY)
+    assert_cone(first["spot"], 40, 10)
+    scale = np.linalg.norm(np.array(first["spot"]["matrix"])[:3, :3], axis=0)
+    np.testing.assert_allclose(scale, 2, atol=FLOAT32)
+    assert_hangs(first["sun"], (8.0, 9.0, 9.0), WAY)
+    np.testing.assert_allclose(first["bulb"]["matrix"], before["bulb"]["matrix"], atol=FLOAT32)
+    for place, kind in zip(PLACES[3:], ("SPOT", "POINT", "AREA"), strict=True):
+        assert first[place.name]["type"] == kind
+        assert_hangs(first[place.name], place.position, place.direction)
+    assert_cone(first["key"], 25, 5)
+    assert first["window"]["size"] == [2.0, 0.5]
+    height = np.array(first["window"]["matrix"])[:3, 1]
+    assert height @ z_up(WAY) == pytest.approx(0, abs=FLOAT32)
+    for name, found in first.items():
+        np.testing.assert_allclose(second[name]["matrix"], found["matrix"], atol=FLOAT32)
+    assert set(first) == set(second)
+    # Another answer in which nothing moved: all is as it was.
+    assert set(again) == set(before)
+    for name, found in before.items():
+        np.testing.assert_allclose(again[name]["matrix"], found["matrix"], atol=FLOAT32)
+    assert again["spot"]["cone"] == pytest.approx(before["spot"]["cone"], abs=FLOAT32)
+
+
+def test_lamps_in_blender_hang_as_in_the_answer(tmp_path: Path, blender: list[str]) -> None:
+    (tmp_path / "set_scene.py").write_text(script(PLACES), encoding="utf-8")
+    (tmp_path / "again.py").write_text(script(STAYED), encoding="utf-8")
+    rig = np.eye(4)
+    rig[:3, :3] = [[0, -2, 0], [2, 0, 0], [0, 0, 2]]
+    rig[:3, 3] = 5, 6, 7
+    given = {"rig": rig.tolist(), "lamps": lamps(), "cone": CONE}
+    (tmp_path / "lamps.json").write_text(json.dumps(given), encoding="utf-8")
+    told = in_blender(blender, Path(__file__).parent / "blender_hung.py", tmp_path)
+    seen = json.loads(next(x for x in told.splitlines() if x.startswith("SEEN"))[5:])
+    assert_all_hung(*seen)
+
+
+def test_lamps_hang_as_in_the_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    modules = fake_with(monkeypatch, lamps())
+    seen = [hung_in(modules)]
+    for text in (script(PLACES), script(PLACES), script(STAYED)):
+        run_in(modules, text, monkeypatch)
+        seen.append(hung_in(modules))
+    assert_all_hung(*seen)
+
+
+def test_new_lamps_have_the_watts_of_their_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    modules = fake_with(monkeypatch, lamps())
+    run_in(modules, script(PLACES), monkeypatch)
+    objects = modules[0].data.objects
+    # Intensity over all directions; radiance over a half space, π, and 2 by .5.
+    for name, factor in (("key", 4 * math.pi), ("fill", 4 * math.pi), ("window", math.pi)):
+        data = objects[name].data
+        np.testing.assert_allclose(np.array(data.color) * data.energy, factor * np.array(RGB))
+
+
+def test_lamps_that_hang_elsewhere_than_in_the_scene_stay(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file in centimetres: neither the lamps nor what they are moved by fit."""
+    modules = fake_with(monkeypatch, lamps(scale=100))
+    before = hung_in(modules)
+    run_in(modules, script(PLACES), monkeypatch)
+    after = hung_in(modules)
+    assert after == before
+    told = capsys.readouterr().out
+    for name in ("spot", "sun", "key", "fill", "window"):
+        assert f"{name!r} is no lamp, or not where the scene has it" in told
+
+
+def test_lamps_tell_the_axes_where_no_camera_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A camera that looks straight down has -z upwards in a scene whose y is up."""
+    modules = fake_with(monkeypatch, lamps())
+    run_in(modules, script(PLACES, up=(0.0, 0.0, -1.0)), monkeypatch)
+    assert_hangs(hung_in(modules)["spot"], PLACES[0].position, WAY)
+
+
+def test_half_a_turn_is_a_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    upwards = EmitterPlace("spot", OLD.position, (0.0, 1.0, 0.0), 30.0, 20.0, moved_from=OLD)
+    modules = fake_with(monkeypatch, lamps())
+    run_in(modules, script([upwards]), monkeypatch)
+    found = hung_in(modules)["spot"]
+    assert_hangs(found, OLD.position, (0.0, 1.0, 0.0))
+    assert found["cone"] == list(CONE)
