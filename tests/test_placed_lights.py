@@ -1,7 +1,9 @@
 """Lights that may move are placed by a solve, verified, and written into the user's text."""
 
+import html
 import json
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -257,11 +259,12 @@ def test_a_suggestion_is_a_turn_with_its_picture_and_the_line_to_paste(
     turn = look.move_suggestion
     assert turn is not None
     assert turn.name == "beam"
-    assert turn.option == f"--aim beam={5 * np.ceil((turn.turn + 10) / 5):.0f}"
+    assert turn.aim == 5 * np.ceil((turn.turn + 10) / 5)
+    assert tomllib.loads(turn.toml) == {"light": {"beam": {"aim": turn.aim}}}
     off = [float(np.square(x - target.image).sum()) for x in (turn.without, turn.with_it)]
     assert off[1] < 0.5 * off[0]
     page = (tmp_path / "answer" / "report.html").read_text()
-    assert f"lightpaint solve room.xml p.exr --spp 128 {turn.option}" in page
+    assert html.escape(turn.toml) in page
     assert json.loads((tmp_path / "answer" / "report.json").read_text())["turn"]["name"] == "beam"
 
 

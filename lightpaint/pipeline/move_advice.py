@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from shlex import quote
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
@@ -56,9 +55,8 @@ def suggest_move(
         return None
     best = placement.moves[0]
     without, with_it = _pictures(job, view, solution, scene.moved({best.name: best.pose}), basis)
-    degrees = 5 * math.ceil((best.turn + MARGIN) / 5)
-    option = f"--aim {quote(f'{best.name}={degrees}')}"
-    return MoveSuggestion(best.name, best.turn, best.gain_share, option, without, with_it)
+    aim = 5 * math.ceil((best.turn + MARGIN) / 5)
+    return MoveSuggestion(best.name, best.turn, best.gain_share, aim, without, with_it)
 
 
 def _turns(scene: Scene) -> dict[str, Freedom]:

@@ -277,7 +277,7 @@ def verification_numbers(v: Verification) -> dict[str, Any]:
 
 
 def _turn(turn: MoveSuggestion) -> dict[str, Any]:
-    return {name: getattr(turn, name) for name in ("name", "turn", "gain_share", "option")}
+    return {name: getattr(turn, name) for name in ("name", "turn", "gain_share", "aim")}
 
 
 def _placement(hung: HungLights) -> dict[str, Any]:

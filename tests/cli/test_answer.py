@@ -215,7 +215,7 @@ def test_what_became_of_a_light(now: Any, new: Any, said: str):
             "room.toml",
             "57 % of the difference.",
         ),  # of a lights file
-        (Reason("hold", loosening=Loosening(0.8, 0.35, None)), "", "; --hold 0.8 would remove"),
+        (Reason("hold", loosening=Loosening(0.8, 0.35, None)), "", "(--hold 0.8) would remove"),
         (Reason("colors", (), 0.5), "", "; --colors free would remove 50 % of the difference."),
     ],
 )

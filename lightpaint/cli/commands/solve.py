@@ -1,6 +1,7 @@
 """`lightpaint solve`: one painting or several, their variations, and a gallery of all."""
 
 from collections.abc import Sequence
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.commands.answer_text import Table, show_look, spoken_settings
@@ -83,7 +84,8 @@ def _show(job: Job, looks: Sequence[Look], table: Table) -> None:
         show_look(look, view.folder, table=table)
         if look.move_suggestion is not None:
             text = spoken_turn(look.move_suggestion)
-            terminal.write(f"{text} Let it turn: {look.move_suggestion.option}")
+            option = f"--aim {quote(f'{look.move_suggestion.name}={look.move_suggestion.aim}')}"
+            terminal.write(f"{text} Let it turn: {option}")
         if look.suggestions is not None:
             tables.show_suggestions(look.suggestions, cd_per_unit=job.settings.cd_per_unit)
     if job.groups is not None:

@@ -3,7 +3,6 @@
 import argparse
 from typing import Any
 
-from lightpaint.placement.rigging.rigging_values import KINDS
 from lightpaint.validation import BRIGHTEST
 
 
@@ -130,6 +129,8 @@ def new_light(text: str) -> dict[str, Any]:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not KIND, KIND:2 or KIND:2@WHERE, like spot:2@ceiling"
         )
+    from lightpaint.placement.rigging.rigging_values import KINDS
+
     table: dict[str, Any] = {"kind" if kind in KINDS else "like": kind.strip()}
     table |= {"count": int(count)} if colon else {}
     return table | ({"on": names_of(where)} if at else {})

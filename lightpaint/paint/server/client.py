@@ -74,6 +74,7 @@ class Client:
 
     Attributes:
         is_observer: Whether it has begun as an observer, which it stays.
+        awaits_state: Whether it is an observer that no state has been sent to yet.
         is_disconnected: Whether it sends no more; queued messages may still wait for an answer.
     """
 
@@ -88,7 +89,7 @@ class Client:
         self._all_sent.set()
         self._all_answered.set()
         self._is_abandoned = False
-        self.is_disconnected = self.is_observer = False
+        self.is_disconnected = self.is_observer = self.awaits_state = False
 
     async def receive_all(self) -> None:
         """Queue the client's messages until it disconnects, as many as the queue takes."""

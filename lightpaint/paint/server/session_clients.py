@@ -226,9 +226,16 @@ class Connections:
             others = [other for other in self._clients if other.is_observer and other is not client]
             if len(others) >= MAX_OBSERVERS:
                 raise PaintError(f"{MAX_OBSERVERS} observers are there already: close one of them")
-            client.is_observer = True
+            client.is_observer = client.awaits_state = True
             await self._brush_up.wait()
-            return [await self._run(self.session.state)]
+            try:
+                state = await self._run(self.session.state)
+            finally:
+                client.awaits_state = False
+            # Nothing precedes the state; pictures that were renewed meanwhile follow it.
+            known = dict(state.resources) if isinstance(state, SessionState) else {}
+            newer = {k: n for k, n in self.generations.items() if n > known.get(k, n)}
+            return [state, PictureUpdate(resources=newer)] if newer else [state]
         is_export = isinstance(request, Export) and request.run
         if not (is_export or isinstance(request, Fetch | Propose)):
             raise PaintError(
@@ -255,7 +262,7 @@ class Connections:
         event = message.answer if isinstance(message, CanvasPatch) else message
         if isinstance(event, OBSERVED_EVENTS):
             for client in self._clients:
-                if client.is_observer and client is not but:
+                if client.is_observer and not client.awaits_state and client is not but:
                     client.send(event)
 
     async def _release_disconnected(self, client: Client) -> None:

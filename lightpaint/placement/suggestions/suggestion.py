@@ -1,5 +1,6 @@
 """A suggested light, as data: its place, its emission, and its gain."""
 
+import json
 from dataclasses import dataclass, field
 
 from lightpaint.arrays import RGB, Floats, Position
@@ -58,7 +59,7 @@ class MoveSuggestion:
         name: The light.
         turn: Degrees that it turns.
         gain_share: The share of the error (energy) that the turn removes, as the search found it.
-        option: The option of `lightpaint solve` that lets it turn.
+        aim: Degrees to let it turn by.
         without: (h, w, 3) linear, the solved picture, small.
         with_it: (h, w, 3), the same after the turn, with all lights solved again.
 
@@ -71,6 +72,11 @@ class MoveSuggestion:
     name: str
     turn: float
     gain_share: float
-    option: str
+    aim: int
     without: Floats = field(repr=False, compare=False)
     with_it: Floats = field(repr=False, compare=False)
+
+    @property
+    def toml(self) -> str:
+        """The lines of a lights file that let it turn."""
+        return f"[light.{json.dumps(self.name, ensure_ascii=False)}]\naim = {self.aim}"

@@ -94,9 +94,9 @@ def _steps(solution: Solution) -> str:
 
 #: What can be done about light that no dimmer gives.
 OTHER_PLACES = (
-    "What no dimmer reaches, a light that hangs or points elsewhere may: <code>--suggest</code> "
-    "looks for the best turn and the best new light, with a picture and the line to paste; "
-    "<code>--aim</code>, <code>--move</code> and <code>--add</code> let lights be placed."
+    "What no dimmer reaches, a light that hangs or points elsewhere may. Ask for suggestions: the "
+    "best turn of a light and the best new light, with a picture of each and the lines to paste. "
+    "Or let lights move, turn or be added, in the lights file or by options."
 )
 
 

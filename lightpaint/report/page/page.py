@@ -127,7 +127,6 @@ def report_page(
         suggestions=suggestion_section(
             suggestions,
             turn=turn,
-            command=command,
             transform=transform,
             cd_per_unit=solution.lighting.cd_per_unit,
             is_clean=looks.is_clean,

@@ -49,5 +49,5 @@ def _figure(picture: npt.NDArray[np.uint8], name: str, caption: str) -> str:
     return (
         f'<figure style="margin:16px 0"><img style="max-width:100%;height:auto" width="{width}" '
         f'height="{height}" alt="{name}." src="{data_uri(picture)}">'
-        f'<figcaption style="color:var(--faint);font-size:13.5px">{caption}</figcaption></figure>'
+        f"<figcaption>{caption}</figcaption></figure>"
     )

@@ -1,6 +1,5 @@
 """Suggested lights, in words and as a section of the report. Sections are HTML."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
@@ -14,9 +13,6 @@ from lightpaint.report.page.figures import data_uri
 from lightpaint.report.page.html import facts
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.report.rig.hung_lights import spoken_fraction
-
-#: The option that asked for suggestions, in a command.
-_SUGGEST = re.compile(r" --suggest(?:[= ]\d+)?(?= |$)")
 
 #: Ring around the place of a light in the picture, dark on bright and bright on dark.
 RING = (
@@ -48,14 +44,13 @@ def suggestion_section(
     *,
     transform: ViewTransform,
     turn: MoveSuggestion | None = None,
-    command: str = "",
     cd_per_unit: float | None = None,
     is_clean: bool = False,
 ) -> str:
     """Return each suggested light: the picture without and with it, its place, and its XML.
 
-    None gives no section. turn: of a light that is there, which comes first. command: the shell
-    command that made the result. is_clean: whether to denoise the pictures.
+    None gives no section. turn: of a light that is there, which comes first. is_clean:
+    whether to denoise the pictures.
     """
     if suggestions is None:
         return ""
@@ -77,7 +72,7 @@ def suggestion_section(
     )
     return (
         f"<section><h2>Lights that would help</h2>"
-        f"{_turn_html(turn, command, transform=transform, is_clean=is_clean)}"
+        f"{_turn_html(turn, transform=transform, is_clean=is_clean)}"
         f"<p>{escape(spoken_suggestions(suggestions))}</p>{method}{shown}</section>"
     )
 
@@ -88,17 +83,15 @@ def spoken_turn(turn: MoveSuggestion) -> str:
     return f"Turning {turn.name} by {turn.turn:.0f}° would remove {gain} of the difference."
 
 
-def _turn_html(
-    turn: MoveSuggestion | None, command: str, *, transform: ViewTransform, is_clean: bool
-) -> str:
-    """Return the turn of a light: its pictures, and the line that makes it."""
+def _turn_html(turn: MoveSuggestion | None, *, transform: ViewTransform, is_clean: bool) -> str:
+    """Return the turn of a light: its pictures, and the lines that let it turn."""
     if turn is None:
         return ""
     pictures = [denoised(x) if is_clean else x for x in (turn.without, turn.with_it)]
     name = escape(turn.name)
-    line = f"{_SUGGEST.sub('', command)} {turn.option}" if command else turn.option
     return (
-        f"<p>{escape(spoken_turn(turn))} Let it turn:</p><pre>{escape(line)}</pre>"
+        f"<p>{escape(spoken_turn(turn))} Let it turn in the lights file, and solve again:</p>"
+        f"<pre>{escape(turn.toml)}</pre>"
         '<div class="maps">'
         f"{_picture(pictures[0], f'{name} as it is', 'as solved', None, transform)}"
         f"{_picture(pictures[1], f'{name} turned', 'a preview, solved again', None, transform)}"

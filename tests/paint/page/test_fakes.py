@@ -32,7 +32,7 @@ ASKED = {
 }
 
 #: Requests of a rig, which the session that tests make up does not have.
-RIG = {"move", "point", "show_rig"}
+RIG = {"move", "point", "show_rig", "place"}
 
 
 def check(told: dict[str, Any]) -> None:
