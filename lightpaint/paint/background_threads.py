@@ -31,27 +31,36 @@ class StoppedError(Exception):
     """Signal that ends a task whose result is no longer needed."""
 
 
-class ExactSolveLoop:
+class _Loop:
+    """A thread's loop that waits for something to do, until it is stopped."""
+
+    def __init__(self, report: Callable[[Message], None]) -> None:
+        self._report = report
+        self._condition = Condition()
+        self._is_open = True
+
+    def stop(self) -> None:
+        """End the loop."""
+        with self._condition:
+            self._is_open = False
+            self._condition.notify_all()
+
+
+class ExactSolveLoop(_Loop):
     """A thread's loop that finds the exact answer whenever the brush rests.
 
     solve: finds the answer and publishes it. report: receives errors.
     """
 
     def __init__(self, solve: Callable[[], None], report: Callable[[Message], None]) -> None:
-        self._solve, self._report = solve, report
-        self._condition = Condition()
-        self._has_changed, self._is_open = False, True
+        super().__init__(report)
+        self._solve = solve
+        self._has_changed = False
 
     def notify(self) -> None:
         """Note that the session has changed."""
         with self._condition:
             self._has_changed = True
-            self._condition.notify_all()
-
-    def stop(self) -> None:
-        """End the loop."""
-        with self._condition:
-            self._is_open = False
             self._condition.notify_all()
 
     def run(self) -> None:
@@ -77,28 +86,21 @@ class ExactSolveLoop:
                 self._report(Notice(text=error_text(error), tone="warn"))
 
 
-class LatestWork:
+class LatestWork(_Loop):
     """A thread's loop over the latest of what it is given; what came before is dropped.
 
     work: done with it. report: receives errors.
     """
 
     def __init__(self, work: Callable[[Any], None], report: Callable[[Message], None]) -> None:
-        self._work, self._report = work, report
-        self._condition = Condition()
+        super().__init__(report)
+        self._work = work
         self._latest: Any = None
-        self._is_open = True
 
     def give(self, latest: Any) -> None:
         """Replace what is worked on next. None is nothing."""
         with self._condition:
             self._latest = latest
-            self._condition.notify_all()
-
-    def stop(self) -> None:
-        """End the loop."""
-        with self._condition:
-            self._is_open = False
             self._condition.notify_all()
 
     def run(self) -> None:

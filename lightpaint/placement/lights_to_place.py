@@ -123,9 +123,9 @@ def why_not_searched(light: Light) -> str:
     if light.is_fixed:
         return "is kept as it is"
     if len(light.members) > 1:
-        return f"is {len(light.members)} emitters"
+        return f"is a group of {len(light.members)} emitters"
     if light.plugin not in SEARCHED:
-        return f"is of the kind {light.plugin}, and only {', '.join(SEARCHED)} are searched"
+        return f"is of the kind {light.plugin}, and only {', '.join(SEARCHED)} can move"
     if light.unit == MULTIPLE:
         return "has a picture in its beam"
     return ""

@@ -1,4 +1,4 @@
-"""What a lights file lets move: each wrong value is one line with the file and the key."""
+"""Keys that let lights move: a wrong value is refused in one line that names file and key."""
 
 from pathlib import Path
 from typing import Any

@@ -21,10 +21,9 @@ from lightpaint.paint.rig.quick_planes import QuickPlanes
 from lightpaint.paint.session.moved_lights import Poses
 from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom
-from lightpaint.placement.lights_to_place import SEARCHED
+from lightpaint.placement.lights_to_place import why_not_searched
 from lightpaint.placement.rigging.rigged_lights import freedoms_of
 from lightpaint.placement.rigging.rigging import rigging_of
-from lightpaint.scene.properties.emission import MULTIPLE
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene
@@ -128,14 +127,7 @@ class LampRig:
         scene = self.scene
         if scene.has_media:
             return "stands in a scene with fog or the like"
-        light = scene.light(name)
-        if light.is_fixed:
-            return "is kept as it is"
-        if len(light.members) > 1:
-            return f"is a group of {len(light.members)} emitters"
-        if light.plugin not in SEARCHED:
-            return f"is of the kind {light.plugin}; only points, spots and suns are moved here"
-        return "has a picture in its beam" if light.unit == MULTIPLE else ""
+        return why_not_searched(scene.light(name))
 
     def site(self, name: str, values: Mapping[str, Any]) -> Site:
         """Return the place of a light with a pose. Raises LightpaintError for what it cannot do."""

@@ -102,7 +102,11 @@ def assert_cone(found: Any, cutoff: float, beam: float) -> None:
 
 
 def assert_all_hung(before: Any, first: Any, second: Any, again: Any) -> None:
-    """What a file has before, after the script, after it ran twice, and after another answer."""
+    """Fail unless the lamps of a file hang where the script puts them.
+
+    before, first, second, again: lamps before the script, after it, after a second run of it, and
+    after the script of another answer.
+    """
     assert_hangs(first["spot"], PLACES[0].position, WAY)
     assert_cone(first["spot"], 40, 10)
     scale = np.linalg.norm(np.array(first["spot"]["matrix"])[:3, :3], axis=0)
