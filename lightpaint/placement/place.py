@@ -53,7 +53,7 @@ LONG_ERROR, WIDE_ERROR = 0.06, 6.0
 def place(
     scenes: Scene | Sequence[Scene],
     bases: Basis | Sequence[Basis],
-    solution: Solution,
+    solution: Solution | Sequence[Solution],
     freedoms: Mapping[str, Freedom] | None = None,
     *,
     new: Sequence[NewLights] = (),
@@ -72,7 +72,9 @@ def place(
         scenes: The scene of `bases`, on the same film or a larger one; through the sensor of each
             view if there are several.
         bases: The basis of each view of the solution.
-        solution: The solution to improve.
+        solution: The solution to improve. Several looks may share places: give the solution of
+            each, which keeps its own weights. A look counts by the share that it misses; `bases`
+            are of the views of all.
         freedoms: Freedom of lights by name: points, spots and suns of one emitter each.
         new: Lights that may be added.
         pairs: Lights that stay mirror images of each other.
@@ -92,6 +94,7 @@ def place(
         True
     """
     views = _views(scenes, bases)
+    looks = _looks(solution, [its for _, its in views])
     scene, basis = views[0]
     freedoms = freedoms or {}
     for name, freedom in freedoms.items():
@@ -108,7 +111,7 @@ def place(
         slots = new_movables_of(scene, lights, len(names), paths, seed=seed)
         fit = fit_of(
             [its for _, its in views],
-            solution,
+            looks,
             [x.size for x in small],
             [light.as_basis_light for light in lights],
             constraints,
@@ -252,6 +255,27 @@ def _views(
                 f"{first.path} and {other.path} are two scenes: views differ in the sensor alone"
             )
     return list(zip(all_scenes, all_bases, strict=True))
+
+
+def _looks(
+    solution: Solution | Sequence[Solution], bases: Sequence[Basis]
+) -> list[tuple[Solution, list[int]]]:
+    """Return each solution, and the places of its views among `bases`."""
+    if isinstance(solution, Solution):
+        return [(solution, list(range(len(bases))))]
+    known = [(basis.origin.sensor, basis.size) for basis in bases]
+    looks = []
+    for its in solution:
+        views = [(basis.origin.sensor, basis.size) for basis in its.problem.views.bases]
+        if missing := [sensor for sensor, size in views if (sensor, size) not in known]:
+            raise SceneError(
+                f"a look is through the sensor {missing[0]!r}, and no basis is, on its film: give "
+                "the bases of all views"
+            )
+        looks.append((its, [known.index(view) for view in views]))
+    if not looks:
+        raise SceneError("no look to place lights for: give a solution")
+    return looks
 
 
 def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:

@@ -7,7 +7,6 @@ weights.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -18,11 +17,9 @@ from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.algebra.optimum import minimise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.normal_equations import NormalEquations
-from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
-from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
 from lightpaint.lighting.unknowns.reduced_problem import reduced_problems
-from lightpaint.lighting.unknowns.reduction import Reduction
+from lightpaint.placement.look_goals import LookGoal, balanced, goal_of
 
 #: Share of a column that others cannot replace, below which it counts as none.
 LEAST_OWN = 1e-3
@@ -30,7 +27,7 @@ LEAST_OWN = 1e-3
 
 @dataclass(frozen=True)
 class Fitted:
-    """The best weights for some columns. weights: (n, 3). missed: Σ D r² and the pull."""
+    """The best weights for some columns. weights: (n, c). missed: Σ D r² and the pull."""
 
     columns: Floats
     weights: Doubles
@@ -43,7 +40,7 @@ class Ranking:
 
     It knows what is missed without that light, and the columns of others that may make up for it.
 
-    root: (p, 3), square root of importance; residual: (p, 3), weighed with it. others, inverses:
+    root: (p, c), square root of importance; residual: (p, c), weighed with it. others, inverses:
     for each channel the columns (k, p), weighed, and the inverse of their inner products.
     """
 
@@ -58,8 +55,8 @@ class Ranking:
         candidates: (k, p, 3). The lights that shine are taken to stay on.
         """
         gains = np.zeros(len(candidates))
-        for c in range(3):
-            its = candidates[:, :, c] * self.root[:, c]
+        for c in range(self.root.shape[1]):
+            its = candidates[:, :, c % 3] * self.root[:, c]
             power = np.einsum("kp,kp->k", its, its)
             gains += self.gain(c, its @ self.residual[:, c], its @ self.others[c].T, power)
         return gains
@@ -88,39 +85,54 @@ class Ranking:
 
 
 class PlacementFit:
-    """A goal on a small film, and the columns of all lights where they are now.
+    """Goals on a small film, and the columns of all lights where they are now.
 
-    columns: (n, p, 3) at unit emission. goal: (p, 3); importance: (p, 3), >= 0. pull: what holds
-    weights, beside the picture.
+    Looks that share places have weights of their own, so they are no more than further channels:
+    3 for each look, which share the columns. So a search need not know of looks. A look counts by
+    the share that it misses, be it bright or dark.
+
+    columns: (n, p, 3) at unit emission. goals: of each look.
     """
 
-    def __init__(
-        self,
-        columns: Floats,
-        goal: Floats,
-        importance: Floats,
-        reduction: Reduction,
-        pull: NormalEquations | None,
-    ) -> None:
-        self.columns, self.reduction, self.pull = columns, reduction, pull
+    def __init__(self, columns: Floats, goals: Sequence[LookGoal]) -> None:
+        self.columns, self._looks = columns, balanced(goals)
+        importance = np.concatenate([look.importance for look in self._looks], axis=1)
         self._root = np.sqrt(importance.astype(np.float64))
-        self._goal = goal * self._root
+        self._goal = np.concatenate([look.goal for look in self._looks], axis=1) * self._root
         self.norm2 = float(np.square(self._goal).sum())
+
+    @property
+    def channels(self) -> range:
+        """All channels of all looks; channel c is of the columns' channel c % 3."""
+        return range(self._root.shape[1])
 
     def replaced(self, changed: Mapping[int, Floats]) -> Floats:
         """Return the columns, those of some lights replaced by (p, 3)."""
         return with_columns(self.columns, changed)
 
     def fitted(self, columns: Floats) -> Fitted:
-        """Return the best weights for `columns`, under the constraints."""
-        equations = self._equations(columns)
-        x = np.zeros(len(self.reduction.unknowns))
-        for problem in reduced_problems(equations, self.reduction):
-            x[problem.unknowns] = minimise(
-                problem.M, problem.b, lower=problem.lower, upper=problem.upper, caps=problem.caps
-            ).x
-        weights = self.reduction.weights(x)
-        return Fitted(columns, weights, float(equations.objective(weights).sum()))
+        """Return the best weights for `columns`, under the constraints of each look."""
+        all_weights, missed = [], 0.0
+        for k, look in enumerate(self._looks):
+            equations, reduction = self._equations(columns, k), look.reduction
+            x = np.zeros(len(reduction.unknowns))
+            for problem in reduced_problems(equations, reduction):
+                x[problem.unknowns] = minimise(
+                    problem.M,
+                    problem.b,
+                    lower=problem.lower,
+                    upper=problem.upper,
+                    caps=problem.caps,
+                ).x
+            weights = reduction.weights(x)
+            all_weights.append(weights)
+            missed += float(equations.objective(weights).sum())
+        return Fitted(columns, np.concatenate(all_weights, axis=1), missed)
+
+    def picture(self, columns: Floats, weights: Doubles) -> Doubles:
+        """Return Σ w_i Φ_i in all channels, (p, c)."""
+        looks = [weights[:, 3 * k : 3 * k + 3] for k in range(len(self._looks))]
+        return np.concatenate([np.einsum("npc,nc->pc", columns, its) for its in looks], axis=1)
 
     def missed_map(self, columns: Floats, weights: Doubles) -> Doubles:
         """Return D r² of each pixel, (p,), with weights that were found on other paths."""
@@ -129,9 +141,9 @@ class PlacementFit:
     def ranking(self, fitted: Fitted) -> "Ranking":
         """Return what ranks candidates for the place of a light that is not in `fitted`."""
         others, inverses, columns = [], [], fitted.columns
-        for c in range(3):
-            free = self._free(fitted.weights[:, c])
-            its = (columns[free, :, c] * self._root[:, c]).astype(np.float32)
+        for c in self.channels:
+            free = self._free(fitted.weights, c)
+            its = (columns[free, :, c % 3] * self._root[:, c]).astype(np.float32)
             power = (its @ its.T).astype(np.float64)
             others.append(its)
             inverses.append(np.linalg.pinv(power, rcond=1e-8, hermitian=True).astype(np.float32))
@@ -149,15 +161,16 @@ class PlacementFit:
         residual = self._residual(fitted.columns, fitted.weights)
         count = max(numbers) + 1
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
-        for c in range(3):
+        for c in self.channels:
             root, weights = self._root[:, c], fitted.weights[:, c]
-            each = slopes[:, :, c] * (root * 1.0) * weights[list(owners)][:, None]
+            each = slopes[:, :, c % 3] * (root * 1.0) * weights[list(owners)][:, None]
             jacobian = np.zeros((count, each.shape[1]))
             for number, row in zip(numbers, each, strict=True):
                 jacobian[number] += row
             matrix += jacobian @ jacobian.T
             gradient += jacobian @ residual[:, c]
-            active = (fitted.columns[self._free(weights), :, c] * root).astype(np.float64)
+            free = self._free(fitted.weights, c)
+            active = (fitted.columns[free, :, c % 3] * root).astype(np.float64)
             if len(active):
                 cross = jacobian @ active.T
                 inverse = np.linalg.pinv(active @ active.T, rcond=1e-9, hermitian=True)
@@ -165,22 +178,24 @@ class PlacementFit:
                 gradient -= cross @ (inverse @ (active @ residual[:, c]))
         return matrix, gradient
 
-    def _free(self, weights: Doubles) -> Bools:
-        """Return which lights shine and may change, (n,)."""
-        free = weights > 0
-        free[[k for k, knob in enumerate(self.reduction.fixed_weights) if knob.any()]] = False
-        return free
+    def _free(self, weights: Doubles, c: int) -> Bools:
+        """Return which lights shine in a channel and may change, (n,)."""
+        free = weights[:, c] > 0
+        fixed = self._looks[c // 3].reduction.fixed_weights
+        free[[k for k, knob in enumerate(fixed) if knob.any()]] = False
+        return np.asarray(free)
 
     def _residual(self, columns: Floats, weights: Doubles) -> Doubles:
-        picture = np.einsum("npc,nc->pc", columns, weights)
-        return np.asarray(self._goal - picture * self._root)
+        return np.asarray(self._goal - self.picture(columns, weights) * self._root)
 
-    def _equations(self, columns: Floats) -> NormalEquations:
-        weighed = columns * self._root
+    def _equations(self, columns: Floats, k: int) -> NormalEquations:
+        """Return the equations of look k."""
+        root, goal = (its[:, 3 * k : 3 * k + 3] for its in (self._root, self._goal))
+        weighed, pull = columns * root, self._looks[k].pull
         M = np.einsum("ipc,jpc->cij", weighed, weighed, optimize=True)
-        b = np.einsum("ipc,pc->ci", weighed, self._goal)
-        equations = NormalEquations(M, b, np.square(self._goal).sum(axis=0))
-        return equations if self.pull is None else equations + self.pull
+        b = np.einsum("ipc,pc->ci", weighed, goal)
+        equations = NormalEquations(M, b, np.square(goal).sum(axis=0))
+        return equations if pull is None else equations + pull
 
 
 def with_columns(columns: Floats, changed: Mapping[int, Floats]) -> Floats:
@@ -193,90 +208,23 @@ def with_columns(columns: Floats, changed: Mapping[int, Floats]) -> Floats:
 
 def fit_of(
     bases: Sequence[Basis],
-    solution: Solution,
+    looks: Sequence[tuple[Solution, Sequence[int]]],
     sizes: Sequence[tuple[int, int]],
     new: Sequence[BasisLight] = (),
     constraints: Constraints | None = None,
 ) -> PlacementFit:
-    """Return the fit of the solution's last linear problem on small films, one of each view.
+    """Return the fit of the last linear problem of each look on small films, one of each view.
 
-    new: lights whose columns, behind those of the basis, are black as yet. constraints: on these
-    alone, besides those of the solution that are for all lights.
+    looks: solutions, and for each of their views its place among `bases`. new: lights whose
+    columns, behind those of the basis, are black as yet. constraints: on these alone, besides
+    those of the solutions that are for all lights.
     """
-    columns: list[Floats] = []
-    goals: list[Floats] = []
-    weights: list[Floats] = []
-    for k, (basis, size) in enumerate(zip(bases, sizes, strict=True)):
+    columns = []
+    for basis, size in zip(bases, sizes, strict=True):
         factor = basis.size[0] // size[0]
-        problem = solution.problem.view_problem(k)
-        goal, importance = reduced_goal(problem, factor)
         planes = np.stack([block_mean(plane, factor) for plane in basis.planes])
-        for listed, image in ((columns, planes), (goals, goal), (weights, importance)):
-            whole = np.broadcast_to(image, (*image.shape[:-1], 3))
-            listed.append(whole.reshape(*whole.shape[:-3], -1, 3))
-    black = np.zeros((len(new), sum(its.shape[1] for its in columns), 3), np.float32)
-    all_constraints = solution.problem.constraints.and_then(constraints or Constraints())
-    return PlacementFit(
-        np.concatenate([np.concatenate(columns, axis=1), black]),
-        np.concatenate(goals),
-        np.concatenate(weights),
-        _with_new_lights(solution.problem.local_reduction, new, all_constraints),
-        pull_with_more(solution, len(new)),
-    )
-
-
-def _with_new_lights(
-    reduction: Reduction, new: Sequence[BasisLight], constraints: Constraints
-) -> Reduction:
-    """Return `reduction` with the unknowns of new lights behind its own."""
-    if not new:
-        return reduction
-    lights = [
-        entry
-        for entry in constraints.lights
-        if any(light.name == entry[0] or fnmatchcase(light.name, entry[0]) for light in new)
-    ]
-    more = reduce_to(Constraints(tuple(lights)), new)
-    first = len(reduction.fixed_weights)
-    knobs = [
-        replace(
-            knob,
-            lights=tuple(k + first for k in knob.lights),
-            unknowns=tuple(
-                replace(x, columns=tuple((k + first, rgb) for k, rgb in x.columns))
-                for x in knob.unknowns
-            ),
-        )
-        for knob in more.knobs
-    ]
-    return replace(
-        reduction,
-        fixed_weights=np.vstack([reduction.fixed_weights, more.fixed_weights]),
-        labels=(*reduction.labels, *more.labels),
-        knobs=(*reduction.knobs, *knobs),
-    )
-
-
-def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
-    """Return the pull of the lights to their present emission, and none of `count` more."""
-    if (pull := solution.problem.pull) is None:
-        return None
-    coupling = pull.coupling
-    return NormalEquations(
-        np.pad(pull.M, ((0, 0), (0, count), (0, count))),
-        np.pad(pull.b, ((0, 0), (0, count))),
-        pull.target_norm2,
-        None if coupling is None else np.pad(coupling, ((0, count), (0, 0), (0, 0))),
-    )
-
-
-def reduced_goal(problem: Problem, factor: int) -> tuple[Floats, Floats]:
-    """Return the goal of a view and its importance on a film with a pixel for each block of pixels.
-
-    Goals are means weighted with importance; importance is that of whole blocks.
-    """
-    squares = problem.squares
-    importance = squares.weight.astype(np.float64)
-    weight = block_mean(importance, factor)
-    weighted = block_mean(squares.image * importance, factor)
-    return weighted / np.where(weight > 0, weight, 1), weight * factor**2
+        columns.append(planes.reshape(len(planes), -1, 3))
+    there = np.concatenate(columns, axis=1)
+    black = np.zeros((len(new), *there.shape[1:]), np.float32)
+    goals = [goal_of(solution, views, sizes, new, constraints) for solution, views in looks]
+    return PlacementFit(np.concatenate([there, black]), goals)

@@ -43,7 +43,7 @@ class Growth:
     """The best lighting with some of the new lights, and all moves.
 
     missed: the share of ‖Ψ‖² that it misses, on paths that no pose was fitted to. picture: (p, 3)
-    linear, of all views.
+    linear, of the first look, all views.
     """
 
     missed: float
@@ -145,7 +145,7 @@ class PlacementJudge:
             )
             weights = self._fit.fitted(fitted).weights
             missed = float(self._fit.missed_map(judged, weights).sum())
-            picture = np.einsum("npc,nc->pc", fitted, weights).astype(np.float32)
+            picture = self._fit.picture(fitted, weights)[:, :3].astype(np.float32)
             made.append(Growth(missed / (self._fit.norm2 or 1.0), picture))
         return made
 

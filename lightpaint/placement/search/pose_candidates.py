@@ -40,7 +40,7 @@ class PoseCandidates:
         self._weighed = [
             np.concatenate([its.residual[None, :, c], its.others[c]]).astype(np.float32)
             * self._root[:, c]
-            for c in range(3)
+            for c in range(self._root.shape[1])
         ]
 
     def gains(
@@ -79,8 +79,8 @@ class PoseCandidates:
 
     def _gains(self, added: Floats, shares: Floats | None) -> Doubles:
         """Return gains of what is added at first hits, (v, 3), by shares of it, (k, v)."""
-        inner = [self._weighed[c] * added[:, c] for c in range(3)]
-        power = np.square(added * self._root)
+        inner = [its * added[:, c % 3] for c, its in enumerate(self._weighed)]
+        power = np.square(np.tile(added, (1, len(inner) // 3)) * self._root)
         if shares is None:
             products, squares = np.concatenate(inner).sum(axis=1)[None], power.sum(axis=0)[None]
         else:
@@ -88,7 +88,7 @@ class PoseCandidates:
                 products = shares @ np.concatenate(inner).T
                 squares = np.square(shares) @ power
         gains, start = np.zeros(len(products)), 0
-        for c in range(3):
+        for c in range(len(inner)):
             its = products[:, start : start + len(inner[c])]
             start += len(inner[c])
             gains += self._ranking.gain(c, its[:, 0], its[:, 1:], squares[:, c])

@@ -17,7 +17,7 @@ from lightpaint.lighting.normal_equations import NormalEquations, inner_products
 from lightpaint.lighting.solution import Solution
 from lightpaint.lighting.unknowns.knobs import Knob
 from lightpaint.lighting.unknowns.reduction import Reduction
-from lightpaint.placement.placement_fit import pull_with_more, reduced_goal
+from lightpaint.placement.look_goals import pull_with_more, reduced_goal
 from lightpaint.threads import one_thread
 
 

@@ -1,0 +1,137 @@
+"""Goals of looks on small films, with their constraints, for lights that move."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.lights import BasisLight
+from lightpaint.images.pixel_blocks import block_mean
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.normal_equations import NormalEquations
+from lightpaint.lighting.problem import Problem
+from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.unknowns.constraint_reduction import reduce_to
+from lightpaint.lighting.unknowns.reduction import Reduction
+
+
+@dataclass(frozen=True)
+class LookGoal:
+    """A look that lights are to give.
+
+    goal: (p, 3); importance: (p, 3), >= 0. reduction: the unknowns that its constraints leave.
+    pull: what holds weights, beside the picture.
+    """
+
+    goal: Floats
+    importance: Floats
+    reduction: Reduction
+    pull: NormalEquations | None
+
+    @property
+    def norm2(self) -> float:
+        """‖Ψ‖²."""
+        return float((self.importance.astype(np.float64) * np.square(self.goal)).sum())
+
+    def scaled(self, factor: float) -> "LookGoal":
+        """Return the goal with its loss multiplied by a factor."""
+        pull = None if self.pull is None else self.pull.scaled(factor)
+        return replace(self, importance=self.importance * factor, pull=pull)
+
+
+def goal_of(
+    solution: Solution,
+    views: Sequence[int],
+    sizes: Sequence[tuple[int, int]],
+    new: Sequence[BasisLight],
+    constraints: Constraints | None,
+) -> LookGoal:
+    """Return the goal of a look on the pixels of all views, with importance in its own alone.
+
+    views: the place of each of the look's views among all. sizes: of the small films. new,
+    constraints: see `fit_of`.
+    """
+    images: list[Floats] = [np.zeros((height * width, 3)) for height, width in sizes]
+    weights: list[Floats] = [np.zeros_like(its) for its in images]
+    for k, view in enumerate(views):
+        problem = solution.problem.view_problem(k)
+        reduced = reduced_goal(problem, problem.basis.size[0] // sizes[view][0])
+        for listed, image in zip((images, weights), reduced, strict=True):
+            whole = np.broadcast_to(image, (*image.shape[:-1], 3))
+            listed[view] = whole.reshape(-1, 3)
+    all_constraints = solution.problem.constraints.and_then(constraints or Constraints())
+    return LookGoal(
+        np.concatenate(images),
+        np.concatenate(weights),
+        _with_new_lights(solution.problem.local_reduction, new, all_constraints),
+        pull_with_more(solution, len(new)),
+    )
+
+
+def balanced(goals: Sequence[LookGoal]) -> list[LookGoal]:
+    """Return goals that count the same: scaled to the mean ‖Ψ‖² of all."""
+    norms = [look.norm2 for look in goals]
+    mean = sum(norms) / len(norms)
+    return [
+        look if len(goals) == 1 or norm2 == 0 else look.scaled(mean / norm2)
+        for look, norm2 in zip(goals, norms, strict=True)
+    ]
+
+
+def _with_new_lights(
+    reduction: Reduction, new: Sequence[BasisLight], constraints: Constraints
+) -> Reduction:
+    """Return `reduction` with the unknowns of new lights behind its own."""
+    if not new:
+        return reduction
+    lights = [
+        entry
+        for entry in constraints.lights
+        if any(light.name == entry[0] or fnmatchcase(light.name, entry[0]) for light in new)
+    ]
+    more = reduce_to(Constraints(tuple(lights)), new)
+    first = len(reduction.fixed_weights)
+    knobs = [
+        replace(
+            knob,
+            lights=tuple(k + first for k in knob.lights),
+            unknowns=tuple(
+                replace(x, columns=tuple((k + first, rgb) for k, rgb in x.columns))
+                for x in knob.unknowns
+            ),
+        )
+        for knob in more.knobs
+    ]
+    return replace(
+        reduction,
+        fixed_weights=np.vstack([reduction.fixed_weights, more.fixed_weights]),
+        labels=(*reduction.labels, *more.labels),
+        knobs=(*reduction.knobs, *knobs),
+    )
+
+
+def pull_with_more(solution: Solution, count: int) -> NormalEquations | None:
+    """Return the pull of the lights to their present emission, and none of `count` more."""
+    if (pull := solution.problem.pull) is None:
+        return None
+    coupling = pull.coupling
+    return NormalEquations(
+        np.pad(pull.M, ((0, 0), (0, count), (0, count))),
+        np.pad(pull.b, ((0, 0), (0, count))),
+        pull.target_norm2,
+        None if coupling is None else np.pad(coupling, ((0, count), (0, 0), (0, 0))),
+    )
+
+
+def reduced_goal(problem: Problem, factor: int) -> tuple[Floats, Floats]:
+    """Return the goal of a view and its importance on a film with a pixel for each block of pixels.
+
+    Goals are means weighted with importance; importance is that of whole blocks.
+    """
+    squares = problem.squares
+    importance = squares.weight.astype(np.float64)
+    weight = block_mean(importance, factor)
+    weighted = block_mean(squares.image * importance, factor)
+    return weighted / np.where(weight > 0, weight, 1), weight * factor**2
