@@ -76,13 +76,13 @@ def round_to_halves(values: Floats) -> npt.NDArray[np.float16]:
     is.
     """
     flat = np.ascontiguousarray(values, np.float32).reshape(-1)
-    made = np.empty(flat.shape, np.float16)
+    rounded = np.empty(flat.shape, np.float16)
     for start in range(0, flat.size, _CACHED_NUMBERS):
         part = slice(start, start + _CACHED_NUMBERS)
         size = flat[part].view(np.uint32) & _MAGNITUDE
         bits = np.where(size > _INFINITY, _HALF_NAN, _half_bits(size))
-        made[part].view(np.uint16)[...] = bits | _half_signs(flat[part])
-    return made.reshape(values.shape)
+        rounded[part].view(np.uint16)[...] = bits | _half_signs(flat[part])
+    return rounded.reshape(values.shape)
 
 
 def _half_bits(size: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:

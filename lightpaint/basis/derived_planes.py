@@ -61,14 +61,14 @@ class ComposedPlanes(RowPlanes):
     def rows(self, top: int, bottom: int) -> Floats:
         """Return some rows of all planes, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self._size[0])
-        made = np.zeros((self.count, max(bottom - top, 0), self._size[1], 3), np.float32)
+        composed = np.zeros((self.count, max(bottom - top, 0), self._size[1], 3), np.float32)
         sources = {id(pick[0]): pick[0] for pick in self._picks if pick is not None}
         for key, source in sources.items():
             rows = source.rows(top, bottom)
             for i, pick in enumerate(self._picks):
                 if pick is not None and id(pick[0]) == key:
-                    made[i] = rows[pick[1]]
-        return made
+                    composed[i] = rows[pick[1]]
+        return composed
 
 
 def block_means(planes: Planes, weight: Doubles, side: int) -> Planes:
@@ -77,12 +77,12 @@ def block_means(planes: Planes, weight: Doubles, side: int) -> Planes:
     weight: (h, w), >= 0, of pixels from the top left corner on; others belong to no block. Where a
     block has no weight its mean is 0. Remainders at the right and at the bottom form smaller ones.
     """
-    made = BlockPlanes(planes, weight, side)
+    means = BlockPlanes(planes, weight, side)
     if not isinstance(planes, RowPlanes):
-        return MemoryPlanes(np.stack(list(made)))
-    height, width = made.size
-    is_small = 12 * made.count * height * width <= file_planes.PICKED_MAX_BYTES
-    return MemoryPlanes(made.array()) if is_small else made
+        return MemoryPlanes(np.stack(list(means)))
+    height, width = means.size
+    is_small = 12 * means.count * height * width <= file_planes.PICKED_MAX_BYTES
+    return MemoryPlanes(means.array()) if is_small else means
 
 
 class BlockPlanes(RowPlanes):
@@ -110,25 +110,25 @@ class BlockPlanes(RowPlanes):
     def rows(self, top: int, bottom: int) -> Floats:
         """Return some rows of all planes, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self.size[0])
-        made = np.empty((self.count, max(bottom - top, 0), self.size[1], 3), np.float32)
+        blocks = np.empty((self.count, max(bottom - top, 0), self.size[1], 3), np.float32)
         step = max(1, READ_ROWS // self._side)
         for first in range(top, bottom, step):
             end = min(first + step, bottom)
             lit = self._whole.rows(first * self._side, end * self._side)
-            for means, its in zip(made, lit, strict=True):
-                means[first - top : end - top] = self._means(its, first, end)
-        return made
+            for means, plane in zip(blocks, lit, strict=True):
+                means[first - top : end - top] = self._means(plane, first, end)
+        return blocks
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some blocks of all planes, (n, p, 3): of a few, from their own pixels alone."""
         if isinstance(where, slice) or SPARSE * len(where) > np.ptp(where) + 1:
             return super().pixels(where)
-        made = np.empty((self.count, len(where), 3), np.float32)
+        means = np.empty((self.count, len(where), 3), np.float32)
         step = max(1, BLOCK_PIXELS // self._side**2)
         for first in range(0, len(where), step):
             part = slice(first, first + step)
-            made[:, part] = self._picked_means(where[part])
-        return made
+            means[:, part] = self._picked_means(where[part])
+        return means
 
     def _picked_means(self, blocks: Indices) -> npt.NDArray[np.float32]:
         """Return the means of some blocks, (n, p, 3)."""
@@ -140,12 +140,14 @@ class BlockPlanes(RowPlanes):
             side * rows[:, None] + along[:, None, None], side * columns[:, None] + along
         )
         is_inside = ((y < height) & (x < width)).reshape(side, -1)
-        y, x = (np.minimum(its, n - 1).reshape(side, -1) for its, n in ((y, height), (x, width)))
+        y, x = (
+            np.minimum(values, n - 1).reshape(side, -1) for values, n in ((y, height), (x, width))
+        )
         weight = (self._weight[y, x] * is_inside)[..., None]
         lit = self._whole.pixels((y * self._whole.size[1] + x).ravel())
         total = self._total.reshape(-1, 1)[blocks]
-        sums = (block_sums(its.reshape(side, -1, 3) * weight, side)[0] for its in lit)
-        return np.array([its / total for its in sums], np.float32)
+        sums = (block_sums(values.reshape(side, -1, 3) * weight, side)[0] for values in lit)
+        return np.array([values / total for values in sums], np.float32)
 
     def _means(self, lit: Floats, top: int, bottom: int) -> npt.NDArray[np.float32]:
         """Return some rows of means of a plane's pixels, which begin with the first of them."""
@@ -194,19 +196,19 @@ class JoinedRow(RowPlanes):
         if isinstance(where, slice):
             start, stop, step = where.indices(self.size[1])
             if step == 1 and start < stop:
-                found = [
+                pieces = [
                     part.pixels(slice(max(start - first, 0), min(stop, end) - first))
                     for part, (first, end) in zip(self._parts, pairwise(self._ends), strict=True)
                     if start < end and first < stop
                 ]
-                return found[0] if len(found) == 1 else np.concatenate(found, axis=1)
+                return pieces[0] if len(pieces) == 1 else np.concatenate(pieces, axis=1)
             where = np.arange(start, stop, step)
-        made = np.empty((3, self.count, len(where)), np.float32).transpose(1, 2, 0)
+        joined = np.empty((3, self.count, len(where)), np.float32).transpose(1, 2, 0)
         of_part = np.searchsorted(self._ends, where, side="right") - 1
         for k in np.unique(of_part):
-            its = np.flatnonzero(of_part == k)
-            made[:, its] = self._parts[int(k)].pixels(where[its] - self._ends[k])
-        return made
+            in_part = np.flatnonzero(of_part == k)
+            joined[:, in_part] = self._parts[int(k)].pixels(where[in_part] - self._ends[k])
+        return joined
 
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (1, p, 3)."""

@@ -71,16 +71,16 @@ class BasisLight:
 class Lights(Sequence[BasisLight]):
     """The ordered table of lights: their order is the order of weights, planes and sums.
 
-    each: the lights. requests: The constraints that the lights file of their scene asks for;
-    of memory only, since that file may change.
+    records: the record of each light. requests: the constraints that the lights file of their scene
+    asks for; of memory only, since that file may change.
     """
 
-    each: tuple[BasisLight, ...]
+    records: tuple[BasisLight, ...]
     requests: SceneRequests = field(default_factory=SceneRequests)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "each", Listed(self.each))
-        if len(set(self.names)) != len(self.each):
+        object.__setattr__(self, "records", Listed(self.records))
+        if len(set(self.names)) != len(self.records):
             raise BasisError(f"light names repeat: {some_names(self.names)}")
 
     @classmethod
@@ -89,20 +89,20 @@ class Lights(Sequence[BasisLight]):
         return lights if isinstance(lights, Lights) else cls(tuple(lights))
 
     def __repr__(self) -> str:
-        return repr(self.each)
+        return repr(self.records)
 
     def __len__(self) -> int:
-        return len(self.each)
+        return len(self.records)
 
     def __iter__(self) -> Iterator[BasisLight]:
-        return iter(self.each)
+        return iter(self.records)
 
     @overload
     def __getitem__(self, k: int) -> BasisLight: ...
     @overload
     def __getitem__(self, k: slice) -> tuple[BasisLight, ...]: ...
     def __getitem__(self, k: int | slice) -> BasisLight | tuple[BasisLight, ...]:
-        return self.each[k]
+        return self.records[k]
 
     def with_requests(self, requests: SceneRequests) -> "Lights":
         """Return these lights with these requests."""
@@ -110,28 +110,28 @@ class Lights(Sequence[BasisLight]):
 
     def identity(self, i: int) -> str:
         """Return the identity of plane i; "" where that is not known."""
-        return self.each[i].identity
+        return self.records[i].identity
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Their names."""
-        return tuple(light.name for light in self.each)
+        return tuple(light.name for light in self.records)
 
     @cached_property
     def present_weights(self) -> Doubles:
         """(n, 3) weights of the scene as it is."""
-        emission = [light.emission for light in self.each]
+        emission = [light.emission for light in self.records]
         return read_only(np.array(emission, dtype=np.float64).reshape(-1, 3))
 
     @cached_property
     def is_fixed(self) -> Bools:
         """(n,), which lights stay as they are, with weight 1."""
-        return read_only(np.array([light.is_fixed for light in self.each], dtype=bool))
+        return read_only(np.array([light.is_fixed for light in self.records], dtype=bool))
 
     @cached_property
     def is_scalar(self) -> Bools:
         """(n,), which lights have one weight for all channels."""
-        return read_only(np.array([light.is_scalar for light in self.each], dtype=bool))
+        return read_only(np.array([light.is_scalar for light in self.records], dtype=bool))
 
 
 def free_name(name: str, used: Collection[str]) -> str:

@@ -101,11 +101,11 @@ class PlanesBase:
 
     def squares(self) -> Doubles:
         """Return Σ Φ² of all pixels and channels, (n,)."""
-        made, pixels = np.zeros(self.count), self.size[0] * self.size[1]
+        totals, pixels = np.zeros(self.count), self.size[0] * self.size[1]
         for start in range(0, pixels, BLOCK_PIXELS):
             block = self.pixels(slice(start, start + BLOCK_PIXELS)).astype(np.float64)
-            made += np.einsum("npc,npc->n", block, block)
-        return made
+            totals += np.einsum("npc,npc->n", block, block)
+        return totals
 
     def sums(self, weight: Floats, image: Floats) -> tuple[Doubles, Doubles, Doubles]:
         """Return M (3, n, n), b (3, n) and ‖Ψ‖² (3,), in one walk over the pixels that count."""
@@ -125,9 +125,9 @@ class PlanesBase:
                 # (n + 1, block): the target goes along as one more row.
                 block = room[:, : len(painted)]
                 for c in range(3):
-                    its = root[:, c * apart]
-                    np.multiply(lit[..., c], its, out=block[:n])
-                    np.multiply(painted[:, c], its, out=block[n])
+                    channel_root = root[:, c * apart]
+                    np.multiply(lit[..., c], channel_root, out=block[:n])
+                    np.multiply(painted[:, c], channel_root, out=block[n])
                     gram[c] += block @ block.T
         return gram[:, :n, :n], gram[:, :n, n], gram[:, n, n]
 
@@ -180,9 +180,9 @@ class MemoryPlanes(PlanesBase):
         return self._images
 
 
-def as_planes(given: Planes | Floats) -> Planes:
+def as_planes(planes: Planes | Floats) -> Planes:
     """Return planes as they are, and an array (n, h, w, 3) as planes in memory."""
-    return MemoryPlanes(given) if isinstance(given, np.ndarray) else given
+    return MemoryPlanes(planes) if isinstance(planes, np.ndarray) else planes
 
 
 def joined_planes(
@@ -193,15 +193,15 @@ def joined_planes(
     Pixels lie behind each other along the rows, and the last row is filled with zeros. The parts
     that are returned look at the memory of the joint planes.
     """
-    ends = np.cumsum([0, *(its.size[0] * its.size[1] for its in parts)])
+    ends = np.cumsum([0, *(part.size[0] * part.size[1] for part in parts)])
     n, rows = parts[0].count, -(-int(ends[-1]) // width)
     joint = np.zeros((n, rows * width, 3), np.float32)
-    made = []
-    for its, (start, end) in zip(parts, pairwise(ends), strict=True):
-        for plane, image in zip(joint[:, start:end], its, strict=True):
+    views = []
+    for part, (start, end) in zip(parts, pairwise(ends), strict=True):
+        for plane, image in zip(joint[:, start:end], part, strict=True):
             plane[...] = image.reshape(-1, 3)
-        made.append(MemoryPlanes(joint[:, start:end].reshape(n, *its.size, 3)))
-    return MemoryPlanes(joint.reshape(n, rows, width, 3)), tuple(made)
+        views.append(MemoryPlanes(joint[:, start:end].reshape(n, *part.size, 3)))
+    return MemoryPlanes(joint.reshape(n, rows, width, 3)), tuple(views)
 
 
 def power_and_totals(planes: Planes, counted: Bools) -> tuple[Doubles, Doubles]:

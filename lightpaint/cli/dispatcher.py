@@ -64,8 +64,8 @@ def run_command(arguments: Sequence[str] | None, received: Sequence[int]) -> int
         warnings.simplefilter("ignore", SlowBackendWarning)
         with using_output_mode(OutputMode(options.as_json, options.is_quiet, options.is_verbose)):
             outcome = command(**values_of(options, words))
-            if options.as_json and outcome.told is not None:
-                terminal.write_json(outcome.told())
+            if options.as_json and outcome.document is not None:
+                terminal.write_json(outcome.document())
             terminal.note("done")
         return outcome.code
     except KeyboardInterrupt as interrupt:

@@ -25,9 +25,9 @@ PACKAGES = ("mitsuba", "drjit", "numpy", "OpenEXR", "OpenImageIO", "pillow", "co
 class Finding:
     """The result of one check. remedy: the command to run if something is missing."""
 
-    what: str
+    subject: str
     state: State
-    found: str
+    result: str
     remedy: str = ""
 
 
@@ -66,19 +66,19 @@ def _package(name: str) -> Finding:
         return Finding(name, "missing", "not installed", f"pip install {name}")
 
 
-def _extra(what: str, package: str, extra: str) -> Finding:
+def _extra(purpose: str, package: str, extra: str) -> Finding:
     """Return the finding of an optional package."""
     version = _package(package)
     if version.state == "ok":
-        return Finding(what, "ok", version.found)
-    return Finding(what, "info", f"not installed, optional: pip install 'lightpaint[{extra}]'")
+        return Finding(purpose, "ok", version.result)
+    return Finding(purpose, "info", f"not installed, optional: pip install 'lightpaint[{extra}]'")
 
 
 def _denoiser() -> Finding:
     """Return the finding of the denoiser, which is optional."""
     version = _package("pyoidn")
     if version.state == "ok":
-        return Finding("denoiser", "ok", f"Open Image Denoise (pyoidn {version.found})")
+        return Finding("denoiser", "ok", f"Open Image Denoise (pyoidn {version.result})")
     return Finding("denoiser", "info", "simpler filters; a better one: pip install pyoidn")
 
 

@@ -50,13 +50,13 @@ class SurfaceFilter:
 
     def __call__(self, image: Floats) -> Floats:
         """Return a picture that is filtered, (h, w, 3) float32."""
-        made = np.empty((*self.size, 3), np.float32)
+        filtered = np.empty((*self.size, 3), np.float32)
 
         def fill(band: "_Band") -> None:
-            made[band.top : band.bottom] = self._filtered(band, image)
+            filtered[band.top : band.bottom] = self._filtered(band, image)
 
-        parallel_map(fill, self._kept if self.is_quick else self._bands())
-        return made
+        parallel_map(fill, self._weighed_bands if self.is_quick else self._bands())
+        return filtered
 
     @property
     def is_quick(self) -> bool:
@@ -64,7 +64,7 @@ class SurfaceFilter:
         return self.size[0] * self.size[1] <= KEPT_PIXELS
 
     @cached_property
-    def _kept(self) -> "list[_Band]":
+    def _weighed_bands(self) -> "list[_Band]":
         return self._bands(weighed=True)
 
     def _bands(self, *, weighed: bool = False) -> "list[_Band]":
@@ -117,23 +117,23 @@ class _Band:
             for x in (of._position, of._normal, of._per_width[None])
         )
         height, width = r + self.bottom - self.top, of.size[1] + 2 * r
-        made = np.zeros((len(self._offsets), height, width), np.float32)
-        for weight, (dy, dx) in zip(made, self._offsets, strict=True):
+        weights = np.zeros((len(self._offsets), height, width), np.float32)
+        for weight, (dy, dx) in zip(weights, self._offsets, strict=True):
             left, right = max(-dx, 0), width - max(dx, 0)
-            one = np.s_[:, :height, left:right]
+            part = np.s_[:, :height, left:right]
             other = np.s_[:, dy : dy + height, left + dx : right + dx]
-            between = position[other] - position[one]
-            off = np.abs((between * normal[one]).sum(axis=0))
+            between = position[other] - position[part]
+            off = np.abs((between * normal[part]).sum(axis=0))
             off += np.abs((between * normal[other]).sum(axis=0))
-            off *= (per_width[one][0] + per_width[other][0]) / 2
-            cosine = np.clip((normal[one] * normal[other]).sum(axis=0), 0, 1)
+            off *= (per_width[part][0] + per_width[other][0]) / 2
+            cosine = np.clip((normal[part] * normal[other]).sum(axis=0), 0, 1)
             for _ in range(SQUARINGS):
                 cosine *= cosine
             apart = float(np.hypot(dy, dx))
             near = np.float32(1 / (NEAR_PLANE * (1 + BEND * apart)))
             weight[:, left:right] = cosine * np.exp(-off * near)
             weight *= np.float32(np.exp(-2 * (apart / r) ** 2))
-        return made
+        return weights
 
     @cached_property
     def total(self) -> Floats:
@@ -155,8 +155,8 @@ class _Band:
         def shifted(planes: Floats, dy: int, dx: int) -> Floats:
             return planes[..., r + dy : r + dy + rows, r + dx : r + dx + columns]
 
-        made = shifted(light, 0, 0).copy()
-        weighed = np.empty_like(made)
+        total = shifted(light, 0, 0).copy()
+        weighed = np.empty_like(total)
         for weight, (dy, dx) in zip(self.weights, self._offsets, strict=True):
             # A pair adds to both of its ends.
             for (y, x), (neighbour_y, neighbour_x) in (
@@ -166,8 +166,8 @@ class _Band:
                 np.multiply(
                     shifted(weight, y, x), shifted(light, neighbour_y, neighbour_x), out=weighed
                 )
-                made += weighed
-        return made
+                total += weighed
+        return total
 
 
 def _planar(image: Floats) -> Floats:
@@ -182,11 +182,11 @@ def _pixels_per_length(position: Floats, is_seen: Bools) -> Floats:
     neighbours, there and in the eight pixels around: where an object ends, the nearer one decides.
     """
     length = np.full(is_seen.shape, np.inf, np.float32)
-    for one, other in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
-        between = position[:, *one] - position[:, *other]
+    for pixel, neighbour in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
+        between = position[:, *pixel] - position[:, *neighbour]
         step = np.sqrt(np.square(between).sum(axis=0))
-        step[~(is_seen[one] & is_seen[other])] = np.inf
-        for end in (one, other):
+        step[~(is_seen[pixel] & is_seen[neighbour])] = np.inf
+        for end in (pixel, neighbour):
             np.minimum(length[end], step, out=length[end])
     height, width = is_seen.shape[0], is_seen.shape[1]
     framed = np.pad(length, 1, constant_values=np.inf)

@@ -95,7 +95,7 @@ def make_answer(
         hold=problem.fit.hold or 0.0,
         colors=problem.fit.colors or "free",
         noise_removed=problem.noise_removed,
-        software=Software.here(),
+        software=Software.installed(),
         basis_spp=problem.spp,
     ).with_objective(problem.objective(weights), problem.norm2)
     labels_and_effects = _labels_and_effects(problem, equations, optimum.weights)

@@ -129,9 +129,9 @@ def aims_of(state: Certainty) -> Doubles:
     counts most.
     """
     basis, weights = state.solution.basis, state.solution.weights
-    made = (basis.totals * weights) @ LUMINANCE
-    scale = state.errors / np.maximum(made, LEAST_SHARE * made.sum())
-    n = len(made)
+    brightness = (basis.totals * weights) @ LUMINANCE
+    scale = state.errors / np.maximum(brightness, LEAST_SHARE * brightness.sum())
+    n = len(brightness)
     aims = np.zeros((n, 3, n))
     aims[np.arange(n), :, np.arange(n)] = basis.totals * LUMINANCE * scale[:, None]
     return aims.reshape(n, -1)
@@ -148,11 +148,11 @@ def needed_counts(state: Certainty, bases: Sequence[Basis], error: float) -> lis
     ]
     variance = np.concatenate([x.variance.ravel() for x in its])
     density = np.concatenate([x.density.ravel() for x in its])
-    there = np.concatenate([x.ravel() for x in have])
+    existing = np.concatenate([x.ravel() for x in have])
     goal = AIM * (error / state.error) ** 2 * variance.sum()
     for size in ROUND_SIZES:
-        counts = top_up_counts(density, there, size * there.sum())
-        if (variance * there / (there + counts)).sum() <= goal:
+        counts = top_up_counts(density, existing, size * existing.sum())
+        if (variance * existing / (existing + counts)).sum() <= goal:
             break
     ends = np.cumsum([x.size for x in have])[:-1]
     parts = zip(np.split(counts, ends), bases, strict=True)
@@ -175,7 +175,7 @@ def _topped_up(
 ) -> list[Basis]:
     """Return the bases with a round of samples where they are needed."""
     assert job.settings.error is not None
-    made = []
+    refined = []
     for view, basis, counts in zip(
         job.views, bases, needed_counts(state, bases, job.settings.error), strict=True
     ):
@@ -189,13 +189,13 @@ def _topped_up(
             is_enough=is_over,
             tracers=tracers,
         )
-        made.append(replace(topped, former=basis.former))
-    return made
+        refined.append(replace(topped, former=basis.former))
+    return refined
 
 
 def _doubled(job: Job, bases: Sequence[Basis], listen: Listener) -> list[Basis]:
     """Return the bases with twice as many samples in all pixels, where lights render alone."""
-    made = []
+    doubled_bases = []
     for view, basis in zip(job.views, bases, strict=True):
         assert view.scene is not None
         spp = 2 * max(PILOT_SPP, basis.origin.spp)
@@ -206,5 +206,5 @@ def _doubled(job: Job, bases: Sequence[Basis], listen: Listener) -> list[Basis]:
             use_cache=job.settings.use_cache,
             progress=view_listener(job, view, listen),
         )
-        made.append(replace(doubled, former=basis.former))
-    return made
+        doubled_bases.append(replace(doubled, former=basis.former))
+    return doubled_bases

@@ -76,8 +76,8 @@ class Changes:
         return child
 
     def _title(self) -> str:
-        given = self.element.attributes
-        id_or_name = given.get("id") or given.get("name") or given.get("type", "")
+        attributes = self.element.attributes
+        id_or_name = attributes.get("id") or attributes.get("name") or attributes.get("type", "")
         return f"<{self.element.tag}> {id_or_name!r}"
 
     def finish(self) -> None:

@@ -135,7 +135,7 @@ def _writer_of(
 
     def overrides() -> str:
         comment = f"lightpaint: the lights of {name} as solved for {lighting.target}"
-        made = usd_overrides(
+        overridden = usd_overrides(
             emitters,
             source.stage,
             folder,
@@ -144,16 +144,16 @@ def _writer_of(
             about=comment,
         )
         stage_name = source.stage or "USD"
-        if made.left:
+        if overridden.left:
             listen.say(
-                f"no one light of {stage_name} takes {some_names(made.left)}: set it by hand"
+                f"no one light of {stage_name} takes {some_names(overridden.left)}: set it by hand"
             )
-        if made.unplaced:
+        if overridden.unplaced:
             listen.say(
-                f"{stage_name} has {some_names(made.unplaced)} elsewhere than the scene, or as a "
-                "mesh: place it by hand"
+                f"{stage_name} has {some_names(overridden.unplaced)} elsewhere than the scene, or "
+                "as a mesh: place it by hand"
             )
-        return made.text
+        return overridden.text
 
     return overrides
 

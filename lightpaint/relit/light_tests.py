@@ -78,13 +78,13 @@ def light_tests(
     floor = block_sums(round_off.mean(axis=-1) + TINY)
     floor = floor[..., None, None] * np.eye(3)
     first, second = difference + half, difference - half
-    scatter = [_scatter(its) + floor for its in (first, second)]
-    counts = [_pixels_that_count(its) for its in (first, second)]
-    inverses = [np.linalg.inv(_smooth(its)) for its in scatter]
+    scatter = [_scatter(half_sums) + floor for half_sums in (first, second)]
+    counts = [_pixels_that_count(half_sums) for half_sums in (first, second)]
+    inverses = [np.linalg.inv(_smooth(x)) for x in scatter]
     sums = block_sums(first), block_sums(second)
-    found = []
-    for its, its_half in zip(blocks.astype(np.float64), half_differences, strict=True):
-        lit = its + its_half, its - its_half
+    tests = []
+    for light_blocks, its_half in zip(blocks.astype(np.float64), half_differences, strict=True):
+        lit = light_blocks + its_half, light_blocks - its_half
         # Each half's weights, and with them what the other half has.
         a = [_times(x, light) for x, light in zip(inverses, lit, strict=True)]
         x, y = _dot(a[0], sums[1]), _dot(a[1], sums[0])
@@ -100,8 +100,8 @@ def light_tests(
         z = np.copysign(np.sqrt(rare), t) * (8 * freedom + 1) / (8 * freedom + 3)
         sensitivity = float((x_signal + y_signal).sum()) / variance**0.5
         overlap = 2 * float((x_signal * y_signal).sum()) / variance
-        found.append((z, sensitivity, overlap, freedom))
-    return LightTests(*np.reshape(np.array(found, np.float64), (-1, 4)).T)
+        tests.append((z, sensitivity, overlap, freedom))
+    return LightTests(*np.reshape(np.array(tests, np.float64), (-1, 4)).T)
 
 
 def _pixels_that_count(values: Floats) -> Doubles:

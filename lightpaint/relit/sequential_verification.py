@@ -89,8 +89,8 @@ def stages_of(spp: int, block_pixels: int = 1) -> list[int]:
     Both halves have equal ones, in multiples of `block_pixels`.
     """
     step = 2 * block_pixels
-    each = [spp * part // ALL_PARTS for part in LOOKS]
-    looks = {max(samples // step * step, step) for samples in each if samples >= FIRST_LOOK}
+    stages = [spp * part // ALL_PARTS for part in LOOKS]
+    looks = {max(samples // step * step, step) for samples in stages if samples >= FIRST_LOOK}
     return [*sorted(samples for samples in looks if samples < spp), spp]
 
 

@@ -123,9 +123,9 @@ def picture_errors(basis: Basis, uncertainty: Uncertainty) -> Doubles:
     low, high = uncertainty.interval
     side = np.maximum(uncertainty.weights - low, high - uncertainty.weights)
     side = np.where(np.isfinite(side), side, 0)
-    error, made = ((basis.totals * x) @ LUMINANCE for x in (side, uncertainty.weights))
-    whole = made.sum()
-    return np.asarray(error / np.maximum(made, LEAST_SHARE * whole) if whole > 0 else 0 * error)
+    error, lit = ((basis.totals * x) @ LUMINANCE for x in (side, uncertainty.weights))
+    whole = lit.sum()
+    return np.asarray(error / np.maximum(lit, LEAST_SHARE * whole) if whole > 0 else 0 * error)
 
 
 def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -> int | None:

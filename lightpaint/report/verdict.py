@@ -164,7 +164,7 @@ def spoken_reason(appearance: Appearance) -> str:
 
 def spoken_holding(reason: Reason) -> str:
     """Return a reason that keeps the lights from the paint: `annex_window is switched off`."""
-    one, several = REASON_CLAUSES[reason.kind]
+    singular, plural = REASON_CLAUSES[reason.kind]
     if len(reason.names) > MAX_NAMES and reason.kind == "views":
         return "other views ask for different light"
     if len(reason.names) > MAX_NAMES:
@@ -172,7 +172,7 @@ def spoken_holding(reason: Reason) -> str:
     else:
         *most, last = [some_names([name]) for name in reason.names] or [""]
         lights = f"{', '.join(most)} and {last}" if most else last
-    return (one if len(reason.names) == 1 else several).format(lights)
+    return (singular if len(reason.names) == 1 else plural).format(lights)
 
 
 def spoken_noise(appearance: Appearance) -> str:

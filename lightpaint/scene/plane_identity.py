@@ -67,8 +67,8 @@ class SceneHasher:
         ]
         passes = has_null or parsed.has_media()
         # Views share no random numbers, and go by their index.
-        about = (mi.__version__, film.sensor, has_environment and passes, children)
-        return _digest(about)
+        facts = (mi.__version__, film.sensor, has_environment and passes, children)
+        return _digest(facts)
 
     def emitter(self, node: int, kind: EmissionKind | None) -> EmitterDigest:
         """Return the hashes of the emitter at `node`, which is scaled by `kind`."""
@@ -94,8 +94,8 @@ class SceneHasher:
     def _content(self, node: int, left_out: frozenset[str] = frozenset()) -> str:
         import mitsuba as mi
 
-        its, props = self._nodes[node], self._nodes[node].props
-        kinds, found = mi.Properties.Type, []
+        tree_node, props = self._nodes[node], self._nodes[node].props
+        kinds, parts = mi.Properties.Type, []
         # A basis has a box filter, and samples of its own.
         replaced = (mi.ObjectType.Sampler, mi.ObjectType.ReconstructionFilter)
         for key in props:
@@ -111,10 +111,10 @@ class SceneHasher:
                 value = self._file(str(props[key]))
             else:
                 value = self._value(kind, props[key])
-            found.append((_MADE_UP.sub("", key), str(kind), value))
+            parts.append((_MADE_UP.sub("", key), str(kind), value))
         # Parameters may stand in any order, but for children without a name.
-        found.sort(key=lambda entry: entry[0])
-        return _digest((str(its.type), props.plugin_name(), found))
+        parts.sort(key=lambda entry: entry[0])
+        return _digest((str(tree_node.type), props.plugin_name(), parts))
 
     def _value(self, kind: Any, value: Any) -> Any:
         """Return what a property holds, as plain values in full precision."""
@@ -155,5 +155,5 @@ def combined_identity(unlit_content: str, *own: object) -> str:
     return _digest((unlit_content, *own))
 
 
-def _digest(about: object) -> str:
-    return hashlib.sha256(repr(about).encode()).hexdigest()[:32]
+def _digest(content: object) -> str:
+    return hashlib.sha256(repr(content).encode()).hexdigest()[:32]

@@ -99,8 +99,8 @@ class Scene(Shown):
 
     def __repr__(self) -> str:
         (height, width), names = self.size, [light.name for light in self.lights]
-        about = f"{len(names)} lights, {width}x{height} through {self.sensor_names[self.sensor]}"
-        return f"Scene({self.path}, {about}: {some_of(names, room=400)})"
+        summary = f"{len(names)} lights, {width}x{height} through {self.sensor_names[self.sensor]}"
+        return f"Scene({self.path}, {summary}: {some_of(names, room=400)})"
 
     @property
     def identity(self) -> str:
@@ -129,15 +129,15 @@ class Scene(Shown):
         members: name of a light → names of its emitters; fixed: lights that stay as they are.
         Raises SceneError unless every emitter of the scene, and no other, is named once.
         """
-        given = [name for names in members.values() for name in names]
-        there = {emitter.name for emitter in self.emitters}
-        if set(given) != there:
+        grouped = [name for names in members.values() for name in names]
+        existing = {emitter.name for emitter in self.emitters}
+        if set(grouped) != existing:
             raise SceneError(
                 f"{self.path} has other emitters than are asked for: it lacks "
-                f"{some_names(sorted(set(given) - there)) or 'none'} and also has "
-                f"{some_names(sorted(there - set(given))) or 'none'}"
+                f"{some_names(sorted(set(grouped) - existing)) or 'none'} and also has "
+                f"{some_names(sorted(existing - set(grouped))) or 'none'}"
             )
-        if len(given) > len(there) or not all(members.values()):
+        if len(grouped) > len(existing) or not all(members.values()):
             raise SceneError(
                 f"every emitter belongs to one light, and every light has one: not so in {members}"
             )
@@ -210,8 +210,8 @@ class Scene(Shown):
         """
         chosen = {self.light(name).name for name in names}
         lights = tuple(light for light in self.lights if light.name in chosen)
-        its = {member.name for light in lights for member in light.members}
-        others = [x for x in self.emitters if x.name not in its]
+        members = {member.name for light in lights for member in light.members}
+        others = [x for x in self.emitters if x.name not in members]
         # Where nothing else may be asked for light, black ones are: some emitter has to be.
         is_asked = any(not m.hit_by_chance for light in lights for m in light.members)
         black = (0.0, 0.0, 0.0)
@@ -236,7 +236,7 @@ class Scene(Shown):
             _parsed=self._parsed.darkened(dark),
         )
 
-    @MITSUBA.taken()
+    @MITSUBA.acquired()
     def moved(self, poses: Mapping[str, Pose]) -> "Scene":
         """Return this scene with lights at other places, directions or cones.
 
@@ -266,8 +266,8 @@ class Scene(Shown):
                 motions[emitter.node] = motion
                 old_sites.setdefault(emitter.name, emitter.site)
         parsed = self._parsed.with_motions(motions).with_elements(elements)
-        made = self._inspected(parsed, ())
-        return replace(made, added=tuple(added.values()), old_sites=old_sites)
+        moved_scene = self._inspected(parsed, ())
+        return replace(moved_scene, added=tuple(added.values()), old_sites=old_sites)
 
     @property
     def emitter_places(self) -> tuple[EmitterPlace, ...]:
@@ -283,7 +283,7 @@ class Scene(Shown):
             places.append(place)
         return tuple(places)
 
-    @MITSUBA.taken()
+    @MITSUBA.acquired()
     def with_new_emitters(self, emitters: Sequence[NewEmitter]) -> "Scene":
         """Return this scene with emitters added, each a light of its own.
 
@@ -308,8 +308,8 @@ class Scene(Shown):
                 )
             taken.add(emitter.name)
         parsed = self._parsed.with_elements({x.name: "".join(x.lines()) for x in emitters})
-        made = self._inspected(parsed, [x.name for x in emitters])
-        return replace(made, added=(*self.added, *emitters))
+        extended = self._inspected(parsed, [x.name for x in emitters])
+        return replace(extended, added=(*self.added, *emitters))
 
     def _inspected(self, parsed: ParsedScene, more: Sequence[str]) -> "Scene":
         """Return the scene of another parsed form. more: names of its emitters without a light."""
@@ -318,12 +318,12 @@ class Scene(Shown):
         members: dict[str, Sequence[str]] = {x.name: x.member_names for x in self.lights}
         members |= {name: [name] for name in more}
         fixed = [light.name for light in self.lights if light.is_fixed]
-        found = {light.name for light in self.lights if light.is_found}
+        found_names = {light.name for light in self.lights if light.is_found}
         lights = lights_of(facts["emitters"], members, fixed)
         return replace(
             self,
             **facts | {"film": self.film},
-            lights=tuple(replace(x, is_found=x.name in found) for x in lights),
+            lights=tuple(replace(x, is_found=x.name in found_names) for x in lights),
             _parsed=parsed,
         )
 
@@ -378,7 +378,7 @@ class Scene(Shown):
         parsed = self._parsed.relocated(old, new)
         return replace(self, path=parsed.path, files=parsed.files, _parsed=parsed)
 
-    @MITSUBA.taken()
+    @MITSUBA.acquired()
     def load(
         self, emission: Mapping[str, RGB] | None = None, *, views: Sequence["Scene"] = ()
     ) -> Any:
@@ -393,7 +393,7 @@ class Scene(Shown):
         settings = settings_for(self.lights, self.emitters, emission or {}, scene=str(self.path))
         return self._parsed.instantiate(settings, self.film, *(view.film for view in views))
 
-    @MITSUBA.taken()
+    @MITSUBA.acquired()
     def while_loaded(
         self,
         work: Callable[[Any], _Made],

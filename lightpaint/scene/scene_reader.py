@@ -22,7 +22,7 @@ from lightpaint.scene.scene_tree import ParsedScene
 
 
 @keywords()
-@MITSUBA.taken()
+@MITSUBA.acquired()
 def load_scene(
     path: str | Path,
     *,

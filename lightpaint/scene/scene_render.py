@@ -71,7 +71,9 @@ def plan_passes(
         left = -(-max(0, -(-spp // 2) - done[half]) // step)
         sizes = [largest] * (left // largest) + [left % largest] * (left % largest > 0)
         lists.append([(half, size * step) for size in sizes])
-    return [one for pair in zip_longest(*lists) for one in pair if one is not None]
+    return [
+        next_pass for pair in zip_longest(*lists) for next_pass in pair if next_pass is not None
+    ]
 
 
 def render(

@@ -319,10 +319,10 @@ class ParsedScene:
         """
         folders = {Path(str(self.resolver[k])) for k in range(len(self.resolver))}
         folders |= {file.parent for file in self.files}
-        there = {*self.files, *self.assets()}
+        files = {*self.files, *self.assets()}
         names = {Path(name) for name in self._asset_names()}
-        names |= {x.relative_to(y) for x in there for y in folders if x.is_relative_to(y)}
-        return there | {folder / name for folder in folders for name in names}
+        names |= {x.relative_to(y) for x in files for y in folders if x.is_relative_to(y)}
+        return files | {folder / name for folder in folders for name in names}
 
     @contextmanager
     def _resolving(self) -> Iterator[None]:
@@ -345,8 +345,8 @@ def _put_nodes(state: Any, first: int, fragment: Any) -> None:
     for k, node in enumerate(list(fragment.nodes)[1:]):
         for key in list(node.props):
             if node.props.type(key) == reference:
-                its = node.props[key].index() - 1 + first
-                node.props[key] = mi.Properties.ResolvedReference(its)
+                child = node.props[key].index() - 1 + first
+                node.props[key] = mi.Properties.ResolvedReference(child)
         if first + k < len(state.nodes):
             state.nodes[first + k] = node
         else:

@@ -28,9 +28,9 @@ def explain_mismatch(picture: Floats, template: Floats) -> str:
             "all of it by one change of colours: unless you graded it, it was saved "
             "through another view or profile (transform=..., mask=...)"
         )
-    for how, turned in _turned(template):
+    for turn, turned in _turned(template):
         if _is_function(picture, turned):
-            return f"it is the template {how}: turn it back"
+            return f"it is the template {turn}: turn it back"
     down, right = _offset(picture, template)
     if (down or right) and _is_function(*_overlap(picture, template, down, right)):
         return f"it is the template moved by {right} pixels to the right and {down} down: undo that"

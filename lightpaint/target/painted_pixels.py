@@ -79,7 +79,7 @@ def _closest(differences: Sequence[Floats], tolerance: float) -> Floats:
     """Return, of several looks that may be its template, the difference with the most unpainted
     pixels.
     """
-    return max(differences, key=lambda one: float((one <= tolerance).mean()))
+    return max(differences, key=lambda difference: float((difference <= tolerance).mean()))
 
 
 def _difference_of_codes(path: Path, picture: Picture, look: Floats) -> Floats:

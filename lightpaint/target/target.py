@@ -126,21 +126,21 @@ class Target(Shown):
 
         Raises TargetError or SizeError for invalid arrays.
         """
-        given = np.asarray(image)
-        if given.ndim != 3 or given.shape[-1] != 3 or not given.size:
+        array = np.asarray(image)
+        if array.ndim != 3 or array.shape[-1] != 3 or not array.size:
             raise SizeError(
-                f"{titled(name)}: an image of the shape {given.shape}: expected (height, width, 3)"
+                f"{titled(name)}: an image of the shape {array.shape}: expected (height, width, 3)"
             )
-        if given.dtype.kind != "f":
+        if array.dtype.kind != "f":
             raise TargetError(
-                f"{titled(name)}: an image of {given.dtype}: expected floats, linear Rec.709; "
+                f"{titled(name)}: an image of {array.dtype}: expected floats, linear Rec.709; "
                 "display values of 8 bits are ViewTransform().decode(image / 255)"
             )
-        counts = np.ones(given.shape[:2]) if importance is None else np.asarray(importance)
+        counts = np.ones(array.shape[:2]) if importance is None else np.asarray(importance)
         if counts.dtype.kind not in "bfui":
             raise TargetError(f"{titled(name)}: importance of {counts.dtype}: expected numbers")
         with np.errstate(over="ignore"):  # what float32 cannot hold is infinite, and refused
-            pixels, counts = given.astype(np.float32), counts.astype(np.float32)
+            pixels, counts = array.astype(np.float32), counts.astype(np.float32)
         if counts.shape == pixels.shape[:2]:  # else that is told
             _check_is_light(name, pixels, counts > 0)
         return cls(name, pixels, counts, everything=importance is None)

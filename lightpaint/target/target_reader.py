@@ -179,33 +179,33 @@ def _opened(
     """Open the picture, and the template it was painted on. For the arguments see `read_target`.
     Arguments as in `read_target`.
     """
-    choice, made = TransformChoice.of(transform), None
+    choice, opened = TransformChoice.of(transform), None
     notes: tuple[str, ...] = ()
     folder = None if template is None else Path(template)
     if folder is not None:
         # A file in it stands for the folder.
         folder = folder.parent if folder.is_file() else folder
-        made = read_template(folder)
-        choice = TransformChoice.of(choice.over(made.transform))
+        opened = read_template(folder)
+        choice = TransformChoice.of(choice.over(opened.transform))
     elif find and (folder := find_template(path)) is not None:
-        made = read_template(folder)
-    otherwise = None if made is None else made.transform
+        opened = read_template(folder)
+    otherwise = None if opened is None else opened.transform
     picture = read_picture(path, layer=layer, transform=choice, otherwise=otherwise)
-    if made is not None and folder is not None and made.size != picture.size:
+    if opened is not None and folder is not None and opened.size != picture.size:
         if template is not None:
             raise SizeError(
                 f"{path} is {picture.size[1]}x{picture.size[0]} but {folder / SHOWN} is "
-                f"{made.size[1]}x{made.size[0]}: give the template it was painted on"
+                f"{opened.size[1]}x{opened.size[0]}: give the template it was painted on"
             )
         notes = (f"not compared with {folder / SHOWN}, which has another size",)
         # The painting has another template, and so another transform.
-        made, otherwise = None, None
+        opened, otherwise = None, None
         picture = read_picture(path, layer=layer, transform=choice)
     own_marks = painted_of(picture.attributes, path)
     if own_marks is not None:
         otherwise = own_marks.transform
     shown = picture.transform or (otherwise if choice.is_open else choice.over(otherwise))
-    return _Reading(path, picture, made, folder, shown, notes)
+    return _Reading(path, picture, opened, folder, shown, notes)
 
 
 def _importance(reading: _Reading, mask: str | Path | None) -> tuple[Floats | None, list[str]]:

@@ -160,8 +160,8 @@ def _about(template: Template, files: Iterable[str]) -> str:
     height, width = template.size
     shown = _Shown(template.transform.name, template.transform.stops)
     identity = (template.scene, template.content, template.sensor)
-    about = fields_of(_About(FORMAT, *identity, (width, height), shown, tuple(files)))
-    return json.dumps(about, indent=2, ensure_ascii=False) + "\n"
+    record = fields_of(_About(FORMAT, *identity, (width, height), shown, tuple(files)))
+    return json.dumps(record, indent=2, ensure_ascii=False) + "\n"
 
 
 def earlier_files(folder: Path) -> list[Path]:
@@ -214,11 +214,11 @@ def write_look(
 def read_template(folder: Path) -> Template:
     """Read a template of `write_template`. Raises TargetError for anything else."""
     try:
-        about = _read_about(folder)
-        transform = ViewTransform(about.view.name, about.view.stops)
-        image = _read_picture(folder / LIGHT, about.size)
+        record = _read_about(folder)
+        transform = ViewTransform(record.view.name, record.view.stops)
+        image = _read_picture(folder / LIGHT, record.size)
         albedo, clean = (
-            _read_picture(folder / name, about.size) if (folder / name).exists() else None
+            _read_picture(folder / name, record.size) if (folder / name).exists() else None
             for name in (ALBEDO, CLEAN)
         )
     except (OSError, ValueError, MemoryError, LightpaintError) as error:
@@ -227,7 +227,7 @@ def read_template(folder: Path) -> Template:
         raise TargetError(
             f"{folder} is no template: {one_line(message)}; make one with lightpaint template"
         ) from None
-    return Template(image, transform, about.scene, about.content, about.sensor, albedo, clean)
+    return Template(image, transform, record.scene, record.content, record.sensor, albedo, clean)
 
 
 def _read_about(folder: Path) -> _About:

@@ -100,11 +100,11 @@ def _append_in_order(path: str, order: list[str], ancestors: tuple[str, ...]) ->
 def _imported_paths(path: str) -> list[str]:
     """Return the paths of the modules that a module imports, in its order."""
     text = _code(path)
-    found = [match["path"] for match in _IMPORT.finditer(text)]
-    found += [match["path"] for match in _EXPORT_LIST.finditer(text) if match["path"]]
+    paths = [match["path"] for match in _IMPORT.finditer(text)]
+    paths += [match["path"] for match in _EXPORT_LIST.finditer(text) if match["path"]]
     if _DYNAMIC.search(text):
-        found += _PATHS.findall(text)
-    return [_resolved(path, one) for one in found]
+        paths += _PATHS.findall(text)
+    return [_resolved(path, specifier) for specifier in paths]
 
 
 def _resolved(path: str, named: str) -> str:
@@ -132,8 +132,8 @@ def _as_constant(path: str, number: dict[str, int]) -> str:
     exports += [match["name"] for match in _EXPORT.finditer(text)]
     text = _EXPORT.sub("", text)
     text = _DYNAMIC.sub(f'loaded.bind(null, "{path}")(', text)
-    if found := _NOT_UNDERSTOOD.search(text):
-        line = text[found.start() :].strip().splitlines()[0]
+    if unknown := _NOT_UNDERSTOOD.search(text):
+        line = text[unknown.start() :].strip().splitlines()[0]
         raise BundleError(
             f"{path}: cannot bundle `{line[:60]}`: write it as another import or export"
         )
@@ -160,7 +160,7 @@ def _constants(names: str | None, module: str, path: str, needed: str) -> str:
 
 def _pairs(names: str) -> list[tuple[str, str]]:
     """Return `a, b as c` as (a, a), (b, c)."""
-    parts = [x.split(" as ") for x in (" ".join(one.split()) for one in names.split(",")) if x]
+    parts = [x.split(" as ") for x in (" ".join(entry.split()) for entry in names.split(",")) if x]
     return [(x[0].strip(), x[-1].strip()) for x in parts]
 
 

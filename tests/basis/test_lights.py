@@ -37,7 +37,7 @@ def test_nobody_changes_what_all_share() -> None:
     with pytest.raises(ValueError, match="read-only"):
         lights.present_weights[0] = 7
     with pytest.raises(dataclasses.FrozenInstanceError):
-        lights.each = ()  # type: ignore[misc]
+        lights.records = ()  # type: ignore[misc]
 
 
 def test_names_do_not_repeat() -> None:

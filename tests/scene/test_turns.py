@@ -34,13 +34,13 @@ class Work:
         self._at_work -= 1
 
     def urgent(self) -> None:
-        with self.turns.taken():
+        with self.turns.acquired():
             self.piece("urgent")
-            with self.turns.taken():  # as what is done within it does
+            with self.turns.acquired():  # as what is done within it does
                 self.piece("urgent")
 
     def leisure(self) -> None:
-        with self.turns.low_priority(), self.turns.taken(), self.turns.taken():
+        with self.turns.low_priority(), self.turns.acquired(), self.turns.acquired():
             for _ in range(6):
                 self.piece("leisure")
                 self.turns.let_others()
@@ -114,7 +114,7 @@ def test_two_who_wait_agree_whose_turn_it_is(work: Work, monkeypatch: pytest.Mon
         work.leisure()
 
     def holds() -> None:
-        with turns.taken():
+        with turns.acquired():
             work.piece("first")
             while not (turns._waiting and turns._idle):
                 time.sleep(PIECE_S)
@@ -128,14 +128,14 @@ def test_who_waits_for_another_lets_it(work: Work):
     turns, is_done = work.turns, threading.Event()
 
     def tells() -> None:
-        with turns.taken(), turns.taken():
+        with turns.acquired(), turns.acquired():
             work.piece("first")
             with turns.aside():
                 assert is_done.wait(SOON_S)
             work.piece("last")
 
     def heard() -> None:
-        with turns.taken():
+        with turns.acquired():
             work.piece("heard")
         is_done.set()
 
@@ -152,7 +152,7 @@ def test_who_is_interrupted_while_waiting_keeps_nobody(work: Work, monkeypatch: 
 
     with monkeypatch.context() as patched:
         patched.setattr(turns._changed, "wait_for", interrupted)
-        with pytest.raises(KeyboardInterrupt), turns.taken():
+        with pytest.raises(KeyboardInterrupt), turns.acquired():
             pass
     _together(work.leisure, work=work)
     assert work.done == ["leisure"] * 6

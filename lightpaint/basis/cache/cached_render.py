@@ -79,42 +79,49 @@ def obtain_basis(
     if exact_spp and time_s is not None:
         raise SceneError("exact_spp=True goes with a number of samples, not with time_s=...")
     if not use_cache:
-        start, how = None, dict[str, Any](time_s=time_s, seed=seed, progress=progress)
+        start, options = None, dict[str, Any](time_s=time_s, seed=seed, progress=progress)
         if before is not None:
-            how["keep"] = lambda basis: False
+            options["keep"] = lambda basis: False
             start = gather_planes(scene, None, spp=spp, seed=seed, before=before, use_cache=False)
         goal = None if time_s is not None else scene.spp if spp is None else spp
-        return as_stored(_completed(scene, start, spp=goal, render=render, how=how))
-    kept = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
-    if kept is not None and not is_of(scene, kept, seed):
-        kept = None
-    asked = scene.spp if spp is None else spp
-    start = kept
-    if start is not None and (time_s is not None or start.origin.spp < asked):
+        return as_stored(_completed(scene, start, spp=goal, render=render, options=options))
+    cached = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
+    if cached is not None and not is_of(scene, cached, seed):
+        cached = None
+    goal_spp = scene.spp if spp is None else spp
+    start = cached
+    if start is not None and (time_s is not None or start.origin.spp < goal_spp):
         start = replace(start, sums=cache.sums_of(start))
     if exact_spp:
         if start is not None and not is_on_the_way(scene, start, spp):
             start = None
-    elif time_s is None and (kept is None or kept.origin.spp < asked):
-        start = gather_planes(scene, start, spp=asked, seed=seed, before=before)
-    elif kept is None:
+    elif time_s is None and (cached is None or cached.origin.spp < goal_spp):
+        start = gather_planes(scene, start, spp=goal_spp, seed=seed, before=before)
+    elif cached is None:
         start = gather_planes(scene, None, spp=None, seed=seed, before=before)
 
     is_composed = start is not None and start.origin.is_composed
 
     def keep(basis: Basis) -> bool:
-        return (kept is None or basis.origin.mean_spp >= kept.origin.mean_spp) and cache.keep(
+        return (cached is None or basis.origin.mean_spp >= cached.origin.mean_spp) and cache.keep(
             _marked(basis, is_composed=is_composed)
         )
 
     if start is not None:
         # One kept by an earlier version may know less of the same lights.
         start = replace(start, lights=basis_lights(scene), source=str(scene.path))
-        enough = [sum(its[:2]) >= (1 if time_s is not None else asked) for its in counts_of(start)]
+        enough = [
+            sum(counts[:2]) >= (1 if time_s is not None else goal_spp)
+            for counts in counts_of(start)
+        ]
         if 0 < sum(enough) < len(enough):
             report_reuse(sum(enough), len(enough))
-    how = dict[str, Any](time_s=time_s, seed=seed, keep=keep, is_final=is_final, progress=progress)
-    basis = _completed(scene, start, spp=asked if time_s is None else None, render=render, how=how)
+    options = dict[str, Any](
+        time_s=time_s, seed=seed, keep=keep, is_final=is_final, progress=progress
+    )
+    basis = _completed(
+        scene, start, spp=goal_spp if time_s is None else None, render=render, options=options
+    )
     if basis is start:
         return basis
     basis = _marked(basis, is_composed=is_composed)
@@ -132,14 +139,14 @@ def obtain_basis(
 
 
 def _completed(
-    scene: Scene, start: Basis | None, *, spp: int | None, render: Render, how: dict[str, Any]
+    scene: Scene, start: Basis | None, *, spp: int | None, render: Render, options: dict[str, Any]
 ) -> Basis:
     """Return `start` with the samples that are missing, of lights that have fewest first.
 
-    spp: None for the time in `how`. how: other arguments of `render`, which adds as many samples to
-    all lights in one pass.
+    spp: None for the time in `options`, which are other arguments of `render`. That adds as many
+    samples to all lights in one pass.
     """
-    end_s = None if how["time_s"] is None else time.monotonic() + how["time_s"]
+    end_s = None if options["time_s"] is None else time.monotonic() + options["time_s"]
 
     def budget(goal: int | None) -> dict[str, Any]:
         if end_s is None:
@@ -154,14 +161,14 @@ def _completed(
         alone, whole = scene.only(names), start
 
         def keep(part: Basis, whole: Basis = whole) -> bool:
-            return bool(how["keep"](merge(scene, whole, part)))
+            return bool(options["keep"](merge(scene, whole, part)))
 
-        options = how | budget(goal) | {"keep": keep}
-        part = render(alone, start=restrict(whole, alone), **options)
+        part_options = options | budget(goal) | {"keep": keep}
+        part = render(alone, start=restrict(whole, alone), **part_options)
         start = merge(scene, whole, part)
         if end_s is not None and time.monotonic() >= end_s:
             return start
-    return render(scene, start=start, **how | budget(spp))
+    return render(scene, start=start, **options | budget(spp))
 
 
 def _marked(basis: Basis, *, is_composed: bool) -> Basis:
@@ -183,7 +190,7 @@ def top_up_basis(
 ) -> Basis:
     """Return `basis` with further samples of some pixels, kept in its place. See `top_up`."""
     keep = cache.keep if use_cache else None
-    made = top_up(
+    refined = top_up(
         scene,
         basis,
         counts,
@@ -192,24 +199,24 @@ def top_up_basis(
         is_enough=is_enough,
         tracers=tracers,
     )
-    return as_stored(made) if keep is None else as_stored(made, keep)
+    return as_stored(refined) if keep is None else as_stored(refined, keep)
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:
     """Raise BasisError unless `basis` was made of `scene` as it is, through its sensor."""
     origin, sensor = basis.origin, scene.sensor_names[scene.sensor]
-    mine = {light.name: light.member_names for light in scene.lights}
-    its = {light.name: light.members for light in basis.lights}
-    if mine != its:
+    scene_members = {light.name: light.member_names for light in scene.lights}
+    basis_members = {light.name: light.members for light in basis.lights}
+    if scene_members != basis_members:
         raise BasisError(
-            f"the basis has the lights {some_names(its)}, and {scene.path} was loaded with "
-            f"{some_names(mine)}: load it with the same lights and groups"
+            f"the basis has the lights {some_names(basis_members)}, and {scene.path} was loaded "
+            f"with {some_names(scene_members)}: load it with the same lights and groups"
         )
     if (origin.scene_identity, origin.sensor) != (scene.identity, sensor):
-        what = "another state of the scene" if origin.sensor == sensor else "another sensor"
+        difference = "another state of the scene" if origin.sensor == sensor else "another sensor"
         raise BasisError(
-            f"the basis shows {what}: it was made of {origin.scene} through {origin.sensor}, not "
-            f"of {scene.path} as it is through {sensor}; make it again"
+            f"the basis shows {difference}: it was made of {origin.scene} through {origin.sensor}, "
+            f"not of {scene.path} as it is through {sensor}; make it again"
         )
     if whole_factor(scene.size, basis.size) is None:
         raise BasisError(

@@ -169,11 +169,11 @@ def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes |
     if planes is None:
         lights = range(len(basis.lights))
         halves, scales = zip(*(denoise_to_halves(basis, k, factor) for k in lights), strict=True)
-        made = np.stack(halves), np.array(scales)
+        denoised = np.stack(halves), np.array(scales)
         if factor == 1:
-            planes = DenoisedPlanes.of(basis, *made)
+            planes = DenoisedPlanes.of(basis, *denoised)
         else:
-            planes = DenoisedPlanes(*made, denoise_present_look(replace(basis, former=None)))
+            planes = DenoisedPlanes(*denoised, denoise_present_look(replace(basis, former=None)))
         cache_denoised_planes(basis, planes)
     return planes
 
@@ -201,7 +201,7 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
         n, of_halves = len(basis.lights), [_shape(basis)]
         if factor > 1:
             of_halves.append((n, *blocks_in(basis.size, factor), 3))
-        shapes = [[its, (n,), _shape(basis)[1:]] for its in of_halves]
+        shapes = [[shape, (n,), _shape(basis)[1:]] for shape in of_halves]
         types = ["float16", "float64", "float32"]
         if [x.shape for x in arrays] in shapes and [x.dtype.name for x in arrays] == types:
             path.touch()

@@ -67,7 +67,7 @@ def counts_of(basis: Basis) -> Sequence[Counts]:
 
 def gather_planes(
     scene: Scene,
-    kept: Basis | None,
+    cached: Basis | None,
     *,
     spp: int | None,
     seed: int,
@@ -83,21 +83,27 @@ def gather_planes(
     are. before: a basis of the same seed and film, of the scene in another state, whose planes are
     taken as well. use_cache: False to take of no other.
     """
-    wanted = scene.light_identities
-    found: list[KeptPlane | None] = [None] * len(wanted)
-    if kept is not None:
-        found = [KeptPlane(kept, i) for i in range(len(wanted))]
+    identities = scene.light_identities
+    planes: list[KeptPlane | None] = [None] * len(identities)
+    if cached is not None:
+        planes = [KeptPlane(cached, i) for i in range(len(identities))]
     if before is not None:
-        found = [
-            _better_sampled(its, before, identity)
-            for its, identity in zip(found, wanted, strict=True)
+        planes = [
+            _better_sampled(plane, before, identity)
+            for plane, identity in zip(planes, identities, strict=True)
         ]
 
     def gain(entry: cache.Entry) -> int:
         assert entry.origin is not None
         has = entry.origin.spp if spp is None else min(entry.origin.spp, spp)
-        covered = (its for name, its in zip(wanted, found, strict=True) if name in entry.identities)
-        return sum(max(0, has - (0 if its is None else sum(its.counts[:2]))) for its in covered)
+        covered = (
+            plane
+            for name, plane in zip(identities, planes, strict=True)
+            if name in entry.identities
+        )
+        return sum(
+            max(0, has - (0 if plane is None else sum(plane.counts[:2]))) for plane in covered
+        )
 
     entries = cache.entries() if use_cache else []
     candidates = [entry for entry in entries if _is_like(entry, scene, seed)]
@@ -107,14 +113,14 @@ def gather_planes(
             break
         candidates.remove(best)
         if (other := cache.read(best)) is not None:
-            found = [
-                _better_sampled(its, other, identity)
-                for its, identity in zip(found, wanted, strict=True)
+            planes = [
+                _better_sampled(plane, other, identity)
+                for plane, identity in zip(planes, identities, strict=True)
             ]
-    sources = {id(its.basis): its.basis for its in found if its is not None}
-    if not sources or [*sources.values()] == [kept]:
-        return kept
-    return _compose_basis(scene, seed, found, _emitters_seen_in(scene, [*sources.values()]))
+    sources = {id(plane.basis): plane.basis for plane in planes if plane is not None}
+    if not sources or [*sources.values()] == [cached]:
+        return cached
+    return _compose_basis(scene, seed, planes, _emitters_seen_in(scene, [*sources.values()]))
 
 
 def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int | None]:
@@ -124,12 +130,18 @@ def least_sampled_lights(basis: Basis, spp: int | None) -> tuple[list[str], int 
     for all of them then. No names: all have enough, or as many as each other.
     """
     counts = counts_of(basis)
-    totals = [sum(its[:2]) for its in counts]
+    totals = [sum(light_counts[:2]) for light_counts in counts]
     fewest = min(totals)
-    if len({its[:2] for its in counts}) == 1 or (spp is not None and fewest >= spp):
+    if len({light_counts[:2] for light_counts in counts}) == 1 or (
+        spp is not None and fewest >= spp
+    ):
         return [], spp
     halves = counts[totals.index(fewest)][:2]
-    names = [name for name, its in zip(basis.names, counts, strict=True) if its[:2] == halves]
+    names = [
+        name
+        for name, light_counts in zip(basis.names, counts, strict=True)
+        if light_counts[:2] == halves
+    ]
     goals = [total for total in totals if total > fewest]
     return names, min(goals if spp is None else [spp, *goals], default=None)
 
@@ -153,8 +165,8 @@ def merge(scene: Scene, whole: Basis, part: Basis) -> Basis:
         for i, name in enumerate(whole.names)
     ]
     seen = whole.emitters_seen | part.emitters_seen
-    made = _compose_basis(scene, whole.origin.seed, sources, seen)
-    return replace(made, features=part.features, objects=part.objects)
+    merged = _compose_basis(scene, whole.origin.seed, sources, seen)
+    return replace(merged, features=part.features, objects=part.objects)
 
 
 def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
@@ -169,16 +181,16 @@ def _is_like(entry: cache.Entry, scene: Scene, seed: int) -> bool:
     )
 
 
-def _better_sampled(its: KeptPlane | None, other: Basis, identity: str) -> KeptPlane | None:
-    """Return the plane of that identity in `other`, if it has more samples than `its`."""
-    has = 0 if its is None else sum(its.counts[:2])
+def _better_sampled(plane: KeptPlane | None, other: Basis, identity: str) -> KeptPlane | None:
+    """Return the plane of that identity in `other`, if it has more samples than `plane`."""
+    has = 0 if plane is None else sum(plane.counts[:2])
     for i, light in enumerate(other.lights):
         if light.identity == identity != "":
-            found = KeptPlane(other, i)
+            candidate = KeptPlane(other, i)
             # Of one half alone the noise is unknown.
-            if min(found.counts[:2]) and sum(found.counts[:2]) > has:
-                return found
-    return its
+            if min(candidate.counts[:2]) and sum(candidate.counts[:2]) > has:
+                return candidate
+    return plane
 
 
 def _compose_basis(
@@ -186,10 +198,11 @@ def _compose_basis(
 ) -> Basis:
     """Return a basis of `scene` of these planes; None stands for a black one."""
     lights, size = basis_lights(scene), scene.size
-    methods = [its.basis.origin.method for its in sources if its is not None]
+    methods = [source.basis.origin.method for source in sources if source is not None]
     is_one_pass = method_of(scene) == ONE_PASS
     counts = _count_fields(
-        [(0, 0, 0, 0) if its is None else its.counts for its in sources], is_one_pass=is_one_pass
+        [(0, 0, 0, 0) if source is None else source.counts for source in sources],
+        is_one_pass=is_one_pass,
     )
     origin = origin_of(scene, seed, methods[-1], counts["halves"], counts["passes"])
     in_memory = not is_large(len(lights), size)
@@ -198,14 +211,14 @@ def _compose_basis(
         return compose_planes(picks, size, in_memory=in_memory)
 
     # Known of all lights or of none.
-    parts = [None if its is None else its.indirect for its in sources]
+    parts = [None if source is None else source.indirect for source in sources]
     is_split = all(
-        (its is None) == (part is None) for its, part in zip(sources, parts, strict=True)
+        (source is None) == (part is None) for source, part in zip(sources, parts, strict=True)
     )
     return Basis(
         lights,
-        compose([None if its is None else its.plane for its in sources]),
-        compose([None if its is None else its.noise for its in sources]),
+        compose([None if source is None else source.plane for source in sources]),
+        compose([None if source is None else source.noise for source in sources]),
         seen,
         replace(origin, each_light=counts["each_light"], is_composed=True),
         indirect=IndirectLight(*(compose([p and p[k] for p in parts]) for k in range(2)))
@@ -215,22 +228,22 @@ def _compose_basis(
     )
 
 
-def _count_fields(each: Sequence[Counts], *, is_one_pass: bool) -> dict[str, Any]:
+def _count_fields(each_light: Sequence[Counts], *, is_one_pass: bool) -> dict[str, Any]:
     """Return the fields of an Origin that say how many samples there are.
 
     In one pass numbers follow from the samples alone, and passes are only counted.
     """
     if is_one_pass:
-        passes = max(its[2] for its in each), max(its[3] for its in each)
-        each = [(*its[:2], *(passes if any(its) else (0, 0))) for its in each]
-    least = np.array(each).min(axis=0).tolist()
-    if len(set(each)) == 1:
+        passes = max(counts[2] for counts in each_light), max(counts[3] for counts in each_light)
+        each_light = [(*counts[:2], *(passes if any(counts) else (0, 0))) for counts in each_light]
+    least = np.array(each_light).min(axis=0).tolist()
+    if len(set(each_light)) == 1:
         return {"halves": tuple(least[:2]), "passes": tuple(least[2:]), "each_light": ()}
     spp, passes_each = min(least[:2]), min(least[2:])
     return {
         "halves": (spp, spp),
         "passes": (passes_each, passes_each),
-        "each_light": tuple(each),
+        "each_light": tuple(each_light),
     }
 
 
@@ -240,10 +253,12 @@ def _emitters_seen_in(scene: Scene, sources: Sequence[Basis]) -> Bools:
     Shapes that shine are the same in all of them, and what surrounds them may not be.
     """
     is_surrounded = any(emitter.plugin in ENVIRONMENTS for emitter in scene.emitters)
-    alike = [its.emitters_seen for its in sources if _is_surrounded(its.lights) == is_surrounded]
+    alike = [
+        source.emitters_seen for source in sources if _is_surrounded(source.lights) == is_surrounded
+    ]
     seen: Bools = np.logical_or.reduce(alike) if alike else emitters_seen(scene)
     return seen
 
 
 def _is_surrounded(lights: Lights) -> bool:
-    return any(plugin in ENVIRONMENTS for its in lights for plugin in its.plugin.split(" + "))
+    return any(plugin in ENVIRONMENTS for light in lights for plugin in light.plugin.split(" + "))

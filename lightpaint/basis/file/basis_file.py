@@ -64,13 +64,13 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     def parts() -> Iterator[tuple[PartHead, Channels]]:
         for k, light in enumerate(basis.lights):
             planes = encoded_planes_of(basis, k)
-            texts = light_texts(light, [its.encoding for its in planes])
+            texts = light_texts(light, [part.encoding for part in planes])
             channels = light_channels(planes)
             sums[light.name] = checksum(checked_text(texts), channels)
             yield PartHead.of(light.name, channels, texts), channels
-        for its in others:
-            head = PartHead.of(its.name, its.channels, its.attributes, display=its.display)
-            yield head, its.channels
+        for part in others:
+            head = PartHead.of(part.name, part.channels, part.attributes, display=part.display)
+            yield head, part.channels
 
     def texts() -> dict[str, str]:
         seen = checksum("", others[0].channels)
@@ -85,10 +85,10 @@ def _room(basis: Basis, others: Sequence[ExrPart], of_origin: str) -> int:
     """Return how many bytes stand before the pixels of a basis at most."""
     scaled = [PlaneEncoding(scale=LARGEST_SCALE)] * len(PLANE_CHANNELS)
     lights = [(light.name, light_texts(light, scaled), basis.size[0]) for light in basis.lights]
-    parts = [(its.name, its.attributes, its.size[0]) for its in others]
+    parts = [(part.name, part.attributes, part.size[0]) for part in others]
     checksums = Checksums(dict.fromkeys(basis.names, "0" * 8), *("0" * 8,) * 3)
     of_file = {FORMAT_KEY: FORMAT, ORIGIN_KEY: of_origin, CHECKSUMS_KEY: checksums.text()}
-    return sum(room_for(*its) for its in (*lights, *parts, ("", of_file, 0)))
+    return sum(room_for(*part) for part in (*lights, *parts, ("", of_file, 0)))
 
 
 def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None) -> Basis:
@@ -104,9 +104,9 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
     keep(stored)
     if is_encoded(len(basis.lights), basis.size):
         return stored
-    for planes, its in zip(plane_sets(basis), plane_sets(stored), strict=True):
-        if planes is not its:
-            for plane, rounded in zip(planes, its, strict=True):
+    for planes, stored_planes in zip(plane_sets(basis), plane_sets(stored), strict=True):
+        if planes is not stored_planes:
+            for plane, rounded in zip(planes, stored_planes, strict=True):
                 plane[...] = rounded
     return basis.without_cached_values()
 

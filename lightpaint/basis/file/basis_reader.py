@@ -105,7 +105,8 @@ def leave_indirect(basis: Basis, path: Path) -> Basis:
         return basis
     scales = [scales_of(p.texts) for p in parts]
     images, noise = (
-        FilePlanes(file, parts, PLANE_CHANNELS[k], [its[k] for its in scales]) for k in (2, 3)
+        FilePlanes(file, parts, PLANE_CHANNELS[k], [light_scales[k] for light_scales in scales])
+        for k in (2, 3)
     )
     return replace(basis, indirect=IndirectLight(images, noise))
 
@@ -127,11 +128,11 @@ def _read_large(path: Path) -> Basis | None:
 
 def _head(texts: Iterable[Mapping[str, str]]) -> Mapping[str, str]:
     """Return the attributes of the first part. Raises BasisError for another format."""
-    head: Mapping[str, str] = next((its for its in texts if FORMAT_KEY in its), {})
+    head: Mapping[str, str] = next((part for part in texts if FORMAT_KEY in part), {})
     if head.get(FORMAT_KEY) not in (FORMAT, OLD_FORMAT):
-        found = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
+        mark = one_line(repr(head.get(FORMAT_KEY, "no such mark")))
         raise BasisError(
-            f"is not a basis this version can read: expected {FORMAT!r}, found {found}; "
+            f"is not a basis this version can read: expected {FORMAT!r}, found {mark}; "
             "make one with lightpaint basis"
         )
     return head
@@ -144,13 +145,13 @@ def _basis_of_parts(parts: Sequence[ExrPart], head: Mapping[str, str]) -> Basis:
     scales = [scales_of(p.attributes) for p in lit]
 
     def planes(order: Sequence[int], number: int) -> Planes:
-        its = [(lit[k], scales[k][number]) for k in order]
+        channels = [(lit[k], scales[k][number]) for k in order]
         if is_encoded(len(lit), lit[0].size):
-            stored = stored_channels(its, PLANE_CHANNELS[number])
+            stored = stored_channels(channels, PLANE_CHANNELS[number])
             return EncodedPlanes(
-                [encoded_plane(*x) for x in zip(stored, (s for _, s in its), strict=True)]
+                [encoded_plane(*x) for x in zip(stored, (s for _, s in channels), strict=True)]
             )
-        return as_planes(stack_channels(its, PLANE_CHANNELS[number]))
+        return as_planes(stack_channels(channels, PLANE_CHANNELS[number]))
 
     stored = [partial(getattr, part, "channels") for part in lit]
     has_indirect = all(p.channels.keys() >= INDIRECT_CHANNELS for p in lit)
@@ -175,8 +176,8 @@ def _basis_of_rows(file: RowFile, head: Mapping[str, str]) -> Basis | None:
         return ExrPart("", file.channels(layout), layout.texts, layout.display)
 
     def planes(order: Sequence[int], number: int) -> Planes:
-        its = [scales[k][number] for k in order]
-        return FilePlanes(file, [lit[k] for k in order], PLANE_CHANNELS[number], its)
+        plane_scales = [scales[k][number] for k in order]
+        return FilePlanes(file, [lit[k] for k in order], PLANE_CHANNELS[number], plane_scales)
 
     stored = [partial(file.channels, p) for p in lit]
     others = [part(p) for p in file.parts if LIGHT_KEY not in p.texts]
@@ -204,7 +205,9 @@ def _checked_basis(
     if not texts or not seen:
         raise BasisError("has lost parts of its basis: make it again with lightpaint basis")
     try:
-        lights = [read_record(BasisLight, strict_json(its[LIGHT_KEY])) for its in texts]
+        lights = [
+            read_record(BasisLight, strict_json(attributes[LIGHT_KEY])) for attributes in texts
+        ]
         origin = read_record(Origin, strict_json(head[ORIGIN_KEY]))
         checksums = None
         if CHECKSUMS_KEY in head:
@@ -228,14 +231,17 @@ def _checked_basis(
         )
     except (BasisError, ImageError) as error:
         raise BasisError(f"is damaged as a basis: {one_line(str(error))}") from error
-    for light, its, read in zip(lights, texts, stored, strict=True):
+    for light, attributes, read in zip(lights, texts, stored, strict=True):
         channels = read()  # one light at a time: they may be larger than memory
         names = LIGHT_CHANNELS | INDIRECT_CHANNELS if has_indirect else LIGHT_CHANNELS
         if not all(np.isfinite(channels[name]).all() for name in names):
             raise BasisError("holds values that are not finite: make it again")
         if checksums is not None:
             check(
-                checksums.lights[light.name], f"light {light.name!r}", checked_text(its), channels
+                checksums.lights[light.name],
+                f"light {light.name!r}",
+                checked_text(attributes),
+                channels,
             )
     if checksums is not None:
         check(checksums.seen, "mask of seen emitters", "", {"Y": seen[0]})
@@ -252,5 +258,5 @@ def read_origin(path: Path) -> tuple[Origin, tuple[int, int], tuple[str, ...]]:
         text = next(header[ORIGIN_KEY] for header in headers if ORIGIN_KEY in header)
         return read_record(Origin, strict_json(text)), size, identities
     except (*_HEADER_ERRORS, BasisError, StopIteration) as error:
-        said = one_line(str(error)) or "it does not say where it comes from"
-        raise BasisError(f"{path} is no basis this version can read: {said}") from error
+        reason = one_line(str(error)) or "it does not say where it comes from"
+        raise BasisError(f"{path} is no basis this version can read: {reason}") from error

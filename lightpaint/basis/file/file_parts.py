@@ -67,7 +67,7 @@ def encoded_planes_of(basis: Basis, k: int) -> list[EncodedPlane]:
     sets = plane_sets(basis)
     if all(isinstance(planes, EncodedPlanes) for planes in sets):
         return [planes.encoded(k) for planes in sets if isinstance(planes, EncodedPlanes)]
-    planes = [its.plane(k) for its in sets]
+    planes = [plane_set.plane(k) for plane_set in sets]
     pairs = zip(planes[::2], planes[1::2], strict=True)
     return [encoded for pair in pairs for encoded in encode_pair(*pair)]
 
@@ -78,8 +78,8 @@ def light_texts(light: BasisLight, encodings: Sequence[PlaneEncoding]) -> dict[s
     if light.members == (light.name,):
         del data["members"]  # which goes without saying for one emitter
     texts = {LIGHT_KEY: json.dumps(data, ensure_ascii=False)}
-    if any(its.scale != 1 for its in encodings):
-        texts[SCALE_KEY] = json.dumps([its.scale for its in encodings])
+    if any(encoding.scale != 1 for encoding in encodings):
+        texts[SCALE_KEY] = json.dumps([encoding.scale for encoding in encodings])
     return texts
 
 
@@ -151,9 +151,9 @@ def other_parts(basis: Basis) -> Iterator[ExrPart]:
         # A table and no picture; the format wants one display window for all parts.
         yield ExrPart(free_name(GUIDE_PART, basis.names), guide_table, display=basis.size)
     if basis.features is not None:
-        its = _feature_channels(basis.features)
-        about_them = {FEATURES_KEY: checksum("", its)}
-        yield ExrPart(free_name(FEATURES_PART, basis.names), its, about_them)
+        channels = _feature_channels(basis.features)
+        about_them = {FEATURES_KEY: checksum("", channels)}
+        yield ExrPart(free_name(FEATURES_PART, basis.names), channels, about_them)
     if basis.objects is not None:
         named = json.dumps(basis.objects.names, ensure_ascii=False)
         # Whole numbers that float32 holds.
@@ -193,8 +193,10 @@ def guide_table_of(others: Sequence[ExrPart], checksums: Checksums | None) -> Fl
 def _feature_channels(features: Features) -> Channels:
     """Return the features, rounded to half floats but for positions."""
     albedo = rgb_channels(features.albedo, "albedo")
-    made = {x: y.astype(np.float16) for x, y in (albedo | _xyz(features.normal, "normal")).items()}
-    return made if features.position is None else made | _xyz(features.position, "position")
+    channels = {
+        x: y.astype(np.float16) for x, y in (albedo | _xyz(features.normal, "normal")).items()
+    }
+    return channels if features.position is None else channels | _xyz(features.position, "position")
 
 
 def _xyz(vectors: Floats, name: str) -> dict[str, Floats]:

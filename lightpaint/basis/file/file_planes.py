@@ -63,12 +63,12 @@ class RowPlanes(PlanesBase):
                 for k in range(start // length, max(-(-stop // length), start // length + 1))
             ]
             return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
-        made = np.empty((3, self.count, len(where)), np.float32).transpose(1, 2, 0)
+        picked = np.empty((3, self.count, len(where)), np.float32).transpose(1, 2, 0)
         of_strip = where // length
         for k in np.unique(of_strip):
-            its = np.flatnonzero(of_strip == k)
-            made[:, its] = self._strip(int(k))[:, where[its] - k * length]
-        return made
+            in_strip = np.flatnonzero(of_strip == k)
+            picked[:, in_strip] = self._strip(int(k))[:, where[in_strip] - k * length]
+        return picked
 
     def _strip(self, k: int) -> Floats:
         """Return the pixels of a strip, (n, p, 3)."""
@@ -86,13 +86,13 @@ class RowPlanes(PlanesBase):
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return Σ w_i Φ_i, (h, w, 3)."""
         (height, width), step = self.size, self.strip_rows
-        made = np.empty((height, width, 3), np.float32)
+        mixed = np.empty((height, width, 3), np.float32)
 
         def fill(top: int) -> None:
-            made[top : top + step] = mix(self.rows(top, min(top + step, height)), weights)
+            mixed[top : top + step] = mix(self.rows(top, min(top + step, height)), weights)
 
         parallel_map(fill, range(0, height, step))
-        return made
+        return mixed
 
     def replaced(self, planes: Mapping[int, Floats]) -> Planes:
         """Return these planes with others, (h, w, 3), for some of the lights."""
@@ -108,27 +108,27 @@ class _Strips:
 
     def __init__(self, step: int, read: Callable[[int], Floats]) -> None:
         self.step, self._read = step, read
-        self._kept: OrderedDict[int, Future[Floats]] = OrderedDict()
+        self._strips: OrderedDict[int, Future[Floats]] = OrderedDict()
         self._lock = Lock()
 
     def __getitem__(self, k: int) -> Floats:
         """Return the k-th strip; who asks while another thread reads it waits for that."""
         with self._lock:
-            made = self._kept.get(k)
-            is_mine = made is None
-            if made is None:
-                made = self._kept[k] = Future()
-            self._kept.move_to_end(k)
-            while len(self._kept) > STRIP_CACHE_COUNT:
-                self._kept.popitem(last=False)
+            strip = self._strips.get(k)
+            is_mine = strip is None
+            if strip is None:
+                strip = self._strips[k] = Future()
+            self._strips.move_to_end(k)
+            while len(self._strips) > STRIP_CACHE_COUNT:
+                self._strips.popitem(last=False)
         if is_mine:
             try:
-                made.set_result(self._read(k))
+                strip.set_result(self._read(k))
             except BaseException as error:
                 with self._lock:
-                    self._kept.pop(k, None)
-                made.set_exception(error)
-        return made.result()
+                    self._strips.pop(k, None)
+                strip.set_exception(error)
+        return strip.result()
 
 
 class FilePlanes(RowPlanes):
@@ -166,18 +166,18 @@ class FilePlanes(RowPlanes):
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
         height, width = self.size
-        made = np.empty((height, width, 3), np.float32)
-        self._read(i, 0, height, made.transpose(2, 0, 1))
-        return made
+        image = np.empty((height, width, 3), np.float32)
+        self._read(i, 0, height, image.transpose(2, 0, 1))
+        return image
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return some rows of all planes, (n, bottom - top, w, 3)."""
         top, bottom = max(top, 0), min(bottom, self.size[0])
         # Channel by channel, as they are stored and as sums go over them.
-        made = np.empty((self.count, 3, max(bottom - top, 0), self.size[1]), np.float32)
-        for i, rows in enumerate(made):
+        block = np.empty((self.count, 3, max(bottom - top, 0), self.size[1]), np.float32)
+        for i, rows in enumerate(block):
             self._read(i, top, bottom, rows)
-        return made.transpose(0, 2, 3, 1)
+        return block.transpose(0, 2, 3, 1)
 
     def _read(self, i: int, top: int, bottom: int, into: Floats) -> None:
         """Read rows of light i into (3, bottom - top, w)."""
@@ -246,7 +246,7 @@ class ReplacedPlanes(RowPlanes):
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return some rows of all planes, (n, bottom - top, w, 3)."""
-        made = self._whole.rows(top, bottom)
+        block = self._whole.rows(top, bottom)
         for k, plane in self._planes.items():
-            made[k] = plane[top:bottom]
-        return made
+            block[k] = plane[top:bottom]
+        return block

@@ -83,7 +83,7 @@ class EncodedPlanes(RowPlanes):
     @property
     def nbytes(self) -> int:
         """Bytes of memory that the planes take."""
-        return sum(channel.nbytes for its in self._encoded for channel in its.numbers)
+        return sum(channel.nbytes for plane in self._encoded for channel in plane.numbers)
 
     def encoded(self, i: int) -> EncodedPlane:
         """Return the plane of light i as it is stored."""
@@ -91,33 +91,33 @@ class EncodedPlanes(RowPlanes):
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        made = np.empty((*self.size, 3), np.float32)
-        self._decode(i, slice(None), made.reshape(-1, 3).T)
-        return made
+        image = np.empty((*self.size, 3), np.float32)
+        self._decode(i, slice(None), image.reshape(-1, 3).T)
+        return image
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return some rows of all planes, (n, bottom - top, w, 3)."""
         height, width = self.size
         top, bottom = max(top, 0), min(bottom, height)
-        made = self.pixels(slice(top * width, max(bottom, top) * width))
-        return made.transpose(0, 2, 1).reshape(self.count, 3, -1, width).transpose(0, 2, 3, 1)
+        block = self.pixels(slice(top * width, max(bottom, top) * width))
+        return block.transpose(0, 2, 1).reshape(self.count, 3, -1, width).transpose(0, 2, 3, 1)
 
     def pixels(self, where: slice | Indices) -> Floats:
         """Return some pixels of all planes, (n, p, 3)."""
         length = self._encoded[0].numbers[0].reshape(-1)[where].size
         # Channel by channel, as they are stored and as sums go over them.
-        made = np.empty((self.count, 3, length), np.float32)
-        for i, channels in enumerate(made):
+        block = np.empty((self.count, 3, length), np.float32)
+        for i, channels in enumerate(block):
             self._decode(i, where, channels)
-        return made.transpose(0, 2, 1)
+        return block.transpose(0, 2, 1)
 
     def _decode(self, i: int, where: slice | Indices, into: Floats) -> None:
         """Write some pixels of light i into (3, p)."""
-        its = self._encoded[i]
-        for stored, channel in zip(its.numbers, into, strict=True):
+        encoded = self._encoded[i]
+        for stored, channel in zip(encoded.numbers, into, strict=True):
             copy_as_singles(stored.reshape(-1)[where], channel)
-        if its.encoding.scale != 1:
-            into *= np.float32(its.encoding.scale)
+        if encoded.encoding.scale != 1:
+            into *= np.float32(encoded.encoding.scale)
 
 
 def encoded_plane(channels: Sequence[npt.NDArray[Any]], scale: float) -> EncodedPlane:

@@ -47,12 +47,12 @@ class SpooledPlanes(RowPlanes):
 
     def plane(self, i: int) -> Floats:
         """Return the plane of light i, (h, w, 3)."""
-        made = np.ascontiguousarray(self._file.array[i].transpose(1, 2, 0))
+        image = np.ascontiguousarray(self._file.array[i].transpose(1, 2, 0))
         self._file.release()
-        return made
+        return image
 
     def rows(self, top: int, bottom: int) -> Floats:
         """Return some rows of all planes, (n, bottom - top, w, 3)."""
-        made = np.array(self._file.array[:, :, max(top, 0) : max(bottom, 0)])
+        block = np.array(self._file.array[:, :, max(top, 0) : max(bottom, 0)])
         self._file.release()
-        return made.transpose(0, 2, 3, 1)
+        return block.transpose(0, 2, 3, 1)

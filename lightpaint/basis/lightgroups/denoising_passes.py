@@ -83,26 +83,26 @@ def split_passes(layers: Sequence[RenderLayer]) -> tuple[list[RenderLayer], Deno
     has_albedo = any(_plain_name(x) in ALBEDO_NAMES for x in layers)
     of_surfaces = {*ALBEDO_NAMES, *(NORMAL_NAMES + POSITION_NAMES if has_albedo else ())}
     surfaces: list[RenderLayer] = []
-    kept: list[RenderLayer] = []
+    lit: list[RenderLayer] = []
     for layer in layers:
         is_surface = layer.is_vector or _plain_name(layer) in of_surfaces
-        (surfaces if is_surface else kept).append(layer)
-    by_name = {x.name: x for x in kept}
+        (surfaces if is_surface else lit).append(layer)
+    by_name = {x.name: x for x in lit}
     parts: dict[str, dict[str, RenderLayer]] = {}
-    for layer in kept:
-        found = PART.fullmatch(layer.name)
-        owner = None if found is None else _owner(found, by_name)
-        if found is not None and owner is not None and _is_part(layer, owner):
-            which = (found["after"] or found["before"]).casefold()
+    for layer in lit:
+        match = PART.fullmatch(layer.name)
+        owner = None if match is None else _owner(match, by_name)
+        if match is not None and owner is not None and _is_part(layer, owner):
+            which = (match["after"] or match["before"]).casefold()
             parts.setdefault(owner.name, {})[which] = layer
-    taken = [its.name for both in parts.values() for its in both.values()]
+    used = [layer.name for pair in parts.values() for layer in pair.values()]
     indirect = {
-        owner: both["indirect"].image.astype(np.float32)
-        if "indirect" in both
-        else by_name[owner].image.astype(np.float32) - both["direct"].image
-        for owner, both in parts.items()
+        owner: pair["indirect"].image.astype(np.float32)
+        if "indirect" in pair
+        else by_name[owner].image.astype(np.float32) - pair["direct"].image
+        for owner, pair in parts.items()
     }
-    left = [x for x in kept if x.name not in taken]
+    left = [x for x in lit if x.name not in used]
     return left, DenoisingPasses(tuple(surfaces), indirect)
 
 
@@ -110,15 +110,15 @@ def _plain_name(layer: RenderLayer) -> str:
     return layer.name.rpartition(".")[2].casefold().replace("_", " ")
 
 
-def _owner(found: re.Match[str], layers: Mapping[str, RenderLayer]) -> RenderLayer | None:
+def _owner(match: re.Match[str], layers: Mapping[str, RenderLayer]) -> RenderLayer | None:
     """Return the light's layer that a part is named after; None where none or several may be it."""
-    if found["owner"]:
-        return layers.get(found["owner"])
-    name = found["name"]
+    if match["owner"]:
+        return layers.get(match["owner"])
+    name = match["name"]
     if name in layers:
         return layers[name]
     ends = tuple(f"{joint}{name}" for joint in SEPARATORS)
-    owners = [x for x in layers if x != found[0] and x.endswith(ends) and is_known(x)]
+    owners = [x for x in layers if x != match[0] and x.endswith(ends) and is_known(x)]
     return layers[owners[0]] if len(owners) == 1 else None
 
 

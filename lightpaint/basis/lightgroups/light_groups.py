@@ -144,11 +144,11 @@ def _check_light(
 
 
 def _light_groups(
-    path: Path, roles: Roles, passes: DenoisingPasses, told: Sequence[str]
+    path: Path, roles: Roles, passes: DenoisingPasses, first_remarks: Sequence[str]
 ) -> LightGroups:
     """Return the light groups in these layers.
 
-    told: sentences that come before those of the roles.
+    first_remarks: sentences that come before those of the roles.
     """
     names, lights, beauty = list(roles.lights), list(roles.lights.values()), roles.beauty
     if not lights:
@@ -162,7 +162,7 @@ def _light_groups(
     listed = f"light groups named as in {roles.renderer}: {some_names(names)}"
     if beauty is not None:
         listed += f"; the whole picture: {beauty.name or 'R, G, B'}"
-    remarks = [*told, listed, *roles.remarks, missing.told]
+    remarks = [*first_remarks, listed, *roles.remarks, missing.remark]
     remarks += _remarks_on_black(roles.lights, missing.share)
     if lights[0].primaries is not None:
         remarks.append(
@@ -193,13 +193,13 @@ class _Missing:
     """The difference between the groups and the beauty.
 
     rest: (h, w, 3), None if it is no more than rounding. share, exceeding: of the beauty, None
-    without one. told: that in words.
+    without one. remark: that in words.
     """
 
     rest: Floats | None
     share: float | None
     exceeding: float | None
-    told: str
+    remark: str
 
 
 def _missing_light(roles: Roles, holes: npt.NDArray[np.bool_]) -> _Missing:
@@ -280,11 +280,11 @@ def _indirect_planes(
     parts = [passes.indirect.get(layer.name) for layer in roles.lights.values()]
     if all(part is None for part in parts):
         return None
-    made = images.copy()
-    for plane, part, layer in zip(made, parts, roles.lights.values(), strict=False):
+    indirect = images.copy()
+    for plane, part, layer in zip(indirect, parts, roles.lights.values(), strict=False):
         if part is not None:
             plane[:] = layer.in_rec709(_without_holes(part, holes))
-    return made
+    return indirect
 
 
 def _light(name: str, layer: str, plugin: str, *, is_fixed: bool = False) -> BasisLight:

@@ -100,12 +100,12 @@ class WholeFilm(FilmSums):
 
     def sums(self, *, is_last: bool) -> list[Floats]:
         """Return the sums of both halves, (planes, h, w, 3). is_last: whether they are released."""
-        made = []
+        sums = []
         for half, planes in enumerate(self._halves):
-            made.append(planes.sums())
+            sums.append(planes.sums())
             if is_last:  # saves as much memory again
                 self._halves[half] = self._tracer.planes(range(0))
-        return made
+        return sums
 
 
 class BandedFilm(FilmSums):
@@ -167,9 +167,9 @@ class FileSums:
 
     def read(self, half: int, rows: range) -> Floats:
         """Return a copy of some rows of a half, (planes, rows, w, 3)."""
-        made = np.array(self.array[half, :, rows.start : rows.stop])
+        block = np.array(self.array[half, :, rows.start : rows.stop])
         self._file.release()
-        return made
+        return block
 
     def write(self, half: int, rows: range, sums: Floats) -> None:
         """Write some rows of a half."""
@@ -178,9 +178,9 @@ class FileSums:
 
     def halves(self, planes: slice, rows: slice) -> list[Floats]:
         """Return a copy of the sums of both halves of some planes and rows."""
-        made = [np.array(half[planes, rows]) for half in self.array]
+        halves = [np.array(half[planes, rows]) for half in self.array]
         self._file.release()
-        return made
+        return halves
 
 
 class SumSets:
@@ -205,7 +205,7 @@ class SumSets:
         if last != i:
             del planes
             self._last = (-1, [])  # whose memory is free for the next
-            planes = [its[0] for its in self.rows(slice(i, i + 1), slice(None))]
+            planes = [rows[0] for rows in self.rows(slice(i, i + 1), slice(None))]
             self._last = (i, planes)
         return planes
 
@@ -216,9 +216,11 @@ class SumSets:
             return [*mean_and_half_difference(total, (self._spp, self._spp))]
         its_indirect = slice(self.lights + lights.start, self.lights + lights.stop)
         indirect = self._sums.halves(its_indirect, rows)
-        for its, part in zip(total, indirect, strict=True):
-            its += part
-        pairs = [mean_and_half_difference(its, (self._spp, self._spp)) for its in (total, indirect)]
+        for half, part in zip(total, indirect, strict=True):
+            half += part
+        pairs = [
+            mean_and_half_difference(half, (self._spp, self._spp)) for half in (total, indirect)
+        ]
         return [plane for pair in pairs for plane in pair]
 
 

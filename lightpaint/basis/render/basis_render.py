@@ -97,15 +97,17 @@ def render_basis(
             "adds as many to each: render the others first, with scene.only([...])"
         )
     has_first_hits = start is not None and not (start.features is None or start.objects is None)
-    how = scene, budget, seed, start, Keeper(keep), progress
+    arguments = scene, budget, seed, start, Keeper(keep), progress
     with render_errors(scene.path):
         if method == ONE_PASS:
-            made = _render_together(*how, is_final=is_final, needs_first_hits=not has_first_hits)
+            rendered = _render_together(
+                *arguments, is_final=is_final, needs_first_hits=not has_first_hits
+            )
         else:
-            made = _render_one_by_one(*how, is_final=is_final)
+            rendered = _render_one_by_one(*arguments, is_final=is_final)
     if start is not None and has_first_hits:
-        made = replace(made, features=start.features, objects=start.objects)
-    return with_first_hits(made, scene, seed)
+        rendered = replace(rendered, features=start.features, objects=start.objects)
+    return with_first_hits(rendered, scene, seed)
 
 
 def render_planes_only(scene: Scene, *, spp: int, seed: int) -> Basis:
@@ -127,7 +129,7 @@ def with_first_hits(basis: Basis, scene: Scene, seed: int, *, loaded: Any = None
     return replace(basis, features=features, objects=objects)
 
 
-@MITSUBA.taken()
+@MITSUBA.acquired()
 def _render_together(
     scene: Scene,
     budget: Budget,
@@ -175,7 +177,7 @@ def _render_together(
                 film.add(done, spp, let_others_through)
                 done += spp
                 keeper.now_and_then(basis)
-        made = basis(is_last=True, is_finished=is_final)
+        rendered = basis(is_last=True, is_finished=is_final)
     except KeyboardInterrupt:
         if keeper.keep is None:
             raise
@@ -193,14 +195,16 @@ def _render_together(
         ) from None
     else:
         return (
-            with_first_hits(made, scene, seed, loaded=tracer.loaded) if needs_first_hits else made
+            with_first_hits(rendered, scene, seed, loaded=tracer.loaded)
+            if needs_first_hits
+            else rendered
         )
     finally:
         tracer.close()
         gc.collect()
 
 
-@MITSUBA.taken()
+@MITSUBA.acquired()
 def _render_one_by_one(
     scene: Scene,
     budget: Budget,
@@ -221,9 +225,9 @@ def _render_one_by_one(
         origin = replace(nothing, **sums.counts())
         lights = basis_lights(scene)
         source = str(scene.path)
-        kept = None if is_finished else (sums.planes[0].copy(), sums.planes[1].copy())
+        kept_sums = None if is_finished else (sums.planes[0].copy(), sums.planes[1].copy())
         planes = as_planes(images), as_planes(half_differences)
-        return Basis(lights, *planes, seen, origin, source=source, sums=kept)
+        return Basis(lights, *planes, seen, origin, source=source, sums=kept_sums)
 
     numbers = view_seed(seed, scene.sensor)
     render_separately(

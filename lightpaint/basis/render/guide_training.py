@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 TRAINING_SAMPLES = (2**16, 2**17, 2**17)
 
 
-@MITSUBA.taken()
+@MITSUBA.acquired()
 def train_guide(scene: Scene, seed: int) -> Floats:
     """Learn which emitters to choose where in `scene`, and return the `Basis.guide_table`."""
     from lightpaint.basis.render.tracer.one_pass import Tracer

@@ -39,7 +39,7 @@ def basis_of_sums(
     """
     n, spp = len(scene.lights), half_counts(half_spp, start)
     keeps_sums = not is_finished and start is None
-    kept = (halves[0].copy(), halves[1].copy()) if keeps_sums else None
+    kept_sums = (halves[0].copy(), halves[1].copy()) if keeps_sums else None
     totals, indirect = [half[:n] for half in halves], [half[n:] for half in halves]
     for total, part in zip(totals, indirect, strict=True):
         total[: len(part)] += part
@@ -62,7 +62,7 @@ def basis_of_sums(
         guide_table,
         start=start,
         is_finished=is_finished,
-        sums=kept,
+        sums=kept_sums,
     )
 
 
@@ -103,5 +103,5 @@ def half_counts(spp: int, basis: Basis | None) -> HalfCounts:
     """Return the samples of both halves: `spp` of each, and the extra ones of a basis."""
     if basis is None or basis.extra is None:
         return spp, spp
-    its = (spp + basis.extra[..., None]).astype(np.float32)
-    return its, its
+    counts = (spp + basis.extra[..., None]).astype(np.float32)
+    return counts, counts

@@ -77,9 +77,9 @@ def steps(pixels: int, budget: Budget, done: int, progress: Progress) -> Iterato
             progress("basis", k + 1, count)
         return
     clock = Clock(budget.time_s, progress)
-    wanted = math.inf if budget.until_spp is None else half_of(budget.until_spp)
-    while clock.left_s > 0 and done < wanted:
-        spp = int(min(largest, wanted - done))
+    goal = math.inf if budget.until_spp is None else half_of(budget.until_spp)
+    while clock.left_s > 0 and done < goal:
+        spp = int(min(largest, goal - done))
         yield spp
         done += spp
         clock.report()

@@ -49,7 +49,7 @@ def _free_memory() -> int | None:
     """Return the bytes available without swapping, if the system tells (Linux)."""
     try:
         with open("/proc/meminfo", encoding="ascii") as lines:
-            found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+            available = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
     except OSError:
         return None
-    return int(found[0]) * 1024 if found else None
+    return int(available[0]) * 1024 if available else None

@@ -24,13 +24,13 @@ FINISHED, UNFINISHED = (1, 1), (0, 0)
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
     """Return True if `basis` was made of `scene` as it is, with its sensor, film and `seed`."""
     of = basis.origin
-    mine = replace(
+    current = replace(
         origin_of(scene, seed, of.method, of.halves, of.passes),
         each_light=of.each_light,
         is_composed=of.is_composed,
         extra_spp=of.extra_spp,
     )
-    return of == mine and basis.size == scene.size
+    return of == current and basis.size == scene.size
 
 
 def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
@@ -42,17 +42,17 @@ def is_on_the_way(scene: Scene, basis: Basis, spp: int | None) -> bool:
     origin = basis.origin
     if origin.is_composed or origin.extra_spp or origin.method != method_of(scene):
         return False
-    wanted = samples_for(scene, spp)
-    if origin.spp < wanted and basis.sums is None:
+    goal = samples_for(scene, spp)
+    if origin.spp < goal and basis.sums is None:
         return False
     if origin.method == ONE_PASS:
-        return origin.spp <= wanted
+        return origin.spp <= goal
     plan = plan_of_light(scene, scene.spp if spp is None else spp)
     sizes = [[size for half, size in plan if half == h] for h in range(2)]
     return all(
-        count <= len(its) and sum(its[:count]) == done
+        count <= len(half_sizes) and sum(half_sizes[:count]) == done
         for a, b, first, second in origin.each_light or ((*origin.halves, *origin.passes),)
-        for its, done, count in zip(sizes, (a, b), (first, second), strict=True)
+        for half_sizes, done, count in zip(sizes, (a, b), (first, second), strict=True)
     )
 
 

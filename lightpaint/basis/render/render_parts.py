@@ -90,13 +90,13 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
 def _separate_parts(scene: Scene, spp: int, start: Basis | None) -> list[Part]:
     """Return the passes of each light, numbered from its first one on."""
     height, _ = scene.size
-    there = LightSums(len(scene.lights), (0, 0)) if start is None else LightSums.counted(start)
+    sums = LightSums(len(scene.lights), (0, 0)) if start is None else LightSums.counted(start)
     parts = []
     for light in range(len(scene.lights)):
-        done, numbers = list(there.done(light)), there.passes[light].tolist()
-        for half, its in plan_of_light(scene, spp, done=(done[0], done[1])):
-            parts.append(Part(0, height, done[half], its, light, half, numbers[half]))
-            done[half] += its
+        done, numbers = list(sums.done(light)), sums.passes[light].tolist()
+        for half, pass_spp in plan_of_light(scene, spp, done=(done[0], done[1])):
+            parts.append(Part(0, height, done[half], pass_spp, light, half, numbers[half]))
+            done[half] += pass_spp
             numbers[half] += 1
     return parts
 
@@ -117,7 +117,7 @@ class PartRenderer:
         self._light: int | None = None
         self._loaded: Any = None
 
-    @MITSUBA.taken()
+    @MITSUBA.acquired()
     def render(self, part: Part) -> tuple[Floats, Floats]:
         """Return the sums of its samples and how many rays saw an emitter, of each half it is of.
 
@@ -137,18 +137,18 @@ class PartRenderer:
         with tracing() as let_others_through:
             for half, planes in enumerate(halves):
                 for done in range(0, part.spp, step):
-                    its = min(step, part.spp - done)
-                    self._tracer.add(planes, half, rows, part.first + done, its)
+                    pass_spp = min(step, part.spp - done)
+                    self._tracer.add(planes, half, rows, part.first + done, pass_spp)
                     let_others_through()
         return np.stack([x.sums() for x in halves]), np.stack([x.seen() for x in halves])
 
     def _of_light(self, part: Part, light: int) -> tuple[Floats, Floats]:
         if self._light != light:
             self.close()
-            its = self._scene.lights[light].name
+            name = self._scene.lights[light].name
             white, black = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
             self._loaded = self._scene.load(
-                {x.name: white if x.name == its else black for x in self._scene.lights}
+                {x.name: white if x.name == name else black for x in self._scene.lights}
             )
             self._light = light
         assert part.half is not None

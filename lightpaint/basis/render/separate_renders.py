@@ -61,8 +61,8 @@ class LightSums:
     def counted(cls, basis: Basis) -> "LightSums":
         """Return the samples and passes that made `basis`, without their sums."""
         origin, sums = basis.origin, cls(len(basis.lights), (0, 0))
-        each = origin.each_light or ((*origin.halves, *origin.passes),) * len(basis.lights)
-        sums.spp[:], sums.passes[:] = np.array(each)[:, :2], np.array(each)[:, 2:]
+        each_light = origin.each_light or ((*origin.halves, *origin.passes),) * len(basis.lights)
+        sums.spp[:], sums.passes[:] = np.array(each_light)[:, :2], np.array(each_light)[:, 2:]
         return sums
 
     def done(self, light: int) -> tuple[int, int]:
@@ -84,10 +84,10 @@ class LightSums:
         """Return the fields of an Origin that count samples."""
         # Of one half alone the noise is unknown: what counts is what both have.
         spp, passes = int(self.spp.min()), int(self.passes.min())
-        each: tuple[tuple[int, ...], ...] = ()
+        each_light: tuple[tuple[int, ...], ...] = ()
         if (self.spp != spp).any() or (self.passes != passes).any():
-            each = tuple(map(tuple, np.hstack([self.spp, self.passes]).tolist()))
-        return {"halves": (spp, spp), "passes": (passes, passes), "each_light": each}
+            each_light = tuple(map(tuple, np.hstack([self.spp, self.passes]).tolist()))
+        return {"halves": (spp, spp), "passes": (passes, passes), "each_light": each_light}
 
 
 def render_separately(
@@ -202,11 +202,11 @@ def light_pass(
     """Return the undivided sum of a pass, (h, w, 3). number: its index for that light and half."""
     # Each light has samples of its own.
     of_light = pass_seed(seed, Stream.BASIS, light)
-    its = pass_seed(of_light, Stream.BASIS, 2 * number + half)
-    return spp * as_float32(render_pass(loaded, scene, seed=its, spp=spp))
+    seed_of_pass = pass_seed(of_light, Stream.BASIS, 2 * number + half)
+    return spp * as_float32(render_pass(loaded, scene, seed=seed_of_pass, spp=spp))
 
 
-@MITSUBA.taken()
+@MITSUBA.acquired()
 def emitters_seen(scene: Scene) -> Bools:
     """Return (h, w), pixels that show the camera an emitter, directly or through clear glass."""
     import mitsuba as mi

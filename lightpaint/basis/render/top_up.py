@@ -45,13 +45,13 @@ class KeptTracer:
         """Return a tracer that goes on with `basis`, which was rendered of `scene`."""
         from lightpaint.basis.render.tracer.one_pass import Tracer
 
-        its, seed = self._tracer, basis.origin.seed
-        is_same = its is not None and its.scene is scene and self._seed == seed
-        if its is None or not is_same or not _is_equal(its.guide_table, basis.guide_table):
+        tracer, seed = self._tracer, basis.origin.seed
+        is_same = tracer is not None and tracer.scene is scene and self._seed == seed
+        if tracer is None or not is_same or not _is_equal(tracer.guide_table, basis.guide_table):
             self.close()
-            its = Tracer(scene, view_seed(seed, scene.sensor), basis.guide_table)
-            self._tracer, self._seed = its, seed
-        return its
+            tracer = Tracer(scene, view_seed(seed, scene.sensor), basis.guide_table)
+            self._tracer, self._seed = tracer, seed
+        return tracer
 
     def close(self) -> None:
         """Release the scene."""
@@ -68,7 +68,7 @@ def _is_equal(a: Floats | None, b: Floats | None) -> bool:
 @contextmanager
 def kept_loaded() -> Iterator[KeptTracer]:
     """Hold Mitsuba, and keep the scene of a top-up loaded for the next one within the block."""
-    with MITSUBA.taken():
+    with MITSUBA.acquired():
         tracers = KeptTracer()
         try:
             yield tracers
@@ -102,12 +102,12 @@ def top_up(
     batches = list(pixel_batches(counts, 2 * plane_count(scene)))
     guide_table = basis.guide_table
     with (
-        nullcontext(tracers) if tracers is not None else kept_loaded() as kept,
+        nullcontext(tracers) if tracers is not None else kept_loaded() as kept_tracers,
         render_errors(scene.path),
     ):
         try:
             with tracing() as let_others_through:
-                tracer = kept.of(scene, basis)
+                tracer = kept_tracers.of(scene, basis)
                 if batches and not tracer.is_trained:
                     train(tracer, let_others_through)
                 guide_table = tracer.guide_table
@@ -161,7 +161,7 @@ class _PlaneSums:
         self._all = [basis.planes.array().copy(), basis.noise.array().copy()]
         if self._is_split and basis.indirect is not None:
             self._all += [
-                its.array().copy() for its in (basis.indirect.planes, basis.indirect.noise)
+                planes.array().copy() for planes in (basis.indirect.planes, basis.indirect.noise)
             ]
 
     def add(self, pixels: Indices, halves: list[Floats], first: Indices, spp: Indices) -> None:
@@ -172,23 +172,27 @@ class _PlaneSums:
         for total, part in zip(totals, indirect, strict=True):
             total[: len(part)] += part
         for which, added in enumerate((totals, indirect)[: 1 + self._is_split]):
-            both = self._all[2 * which : 2 * which + 2]
+            pair = self._all[2 * which : 2 * which + 2]
             for k, (a, b) in enumerate(self._half_spp()):
-                its = [half[k : k + 1] for half in added]
+                light_halves = [half[k : k + 1] for half in added]
                 old, new = (
                     [(x + y)[:, None].astype(np.float32) for x in (a, b)]
                     for y in (first, first + spp)
                 )
-                there = [as_planes(flat(plane[k : k + 1])[:, pixels][:, None]) for plane in both]
-                add_halves(its, there[0], there[1], old)
-                for plane, made in zip(both, mean_and_half_difference(its, new), strict=True):
-                    flat(plane)[k, pixels] = made[0, 0]
+                old_planes = [
+                    as_planes(flat(plane[k : k + 1])[:, pixels][:, None]) for plane in pair
+                ]
+                add_halves(light_halves, old_planes[0], old_planes[1], old)
+                for plane, updated in zip(
+                    pair, mean_and_half_difference(light_halves, new), strict=True
+                ):
+                    flat(plane)[k, pixels] = updated[0, 0]
 
     def _half_spp(self) -> list[tuple[int, int]]:
         """Return the uniform samples of each light in both halves."""
         origin = self._basis.origin
         if origin.each_light:
-            return [its[:2] for its in origin.each_light]
+            return [counts[:2] for counts in origin.each_light]
         return [origin.halves] * self._lights
 
     def basis(self, extra: Indices, guide_table: Floats | None) -> Basis:

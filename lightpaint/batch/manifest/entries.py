@@ -174,7 +174,7 @@ def _table_looks(
     example = expanded[0] if expanded else _partial_entry(manifest, sources, table, entry)
     if "export" in entry.want and (example.scenes or example.basis):
         check_handover(mistakes, label, entry.handover, example)
-    for name in {one.name for one in expanded} or {entry.name} - {""}:
+    for name in {x.name for x in expanded} or {entry.name} - {""}:
         if not is_name(name):
             mistakes.add(label, f"{name!r} is no name for a folder: say name = ...")
     if len(mistakes.lines) == mistakes_before and not table.unclear:

@@ -51,9 +51,9 @@ def interpolate(ends: Sequence[Lighting], share: float, *, space: Space) -> Ligh
     """
     first, second = ends
     apart = [
-        one.name
-        for one, other in zip(first.places, second.places, strict=False)
-        if not one.site.is_near(other.site)
+        place.name
+        for place, end_place in zip(first.places, second.places, strict=False)
+        if not place.site.is_near(end_place.site)
     ]
     if apart:
         raise LightingError(

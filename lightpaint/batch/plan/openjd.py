@@ -50,14 +50,14 @@ def template_of(plan: Plan, folder: Path, command: Sequence[str]) -> dict[str, A
 
     base = folder.resolve()
 
-    def path(default: Path, kind: str, flow: str, about: str) -> dict[str, Any]:
+    def path(default: Path, kind: str, flow: str, description: str) -> dict[str, Any]:
         file = default.resolve()
         if base not in (file, *file.parents):
             # The default of a PATH parameter may not lie outside the folder of the job.
-            return {"type": "STRING", "default": str(file), "description": about}
+            return {"type": "STRING", "default": str(file), "description": description}
         inside = os.path.relpath(file, base)
         definition = {"type": "PATH", "objectType": kind, "dataFlow": flow, "default": inside}
-        return {**definition, "description": about}
+        return {**definition, "description": description}
 
     manifest = path(plan.manifest, "FILE", "IN", "The looks.")
     output = path(plan.folder, "DIRECTORY", "OUT", "Receives a folder for each look.")

@@ -179,10 +179,10 @@ def key_of_scene(scene: SceneFile, settings: Settings) -> str:
     return json.dumps({"scene": asdict(scene), **render_settings})
 
 
-def _map_paths(given: Any, move: PathMap) -> Any:
+def _map_paths(content: Any, move: PathMap) -> Any:
     """Return a job's plain values with other paths; `move` leaves all other texts unchanged."""
-    if isinstance(given, dict):
-        return {key: _map_paths(value, move) for key, value in given.items()}
-    if isinstance(given, list):
-        return [_map_paths(value, move) for value in given]
-    return move(given) if isinstance(given, str) else given
+    if isinstance(content, dict):
+        return {key: _map_paths(value, move) for key, value in content.items()}
+    if isinstance(content, list):
+        return [_map_paths(value, move) for value in content]
+    return move(content) if isinstance(content, str) else content

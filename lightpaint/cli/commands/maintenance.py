@@ -56,10 +56,10 @@ def doctor(*, variant: str | None) -> CommandOutcome:
     findings = examine(variant)
     for finding in findings:
         mark = {"ok": "ok", "missing": "MISSING", "info": ""}[finding.state]
-        terminal.write(f"{finding.what:18s} {mark:8s} {finding.found}")
+        terminal.write(f"{finding.subject:18s} {mark:8s} {finding.result}")
     missing = [finding for finding in findings if finding.state == "missing"]
     for finding in missing:
         if finding.remedy:
-            terminal.write(f"to fix {finding.what}: {finding.remedy}")
+            terminal.write(f"to fix {finding.subject}: {finding.remedy}")
     terminal.write("something is missing" if missing else "everything that is needed works")
     return CommandOutcome(lambda: documents.doctor_document(findings), 2 if missing else 0)

@@ -180,8 +180,8 @@ def demo(*, folder: Path, variant: str | None, settings: Settings) -> CommandOut
     terminal.write(f"Open {written.answer / 'report.html'} in a browser. Then paint your own:")
     terminal.write(f"lightpaint template {shlex.quote(str(written.scene))}")
     fields = {"scene": str(written.scene), "painting": str(written.painting), "command": command}
-    results = solved.told
-    return replace(solved, told=lambda: fields | (results() if results is not None else {}))
+    results = solved.document
+    return replace(solved, document=lambda: fields | (results() if results is not None else {}))
 
 
 def relight(

@@ -124,9 +124,9 @@ def doctor_document(findings: Sequence[Finding]) -> dict[str, Any]:
         "ok": all(finding.state != "missing" for finding in findings),
         "findings": [
             {
-                "what": finding.what,
+                "what": finding.subject,
                 "state": finding.state,
-                "found": finding.found,
+                "found": finding.result,
                 **({"remedy": finding.remedy} if finding.remedy else {}),
             }
             for finding in findings

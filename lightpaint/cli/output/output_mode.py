@@ -39,10 +39,10 @@ class OutputMode:
 class CommandOutcome:
     """The outcome of a command.
 
-    told: creates the document for programs, on request; None if it was printed already.
+    document: creates the document for programs, on request; None if it was printed already.
     """
 
-    told: Callable[[], dict[str, Any]] | None
+    document: Callable[[], dict[str, Any]] | None
     code: int = 0
 
 

@@ -146,7 +146,7 @@ class TerminalListener:
     """
 
     def __init__(self) -> None:
-        self._said: set[str] = set()
+        self._shown_notes: set[str] = set()
         self._bars: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
         self._workers: dict[str, TaskID] = {}
@@ -203,9 +203,9 @@ class TerminalListener:
 
     def say(self, text: str) -> None:
         """Print a remark, above the bars if there are any."""
-        if text in self._said:
+        if text in self._shown_notes:
             return
-        self._said.add(text)
+        self._shown_notes.add(text)
         if self._bars is None:
             say(text)
             return

@@ -134,7 +134,7 @@ class _Sigmoid:
     def with_derivative(self, x: Floats) -> tuple[Floats, Floats]:
         """Return `forward` and its derivative."""
         below = x < self.pivot[0]
-        scale, power = (np.where(below, *each) for each in (self.scales, self.powers))
+        scale, power = (np.where(below, *ends) for ends in (self.scales, self.powers))
         # Keep float32 if x is float32.
         scale, power = scale.astype(x.dtype), power.astype(x.dtype)
         run = self.contrast * (x - self.pivot[0])

@@ -171,9 +171,9 @@ def _solve_together(
         rows = np.flatnonzero(reached)
         M, b = np.ascontiguousarray(M[:, rows][:, :, rows]), b[:, rows]
         counts, power = counts[:, rows], power[:, rows]
-    its = counts & asks[:, None]
-    root = np.sqrt(np.where(its, power, 1))
-    scale = np.where(its, 1 / root, 0)
+    active = counts & asks[:, None]
+    root = np.sqrt(np.where(active, power, 1))
+    scale = np.where(active, 1 / root, 0)
     M, b = (M * scale[:, :, None]) * scale[:, None, :], b * scale
     low, high = lower[:, rows] * root, upper[:, rows] * root
     size = np.abs(b).max(axis=1)
@@ -181,7 +181,7 @@ def _solve_together(
         pull = np.matmul(M, np.clip(0, low, high)[:, :, None])[:, :, 0]
         size = np.maximum(size, np.abs(pull).max(axis=1))
     size = np.where(asks, size, 1)
-    begin = np.where(its, np.minimum(np.maximum(start[:, rows] * root, low), high), 0)
+    begin = np.where(active, np.minimum(np.maximum(start[:, rows] * root, low), high), 0)
     with one_thread():
         x, residuals, steps, is_singular = clipped_newton(
             M, b, low, high, begin, size, tolerance=tolerance

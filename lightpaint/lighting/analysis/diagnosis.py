@@ -217,15 +217,15 @@ def _place(solution: Solution, unreachable: Floats) -> Place | None:
     def block_sums(part: Callable[[slice], Floats]) -> Floats:
         sums = []
         for top, bottom in pairwise(rows.tolist()):
-            its = part(slice(top, bottom))
-            sums.append(np.add.reduceat(its.sum(axis=0, dtype=np.float64), columns[:-1], 0))
+            band = part(slice(top, bottom))
+            sums.append(np.add.reduceat(band.sum(axis=0, dtype=np.float64), columns[:-1], 0))
         return np.stack(sums)
 
     D = solution.weight
     # Noise averages out: the square of a block's mean is nearly free of it.
-    counted = block_sums(lambda its: D[its])
+    counted = block_sums(lambda part_rows: D[part_rows])
     safe = np.where(counted > 0, counted, 1)
-    lacking = block_sums(lambda its: D[its] * unreachable[its]) / safe
+    lacking = block_sums(lambda part_rows: D[part_rows] * unreachable[part_rows]) / safe
     energy = (counted * np.square(lacking)).sum(axis=-1)
     if not energy.any():
         return None
@@ -235,7 +235,7 @@ def _place(solution: Solution, unreachable: Floats) -> Place | None:
     worst = np.unravel_index(int(np.argmax(region)), region.shape)
     inside = (place_of[0] == worst[0])[:, None] & (place_of[1] == worst[1])
     y, x = np.unravel_index(int(np.argmax(np.where(inside, energy, -1))), energy.shape)
-    painted = (block_sums(lambda its: D[its] * solution.image[its]) / safe)[y, x]
+    painted = (block_sums(lambda part_rows: D[part_rows] * solution.image[part_rows]) / safe)[y, x]
     return Place(
         region=(int(worst[0]), int(worst[1])),
         share=float(region[worst] / energy.sum()),

@@ -65,8 +65,8 @@ class ErrorEnergies:
                 ]
             )
 
-        its = np.sum(parallel_map(sums, bands_of(predicted.shape)), axis=0).tolist()
-        total, out_of_reach, noise, ignored, painted = its
+        energies = np.sum(parallel_map(sums, bands_of(predicted.shape)), axis=0).tolist()
+        total, out_of_reach, noise, ignored, painted = energies
         return cls(total, out_of_reach, noise, ignored, painted)
 
 

@@ -67,17 +67,17 @@ def _weights(basis: Basis, values: Mapping[str, Any] | npt.ArrayLike) -> Doubles
     return weights
 
 
-def _numbers(values: Any, what: str, shapes: tuple[tuple[int, ...], ...]) -> Doubles:
+def _numbers(values: Any, name: str, shapes: tuple[tuple[int, ...], ...]) -> Doubles:
     """Return weights as an array of one of these shapes. Raises LightingError for anything else."""
     expected = " or ".join(str(shape) if shape else "one number" for shape in shapes)
     try:
         weights = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise LightingError(
-            f"{what}: weights of the type {type(values).__name__}: expected {expected}"
+            f"{name}: weights of the type {type(values).__name__}: expected {expected}"
         ) from None
     if weights.shape not in shapes:
-        raise LightingError(f"{what}: weights of the shape {weights.shape}: expected {expected}")
+        raise LightingError(f"{name}: weights of the shape {weights.shape}: expected {expected}")
     if (wrong := weights[~(np.isfinite(weights) & (weights >= 0))]).size:
-        raise LightingError(f"{what}: a weight of {wrong[0]:g}: expected finite numbers >= 0")
+        raise LightingError(f"{name}: a weight of {wrong[0]:g}: expected finite numbers >= 0")
     return weights

@@ -24,7 +24,7 @@ class Software:
 
     @classmethod
     @cache
-    def here(cls) -> "Software":
+    def installed(cls) -> "Software":
         """Return the versions of this process."""
         blas, kernel = linear_algebra()
         return cls(__version__, version("numpy"), blas, kernel, version("mitsuba"))

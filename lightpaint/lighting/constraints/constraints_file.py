@@ -58,9 +58,9 @@ def _without_moves(light: Any, source: str) -> Any:
     tables = {}
     for name, table in light.items():
         check_keys(table, (*LIGHT_KEYS, *MOVES), f"{source}: light.{name}")
-        kept = {key: value for key, value in table.items() if key not in MOVES}
-        if kept or not table:
-            tables[name] = kept
+        remaining = {key: value for key, value in table.items() if key not in MOVES}
+        if remaining or not table:
+            tables[name] = remaining
     return tables
 
 

@@ -165,15 +165,15 @@ class TiledEquations:
         self._b[0][rows, columns, :, :n] = b
         self._b[0][rows, columns, :, n] = np.matmul(target, painted.swapaxes(-1, -2))[..., 0, 0]
         if with_M:
-            one = _BUFFERS.array("one", lit.shape)
-            np.multiply(lit, np.sqrt(D)[:, :, :, None], out=one)
-            two = one
+            channel = _BUFFERS.array("one", lit.shape)
+            np.multiply(lit, np.sqrt(D)[:, :, :, None], out=channel)
+            two = channel
             if n <= MAX_CHEAP_LIGHTS:
                 # Of one array and itself numpy forms half of the product, of two all of it, which
                 # is faster for few lights.
                 two = _BUFFERS.array("two", lit.shape)
-                two[...] = one
-            np.matmul(one, two.swapaxes(-1, -2), out=self._M[0][rows, columns])
+                two[...] = channel
+            np.matmul(channel, two.swapaxes(-1, -2), out=self._M[0][rows, columns])
 
 
 class _TileReader:
@@ -205,16 +205,16 @@ class _Buffers(threading.local):
     """Memory of a thread that is reused: new pages from the system take as long as the sums."""
 
     def __init__(self) -> None:
-        self._kept: dict[str, Doubles] = {}
+        self._arrays: dict[str, Doubles] = {}
 
     def array(self, name: str, shape: tuple[int, ...]) -> Doubles:
         """Return an array of any content, valid until the next call with that name."""
         size = prod(shape)
         if 8 * size > 2 * CHUNK_BYTES:
             return np.empty(shape)
-        if name not in self._kept or self._kept[name].size < size:
-            self._kept[name] = np.empty(size)
-        return self._kept[name][:size].reshape(shape)
+        if name not in self._arrays or self._arrays[name].size < size:
+            self._arrays[name] = np.empty(size)
+        return self._arrays[name][:size].reshape(shape)
 
 
 _BUFFERS = _Buffers()

@@ -36,10 +36,10 @@ class ReducedProblem:
     upper: Doubles
     caps: tuple[Cap, ...]
 
-    def restricted(self, kept: Indices) -> "ReducedProblem":
+    def restricted(self, unknowns: Indices) -> "ReducedProblem":
         """Return the problem of some of its unknowns, (k,) places among them, with the others at
         0."""
-        place = {int(k): j for j, k in enumerate(kept)}
+        place = {int(k): j for j, k in enumerate(unknowns)}
         caps = tuple(
             replace(cap, unknowns=tuple(place[i] for i in cap.unknowns))
             for cap in self.caps
@@ -47,11 +47,11 @@ class ReducedProblem:
         )
         return ReducedProblem(
             self.channels,
-            self.unknowns[kept],
-            self.M[np.ix_(kept, kept)],
-            self.b[kept],
-            self.lower[kept],
-            self.upper[kept],
+            self.unknowns[unknowns],
+            self.M[np.ix_(unknowns, unknowns)],
+            self.b[unknowns],
+            self.lower[unknowns],
+            self.upper[unknowns],
             caps,
         )
 

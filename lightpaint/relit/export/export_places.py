@@ -92,8 +92,10 @@ def conversion_of(
 
     present: positions of the lights in the program, by name.
     """
-    known = [x for place in places for x in (old_position(place), place.position) if x is not None]
-    size = float(np.abs(known).max(initial=0.0))
+    places_known = [
+        x for place in places for x in (old_position(place), place.position) if x is not None
+    ]
+    size = float(np.abs(places_known).max(initial=0.0))
     pairs = [
         (old, present[place.name])
         for place in places

@@ -130,8 +130,8 @@ def nuke_layer(layer: RenderLayer) -> str:
 
 def _in_nuke(name: str) -> str:
     pieces = [piece.lstrip("0123456789") for piece in name.split(".")]
-    told = "_".join(piece for piece in pieces if piece).encode("utf-8", "surrogateescape")
-    return re.sub(rb"[^A-Za-z0-9]", b"_", told).decode("ascii")
+    spoken = "_".join(piece for piece in pieces if piece).encode("utf-8", "surrogateescape")
+    return re.sub(rb"[^A-Za-z0-9]", b"_", spoken).decode("ascii")
 
 
 def _copied_names(groups: LightGroups) -> list[str]:
@@ -170,7 +170,7 @@ def _path(file: Path) -> str:
 
 def quoted(text: str) -> str:
     """Return any text as one word of Tcl."""
-    escaped = SPECIAL.sub(lambda found: f"\\{found[0]}", text)
+    escaped = SPECIAL.sub(lambda match: f"\\{match[0]}", text)
     return '"' + escaped.replace("\r", "").replace("\n", "\\n") + '"'
 
 

@@ -131,9 +131,9 @@ def _prims_of(opened: Any, names: Iterable[str]) -> dict[str, tuple[str, str]]:
 
     stage_lights, prims = _lights_of(opened), {}
     for name in names:
-        found = stage_lights.get(name) or stage_lights.get(Tf.MakeValidIdentifier(name)) or {}
-        if len(found) == 1:
-            [prims[name]] = found.items()
+        types = stage_lights.get(name) or stage_lights.get(Tf.MakeValidIdentifier(name)) or {}
+        if len(types) == 1:
+            [prims[name]] = types.items()
     return prims
 
 

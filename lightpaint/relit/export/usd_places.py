@@ -69,7 +69,7 @@ class UsdPlaces:
         """
         from pxr import Tf, UsdLux
 
-        made: dict[str, tuple[str, str]] = {}
+        added: dict[str, tuple[str, str]] = {}
         used = self._children(scope)
         for place in self._changed:
             if not place.new or place.name in self._prims or not self._conversion.is_known:
@@ -89,8 +89,8 @@ class UsdPlaces:
                 UsdLux.SphereLight(prim).CreateTreatAsPointAttr(True)
                 UsdLux.SphereLight(prim).CreateRadiusAttr(RADIUS)
             self._place(path, place, None)
-            made[place.name] = path, schema
-        return made
+            added[place.name] = path, schema
+        return added
 
     def move(self) -> tuple[str, ...]:
         """Set the places of lights that moved; return the names of those that stay as they are.
@@ -128,8 +128,8 @@ class UsdPlaces:
         if not self._conversion.is_known:
             return False
         point = self._world(path)[3, :3]
-        known = [x for x in (old_position(place), place.position) if x is not None]
-        return not known or any(self._conversion.is_at(x, point) for x in known)
+        expected = [x for x in (old_position(place), place.position) if x is not None]
+        return not expected or any(self._conversion.is_at(x, point) for x in expected)
 
     def _place(self, path: str, place: EmitterPlace, old: Doubles | None) -> None:
         """Write transform and cone of a prim. old: (4, 4), its present transform to the world."""

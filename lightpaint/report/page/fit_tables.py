@@ -84,11 +84,11 @@ def _light_tests(v: Verification) -> list[tuple[str, str]]:
     """
     if not v.power:
         return []
-    in_order = sorted(v.power.items(), key=lambda its: its[1])
-    told = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
-    rows = [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(told, room=400))]
+    in_order = sorted(v.power.items(), key=lambda entry: entry[1])
+    powers = [f"{100 * power:.0f} % in {name}" for name, power in in_order]
+    rows = [(f"Chance of seeing an error of {100 * ERROR:.0f} %", some_of(powers, room=400))]
     if v.z_lights:
-        name, z = max(v.z_lights.items(), key=lambda its: abs(its[1]))
+        name, z = max(v.z_lights.items(), key=lambda entry: abs(entry[1]))
         limit = limit_of_tests(len(v.z_lights), once=v.limit)
         far = f"{z:+.2f} in {name}, the largest of {len(v.z_lights)}; limit ±{limit:.3g}"
         rows.insert(0, ("z of each light", far.replace("-", "−")))
@@ -184,7 +184,7 @@ def versions(basis: Basis) -> str:
         for name in ("mitsuba", "drjit", "numpy")
         if (installed := version(name))
     ]
-    software = Software.here()
+    software = Software.installed()
     parts.append(f"{software.blas} {software.kernel}".strip())
     return " · ".join([*parts, f"Python {platform.python_version()}"])
 

@@ -40,17 +40,17 @@ def aim_picture(
         if new is None:
             continue
         is_any = True
-        here = zoom * np.array(new)
+        tip = zoom * np.array(new)
         if before is not None:
-            there = zoom * np.array(before)
-            circle(draw, there, 0.35 * text, outline=CHANGED, width=max(2, text // 8))
-            if float(np.hypot(*(here - there))) > text:
-                arrow(draw, there, here, CHANGED, width=max(2, text // 8), head=0.8 * text)
-        circle(draw, here, 0.3 * text, outline=CHANGED, width=1, fill=CHANGED)
+            tail = zoom * np.array(before)
+            circle(draw, tail, 0.35 * text, outline=CHANGED, width=max(2, text // 8))
+            if float(np.hypot(*(tip - tail))) > text:
+                arrow(draw, tail, tip, CHANGED, width=max(2, text // 8), head=0.8 * text)
+        circle(draw, tip, 0.3 * text, outline=CHANGED, width=1, fill=CHANGED)
         label = visible(light.place.name)
         wide = font.getlength(label)
-        x = float(np.clip(here[0] + 0.6 * text, 0, max(size[0] - wide - 4, 0)))
-        y = float(np.clip(here[1], text, size[1] - text))
+        x = float(np.clip(tip[0] + 0.6 * text, 0, max(size[0] - wide - 4, 0)))
+        y = float(np.clip(tip[1], text, size[1] - text))
         edge = {"stroke_width": text // 7, "stroke_fill": GROUND}
         draw.text((x, y), label, CHANGED, font, anchor="lm", **edge)
     if not is_any:

@@ -220,13 +220,13 @@ def _room(panel: _Panel, geometry: ViewGeometry, colors: Doubles) -> npt.NDArray
     depth = geometry.points @ towards
     # Coarse points first, so that they only fill gaps between others.
     for side in sorted({*sides[faces].tolist()}, reverse=True):
-        here = np.flatnonzero(faces & (sides == side))
-        here = here[np.argsort(depth[here])]
+        shown_faces = np.flatnonzero(faces & (sides == side))
+        shown_faces = shown_faces[np.argsort(depth[shown_faces])]
         for i in range(side):
             for j in range(side):
-                across, down = x[here] + i - side // 2, y[here] + j - side // 2
+                across, down = x[shown_faces] + i - side // 2, y[shown_faces] + j - side // 2
                 inside = (across >= 0) & (across < width) & (down >= 0) & (down < height)
-                image[down[inside], across[inside]] = shade[here[inside]]
+                image[down[inside], across[inside]] = shade[shown_faces[inside]]
     return image
 
 
@@ -235,11 +235,11 @@ def _draw_camera(
 ) -> None:
     assert geometry.camera is not None
     inside = np.array([1.5 * text, 1.5 * text]), np.array(panel.size) - 1.5 * text
-    there = panel.at(geometry.camera)
-    way = panel.at(np.median(geometry.points, axis=0)) - there
+    eye = panel.at(geometry.camera)
+    way = panel.at(np.median(geometry.points, axis=0)) - eye
     way = way / max(float(np.hypot(*way)), 1e-9)
     # One that stands farther away is drawn at the edge.
-    x, y = np.clip(there, *inside)
+    x, y = np.clip(eye, *inside)
     side = np.array([-way[1], way[0]])
     size = 0.8 * text
     corners = [(x, y), *(tuple((x, y) + size * (1.6 * way + s * side)) for s in (0.7, -0.7))]
@@ -280,23 +280,23 @@ def _draw_beam(
 def _draw_light(draw: ImageDraw.ImageDraw, panel: _Panel, light: HungLight, text: int) -> None:
     """Draw where a light hangs and, if it moved, where it hung before."""
     assert light.place.position is not None
-    here, radius = panel.at(light.place.position), 0.42 * text
+    centre, radius = panel.at(light.place.position), 0.42 * text
     thin = max(2, text // 9)
     old = light.place.moved_from
     if old is not None and old.position is not None:
-        there = panel.at(old.position)
-        circle(draw, there, 0.8 * radius, outline=CHANGED, width=thin)
-        if float(np.hypot(*(here - there))) > 2.2 * radius:
-            arrow(draw, there, here, CHANGED, width=thin, head=0.8 * text)
+        old_centre = panel.at(old.position)
+        circle(draw, old_centre, 0.8 * radius, outline=CHANGED, width=thin)
+        if float(np.hypot(*(centre - old_centre))) > 2.2 * radius:
+            arrow(draw, old_centre, centre, CHANGED, width=thin, head=0.8 * text)
     edge = CHANGED if light.is_changed else TEXT
-    circle(draw, here, radius, fill=_shown(light.color), outline=edge, width=thin)
+    circle(draw, centre, radius, fill=_shown(light.color), outline=edge, width=thin)
 
 
 def _draw_names(
     draw: ImageDraw.ImageDraw, panel: _Panel, names: Mapping[str, HungLight], text: int
 ) -> None:
     """Draw names beside lights, moved down where one would cover another."""
-    font, taken = ImageFont.load_default(round(0.9 * text)), list[tuple[float, ...]]()
+    font, occupied = ImageFont.load_default(round(0.9 * text)), list[tuple[float, ...]]()
     for name, light in sorted(names.items(), key=lambda item: not item[1].is_changed):
         assert light.place.position is not None
         x, y = panel.at(light.place.position)
@@ -308,13 +308,13 @@ def _draw_names(
         top = y - 0.5 * text
         for _ in range(len(names)):
             box = (left, top, left + wide, top + 1.05 * text)
-            over = [b for b in taken if _overlap(box, b)]
+            over = [b for b in occupied if _overlap(box, b)]
             if not over:
                 break
             top = max(b[3] for b in over)
         if top + text > panel.size[1]:
             continue  # a plan of a hundred lamps has no room for their names
-        taken.append((left, top, left + wide, top + 1.05 * text))
+        occupied.append((left, top, left + wide, top + 1.05 * text))
         color = CHANGED if light.is_changed else (190, 190, 194)
         draw.text((left, top), label, color, font, stroke_width=text // 8, stroke_fill=GROUND)
 

@@ -117,16 +117,16 @@ def _projection(points: Doubles, pixels: Doubles) -> Doubles | None:
     points, pixels = points[::step], pixels[::step]
     # Numbers of equal size keep the equations well conditioned.
     to_unit, from_unit = _to_unit(points), np.linalg.inv(_to_unit(pixels))
-    here, there = (_moved(_to_unit(x), x) for x in (points, pixels))
-    kept = np.arange(len(points))
+    scaled_points, scaled_pixels = (_moved(_to_unit(x), x) for x in (points, pixels))
+    inliers = np.arange(len(points))
     matrix = np.zeros((3, 4))
     for _ in range(PASSES):
-        matrix = _linear_fit(here[kept], there[kept])
-        seen = np.c_[here, np.ones(len(here))] @ matrix.T
+        matrix = _linear_fit(scaled_points[inliers], scaled_pixels[inliers])
+        seen = np.c_[scaled_points, np.ones(len(scaled_points))] @ matrix.T
         if np.median(seen[:, 2]) < 0:
             matrix, seen = -matrix, -seen
-        error = np.linalg.norm(seen[:, :2] / seen[:, 2:] - there, axis=1)
-        kept = np.argsort(error)[: max(LEAST, int(KEPT * len(error)))]
+        error = np.linalg.norm(seen[:, :2] / seen[:, 2:] - scaled_pixels, axis=1)
+        inliers = np.argsort(error)[: max(LEAST, int(KEPT * len(error)))]
     whole = from_unit @ matrix @ to_unit
     seen = np.c_[points, np.ones(len(points))] @ whole.T
     errors = np.linalg.norm(seen[:, :2] / seen[:, 2:] - pixels, axis=1)

@@ -42,8 +42,8 @@ class SceneRequests:
     @classmethod
     def of(cls, path: Path, data: Mapping[str, Any]) -> "SceneRequests":
         """Return the requests among all keys of the lights file at `path`."""
-        known = (*CONSTRAINTS, *OLDER, *RIGGING)
-        return cls({key: data[key] for key in known if key in data}, str(path))
+        keys = (*CONSTRAINTS, *OLDER, *RIGGING)
+        return cls({key: data[key] for key in keys if key in data}, str(path))
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -65,8 +65,8 @@ class Pose:
             )
 
     def __repr__(self) -> str:
-        given = {field.name: getattr(self, field.name) for field in fields(self)}
-        listed = (f"{name}={value!r}" for name, value in given.items() if value is not None)
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        listed = (f"{name}={value!r}" for name, value in values.items() if value is not None)
         return f"Pose({', '.join(listed)})"
 
 

@@ -23,9 +23,9 @@ def rotation_between(old: Sequence[float], new: Sequence[float] | Doubles) -> Do
 def across(direction: Sequence[float] | Doubles) -> Doubles:
     """Return two unit vectors across a direction and each other, (2, 3)."""
     axis = np.array(unit(direction))
-    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    one /= np.linalg.norm(one)
-    return np.stack([one, np.cross(axis, one)])
+    normal = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    normal /= np.linalg.norm(normal)
+    return np.stack([normal, np.cross(axis, normal)])
 
 
 def unit(vector: Sequence[float] | Floats) -> Position:

@@ -44,17 +44,17 @@ def prepare_llvm() -> Llvm | None:
 @cache
 def llvm_candidates() -> tuple[Llvm, ...]:
     """Return LLVM libraries in the order they are tried, up to the first usable one."""
-    found: list[Llvm] = []
+    candidates: list[Llvm] = []
     seen: set[Path] = set()
     for path, origin in _llvm_paths():
         resolved = path.resolve()
         if resolved in seen:
             continue
         seen.add(resolved)
-        found.append(_probe(path, origin))
-        if found[-1].version is not None:
+        candidates.append(_probe(path, origin))
+        if candidates[-1].version is not None:
             break
-    return tuple(found)
+    return tuple(candidates)
 
 
 def _llvm_paths() -> Iterator[tuple[Path, str]]:
@@ -132,8 +132,8 @@ def _cpp_runtime(llvm: Path) -> list[Path]:
     """Return the C++ runtime that some LLVM packages contain, in loading order."""
     names = ["libunwind.so.1", "libc++abi.so.1", "libc++.so.1"]
     folders = [llvm.parent, *sorted(llvm.parent.glob("*-linux-gnu"))]
-    found = [folder / name for name in names for folder in folders if (folder / name).exists()]
-    return found if len(found) >= len(names) - 1 else []
+    libraries = [folder / name for name in names for folder in folders if (folder / name).exists()]
+    return libraries if len(libraries) >= len(names) - 1 else []
 
 
 def _preload_cpp_runtime(llvm: Path) -> None:

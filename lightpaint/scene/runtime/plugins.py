@@ -53,18 +53,18 @@ def loaded_plugins() -> frozenset[str]:
                 f"{VARIABLE} is {folder}, which is not a folder: set it to a folder of plugins"
             )
         added = {path.stem for path in _files(folder)}
-        if taken := sorted(added & (names | IN_PYTHON)):
+        if duplicates := sorted(added & (names | IN_PYTHON)):
             raise BackendError(
-                f"{VARIABLE}: {folder} has a plugin {taken[0]!r}, which Mitsuba has itself: give "
-                "it another name"
+                f"{VARIABLE}: {folder} has a plugin {duplicates[0]!r}, which Mitsuba has itself: "
+                "give it another name"
             )
-        found = _load_folder(folder)
-        if missing := sorted(added - found):
+        plugins = _load_folder(folder)
+        if missing := sorted(added - plugins):
             raise BackendError(
                 f"{VARIABLE}: {folder} has {missing[0]!r}, which this Mitsuba cannot load as a "
                 "plugin"
             )
-        names |= found
+        names |= plugins
     return names | BUILT_IN
 
 
@@ -73,10 +73,10 @@ def check_plugins(state: Any, resolver: Any) -> None:
 
     Call it before building the scene. resolver: the one in which Mitsuba will look for files.
     """
-    known = loaded_plugins()
+    plugins = loaded_plugins()
     for node in _in_use(state):
         name = str(node.props.plugin_name())
-        if name in known:
+        if name in plugins:
             continue
         kind = str(node.type).rpartition(".")[2].lower()
         lead = f"{place_of_node(state, node)}Mitsuba has no {kind} plugin {one_line(repr(name))}"
@@ -86,7 +86,7 @@ def check_plugins(state: Any, resolver: Any) -> None:
                     f"{lead} except in Python, and {file} would run instead: move that file away"
                 )
             continue
-        close = difflib.get_close_matches(name, known | IN_PYTHON, n=1, cutoff=0.75)
+        close = difflib.get_close_matches(name, plugins | IN_PYTHON, n=1, cutoff=0.75)
         suggestion = f"; did you mean {close[0]!r}?" if close else ""
         raise UnknownPluginError(f"{lead}{suggestion}")
 
@@ -96,13 +96,13 @@ def _in_use(state: Any) -> Iterator[Any]:
     import mitsuba as mi
 
     resolved = mi.Properties.Type.ResolvedReference
-    found, waiting = {0}, [0]
+    reached, waiting = {0}, [0]
     while waiting:
         node = state.nodes[waiting.pop()]
         yield node
         props = node.props
-        below = {int(props[key].index()) for key in props if props.type(key) == resolved} - found
-        found |= below
+        below = {int(props[key].index()) for key in props if props.type(key) == resolved} - reached
+        reached |= below
         waiting += sorted(below)
 
 

@@ -35,7 +35,7 @@ class Turns:
         self._own = local()
 
     @contextmanager
-    def taken(self) -> Iterator[None]:
+    def acquired(self) -> Iterator[None]:
         """Wait for a turn, and hold it within the block."""
         if self._holder == get_ident():
             self._depth += 1
@@ -137,7 +137,7 @@ MITSUBA = Turns()
 @contextmanager
 def tracing() -> Iterator[Callable[[], None]]:
     """Hold Mitsuba and hold Ctrl-C back; yield a function that lets both through between pieces."""
-    with MITSUBA.taken(), interruptible_between_pieces() as let_interrupts_through:
+    with MITSUBA.acquired(), interruptible_between_pieces() as let_interrupts_through:
 
         def between() -> None:
             let_interrupts_through()

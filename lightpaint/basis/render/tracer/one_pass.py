@@ -179,7 +179,7 @@ def aligned(values: Indices) -> npt.NDArray[np.uint32]:
 
 def later_emitter_samples(emitters: int) -> int:
     """Return how many of so many emitters are sampled at vertices but the first."""
-    return next(its for fewer, its in LATER_EMITTER_SAMPLES.items() if emitters < fewer)
+    return next(samples for fewer, samples in LATER_EMITTER_SAMPLES.items() if emitters < fewer)
 
 
 def view_of(scene: Scene, loaded: Any) -> View:

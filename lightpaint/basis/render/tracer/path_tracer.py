@@ -150,8 +150,8 @@ def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term
             pdf *= rules.emitter_samples_at(depth - 1)
         emission = emitter.eval(si, hit & (previous_pdf > 0))
         carried = weight * throughput
-        found = carried * emission * _mis(previous_pdf, pdf)
-        planes.add(place, emitter, found, depth, hit)
+        emitted = carried * emission * _mis(previous_pdf, pdf)
+        planes.add(place, emitter, emitted, depth, hit)
         planes.note_seen(place, hit & looks_through)
 
         # Next-event estimation: emitters are sampled.

@@ -231,12 +231,12 @@ def compare_appearance(
     # Without the constraint to be white, which applies to all.
     by_light = constraints_by_light(problem.constraints, solution.basis.lights)
     tied = tied_lights(problem.constraints, solution.basis.lights)
-    held = {
+    limits = {
         light.name
         for k, light in enumerate(solution.lighting.lights)
         if light.is_active and (by_light[k] is not None or k in tied)
     }
-    held_lights = tuple(name for name in local_lights if name in held)
+    held_lights = tuple(name for name in local_lights if name in limits)
     appearance = replace(
         appearance,
         local_lights=local_lights,

@@ -182,21 +182,21 @@ def _with_colors(problem: Problem, colors: Colors) -> Problem:
     return replace(problem, fit=fit, full=full, reduction=reduction)
 
 
-def _view_choices(view: Solution, delta_e: float, found: Mapping[Colors, Doubles]) -> Choices:
+def _view_choices(view: Solution, delta_e: float, answers: Mapping[Colors, Doubles]) -> Choices:
     look = PaintComparison.of_problem(view.problem, max_pixels=COMPARED_PIXELS)
     rows = look.rows(view.basis.planes)
 
     def missed(weights: Doubles) -> float:
         return look.mean(look.difference(np.einsum("npc,nc->pc", rows, weights)))
 
-    chosen, told = found[view.problem.fit.colors or "free"], []
+    chosen, choices = answers[view.problem.fit.colors or "free"], []
     own = missed(chosen)
-    for colors, weights in found.items():
+    for colors, weights in answers.items():
         # Both are of the same sample, so that they differ by the effect of colours.
-        its = delta_e if weights is chosen else max(delta_e + missed(weights) - own, 0.0)
+        distance = delta_e if weights is chosen else max(delta_e + missed(weights) - own, 0.0)
         turned = _largest_hue_change(view, chosen, weights)
-        told.append(ColorChoice(colors, weights is chosen, its, *turned, weights))
-    return tuple(told)
+        choices.append(ColorChoice(colors, weights is chosen, distance, *turned, weights))
+    return tuple(choices)
 
 
 def _largest_hue_change(view: Solution, hue: Doubles, weights: Doubles) -> tuple[str, RGB, RGB]:

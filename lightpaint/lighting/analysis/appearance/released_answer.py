@@ -32,7 +32,7 @@ def released_weights(
         constraints=problem.constraints if constraints is None else constraints,
         fit=fit or problem.fit,
     )
-    found = solution_of(replace(released, start=problem.start))
+    released_solution = solution_of(replace(released, start=problem.start))
     if problem.corrected is not None and solution.basis.knows_noise:
-        found = correct_noise(found)
-    return found.weights
+        released_solution = correct_noise(released_solution)
+    return released_solution.weights

@@ -73,10 +73,12 @@ def correct_noise(solution: Solution, *, share: float | None = None) -> Solution
         share = _best_share(solution, base, noise, least)
     while share > 0:
         M, b = (1 - share) * base.M + share * least, base.b - share * noise.target_noise
-        found = _solved(solution, NormalEquations(M, b, e.target_norm2), share)
-        taken = NormalEquations(e.M - M, e.b - b, np.zeros(3))
-        if solution.problem.is_linear or _loss(found, taken) <= _loss(solution, taken):
-            return found
+        corrected = _solved(solution, NormalEquations(M, b, e.target_norm2), share)
+        subtracted = NormalEquations(e.M - M, e.b - b, np.zeros(3))
+        if solution.problem.is_linear or _loss(corrected, subtracted) <= _loss(
+            solution, subtracted
+        ):
+            return corrected
         share = share / 2 if share > 1 / SHARE_STEPS else 0.0
     return _solved(solution, e, 0.0)
 

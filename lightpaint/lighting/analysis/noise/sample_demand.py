@@ -45,17 +45,17 @@ def pixel_variances(solution: Solution, aims: Doubles) -> Doubles:
     """
     pixels = NoisyPixels.of(solution)
     push = aims @ gradient_response(solution)
-    made = np.zeros(solution.importance.size)
+    variances = np.zeros(solution.importance.size)
 
-    def fill(its: Indices) -> None:
-        rows = pixels.gradient_noise(its).reshape(push.shape[1], -1)
-        made[its] = np.square(push @ rows).sum(axis=0)
+    def fill(part: Indices) -> None:
+        rows = pixels.gradient_noise(part).reshape(push.shape[1], -1)
+        variances[part] = np.square(push @ rows).sum(axis=0)
 
     counted = pixels.counted
     parallel_map(
         fill, [counted[k : k + BLOCK_PIXELS] for k in range(0, counted.size, BLOCK_PIXELS)]
     )
-    return made.reshape(solution.importance.shape)
+    return variances.reshape(solution.importance.shape)
 
 
 def sample_demand(variances: Doubles, counted: Bools, have: Doubles) -> SampleDemand:
@@ -78,11 +78,11 @@ def sample_demand(variances: Doubles, counted: Bools, have: Doubles) -> SampleDe
 def _sum_around(image: Doubles) -> Doubles:
     """Return the sum over the neighbours of each pixel, without itself, (h, w)."""
     height, width = image.shape
-    padded, made = np.pad(image, AROUND), np.zeros_like(image)
+    padded, total = np.pad(image, AROUND), np.zeros_like(image)
     for down, right in product(range(2 * AROUND + 1), repeat=2):
         if (down, right) != (AROUND, AROUND):
-            made += padded[down : down + height, right : right + width]
-    return made
+            total += padded[down : down + height, right : right + width]
+    return total
 
 
 def top_up_counts(density: Doubles, have: Doubles, budget: float) -> Indices:
@@ -95,13 +95,13 @@ def top_up_counts(density: Doubles, have: Doubles, budget: float) -> Indices:
 
 def _level(density: Doubles, have: Doubles, budget: float) -> float:
     """Return the level at which Σ max(level · density − have, 0) is the budget."""
-    its = density > 0
-    if not its.any():
+    counted = density > 0
+    if not counted.any():
         return 0.0
-    wanted, there = density[its], have[its]
-    order = np.argsort(there / wanted)
-    wanted, there = wanted[order], there[order]
+    demand, existing = density[counted], have[counted]
+    order = np.argsort(existing / demand)
+    demand, existing = demand[order], existing[order]
     # With the k pixels that lack most, the level is (budget + Σ have) / Σ density.
-    levels = (budget + np.cumsum(there)) / np.cumsum(wanted)
-    reached = levels >= there / wanted
+    levels = (budget + np.cumsum(existing)) / np.cumsum(demand)
+    reached = levels >= existing / demand
     return float(levels[np.flatnonzero(reached)[-1]])

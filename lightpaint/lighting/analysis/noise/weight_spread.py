@@ -70,13 +70,13 @@ def gradient_response(solution: Solution) -> Doubles:
     pulled = solution.problem.with_pull(solution.problem.solved)
     gradient = pulled.gradient(solution.weights).T.ravel()
     M, C = pulled.full_matrix, noise.full_covariance.reshape(gradient.size, -1)
-    made = np.zeros_like(M)
+    response = np.zeros_like(M)
     for room in block_freedoms(solution, pulled):
         to = room.columns
         _, free = _movable(to.T @ M @ to, to.T @ C @ to, room, to.T @ gradient)
         along = to @ free
-        made += along @ pseudo_inverse(along.T @ M @ along) @ along.T
-    return made
+        response += along @ pseudo_inverse(along.T @ M @ along) @ along.T
+    return response
 
 
 def _propagate(
