@@ -7,9 +7,10 @@ import numpy.typing as npt
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpaint.paint.session import open_stroke
-from lightpaint.paint.session.open_stroke import OpenStroke
-from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+from lightpaint.paint.layers import open_stroke
+from lightpaint.paint.layers.layer_pixels import LayerPixels
+from lightpaint.paint.layers.open_stroke import OpenStroke
+from lightpaint.paint.store.canvas_pixels import Pixels, Region
 
 HEIGHT, WIDTH = 21, 34
 
@@ -30,18 +31,15 @@ def picture(seed: int, marks: npt.NDArray[np.bool_] | None = None) -> Pixels:
 @given(regions=st.lists(REGIONS, max_size=8), is_marked=st.booleans(), side=st.sampled_from([4, 7]))
 def test_what_was_before_is_given_back(regions: list[Region], is_marked: bool, side: int) -> None:
     marks = np.random.default_rng(1).random((HEIGHT, WIDTH, 3)) > 0.5 if is_marked else None
-    painting = picture(0, marks)
-    before = painting.copy()
+    layer = LayerPixels((HEIGHT, WIDTH))
+    layer.put((0, HEIGHT, 0, WIDTH), picture(0, marks))
+    before = picture(0, marks)
     with patch.object(open_stroke, "SQUARE_SIDE", side):
         stroke = OpenStroke()
         for k, region in enumerate(regions):
-            stroke.touch(region, painting)
-            new = picture(k + 1).part(region)
-            painting.image[slices(region)] = new.image
-            painting.importance[slices(region)] = new.importance
-            if marks is not None:
-                marks[slices(region)] = False
-        found = stroke.pixels_before(painting)
+            stroke.touch(region, layer)
+            layer.put(region, picture(k + 1).part(region))
+        found = stroke.pixels_before(layer)
     real = [(a, b, c, d) for a, b, c, d in regions if a < b and c < d]
     assert bool(stroke) == bool(real)
     if real:

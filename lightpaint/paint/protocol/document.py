@@ -14,6 +14,7 @@ from typing import Any, get_origin, get_type_hints
 
 import numpy as np
 
+from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.protocol import events, message_parts, requests
 from lightpaint.paint.protocol.typescript import field_types
 
@@ -38,7 +39,8 @@ def replace_sections(text: str) -> str:
 
 
 def _is_part(value: Any) -> bool:
-    return getattr(value, "__module__", "") == message_parts.__name__ and isinstance(value, type)
+    names = (message_parts.__name__, Layer.__module__)
+    return getattr(value, "__module__", "") in names and isinstance(value, type)
 
 
 def _entry(name: str, record: type[Any]) -> str:

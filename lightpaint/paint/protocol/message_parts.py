@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from lightpaint.arrays import RGB
+from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.protocol.base import OPTIONAL
+from lightpaint.paint.store.canvas_pixels import Region
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,27 @@ class ViewInfo:
     size: tuple[int, int]
     objects: tuple[str, ...]
     scales: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayerInfo(Layer):
+    """A layer, and where its pixels are: the picture `layer/ID`, in each view.
+
+    regions: of that picture, by view; empty where it covers nothing. accents: by how much it counts
+    more there, since all of the picture is painted. revision: grows when its pixels change.
+    """
+
+    regions: tuple[Region, ...]
+    accents: tuple[float, ...]
+    revision: int
+
+
+@dataclass(frozen=True)
+class LayerList:
+    """The layers of the painting, the lowest first. next: the id of the next new one."""
+
+    layers: tuple[LayerInfo, ...]
+    next: int
 
 
 @dataclass(frozen=True)
@@ -210,7 +233,7 @@ class EditState:
 
     asked: constraints by name of light, keys and values as in a lights file. ties: names on one
     dimmer. settings: set by somebody. resolved: the values in effect. poses: of lights that were
-    moved, by name.
+    moved, by name. layers: what the painting is made of.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -219,6 +242,7 @@ class EditState:
     settings: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
     poses: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
     resolved: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
+    layers: LayerList | None = field(default=None, metadata=OPTIONAL)
 
 
 #: Tone of a message to a person.

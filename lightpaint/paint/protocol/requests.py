@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, get_args
 
 from lightpaint.arrays import RGB
+from lightpaint.paint.layers.layer import PAINTING_ID, Layer
 from lightpaint.paint.protocol.base import Message
 from lightpaint.paint.store.canvas_pixels import Region
 
@@ -32,7 +33,9 @@ class Paint(Message, kind="paint"):
 
     stroke: number of the stroke, which the page counts. done: whether the brush has left the
     picture with it: only then is the stroke kept. label: what undo calls it. view: of which picture
-    it is.
+    it is. layer: id of the layer whose pixels these are; `importance` is its coverage, 0 to 1, of
+    all but `pixels`, and masks need no `image`. properties: of the layer, from now on; with them a
+    new one lies on top.
     """
 
     request_buffers: ClassVar[Mapping[str, str]] = {
@@ -45,10 +48,29 @@ class Paint(Message, kind="paint"):
     done: bool = False
     label: str = "stroke"
     view: int = 0
+    layer: int = PAINTING_ID
+    properties: Layer | None = None
 
     def __post_init__(self) -> None:
         if self.stroke >= 2**53:  # beyond which a page cannot count
             raise ValueError("stroke is a number below 2**53")
+
+
+@dataclass(frozen=True)
+class ChangeLayers(Message, kind="change_layers"):
+    """Other properties, another order or other layers from now on: one step. Answered by `answer`.
+
+    layers: those that are new or changed; new ones lie on top. order: ids of all that stay, the
+    lowest first; null for the order as it is. copies: ids of layers by the id of each copy, which
+    is among `layers`. done: whether it becomes a step; false while a slider moves. label: what undo
+    calls it.
+    """
+
+    layers: tuple[Layer, ...] = ()
+    order: tuple[int, ...] | None = None
+    copies: Mapping[str, int] = field(default_factory=dict)
+    done: bool = True
+    label: str = "layers"
 
 
 @dataclass(frozen=True)
@@ -292,6 +314,7 @@ class Propose(Message, kind="propose"):
 AnyRequest = (
     Hello
     | Paint
+    | ChangeLayers
     | Drop
     | Undo
     | Redo

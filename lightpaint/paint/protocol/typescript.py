@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 
 from lightpaint.arrays import RGB
+from lightpaint.paint.layers.layer import Layer
 from lightpaint.paint.protocol import events, message_parts, requests
 from lightpaint.paint.store.canvas_pixels import Region
 
@@ -58,7 +59,8 @@ def declarations() -> str:
 
 
 def _is_record_of(value: Any, module: Any) -> bool:
-    return is_dataclass(value) and getattr(value, "__module__", "") == module.__name__
+    names = (module.__name__, Layer.__module__)
+    return is_dataclass(value) and getattr(value, "__module__", "") in names
 
 
 def _interface(record: type[Any], *, is_request: bool) -> str:

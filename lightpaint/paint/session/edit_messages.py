@@ -4,17 +4,20 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from lightpaint.paint.protocol import CanvasPatch, Message, ResolvedFit
+from lightpaint.paint.layers.canvas import Canvas
+from lightpaint.paint.layers.canvases import Canvases
+from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.protocol import CanvasPatch, LayerInfo, LayerList, Message, ResolvedFit
 from lightpaint.paint.session.answer_messages import unpainted_text
-from lightpaint.paint.session.canvas import Canvases
 from lightpaint.paint.session.history import History
 from lightpaint.paint.session.live_answer import LiveAnswer
 from lightpaint.paint.store.canvas_pixels import Region
 
 
-def edit_state(history: History, live_answer: LiveAnswer) -> dict[str, Any]:
-    """Return steps that can be undone, and requests in effect: the fields of `EditState`."""
+def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> dict[str, Any]:
+    """Return steps that can be undone, requests in effect and layers: the fields of `EditState`."""
     requests, fit = live_answer.requests, live_answer.fit
     return {
         "history": history.info(),
@@ -23,7 +26,31 @@ def edit_state(history: History, live_answer: LiveAnswer) -> dict[str, Any]:
         "settings": dict(requests.values),
         "poses": dict(requests.poses),
         "resolved": ResolvedFit(fit.space, fit.hold, fit.colors),
+        "layers": LayerList(
+            tuple(layer_info(layer, views) for layer in views.layers), views.next_layer
+        ),
     }
+
+
+def layer_info(layer: Layer, views: Canvases) -> LayerInfo:
+    """Return a layer for clients, with where its pixels are in each view."""
+    pixels = [view.layer(layer.id) for view in views]
+    return LayerInfo(
+        **vars(layer),
+        regions=tuple(one.bounds for one in pixels),
+        accents=tuple(view.accent(layer.id) for view in views),
+        revision=sum(one.revision for one in pixels),
+    )
+
+
+def layer_picture(layer: Layer, view: Canvas) -> npt.NDArray[np.float32]:
+    """Return the pixels of a layer in its region: (rows, columns, 4), colour and coverage; of a
+    mask (rows, columns, 1).
+    """
+    pixels = view.layer(layer.id)
+    image, coverage, _ = pixels.part(pixels.bounds)
+    mask = coverage[..., None]
+    return mask if layer.is_mask else np.concatenate([image, mask], axis=-1)
 
 
 def unpainted_headline(live_answer: LiveAnswer) -> str:

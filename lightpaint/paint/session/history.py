@@ -1,14 +1,16 @@
 """The history of a session: steps, and what each of them changes in canvases and requests."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from lightpaint.arrays import Floats
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import NothingToUndoError, PaintError
+from lightpaint.paint.layers.canvases import Canvases
+from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.protocol import HistoryInfo
-from lightpaint.paint.session.canvas import Canvases
 from lightpaint.paint.session.live_answer import LiveAnswer
-from lightpaint.paint.store.canvas_pixels import Pixels
+from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.database import DamagedError
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Patch, Step
@@ -16,6 +18,9 @@ from lightpaint.paint.store.store import Store
 
 #: Steps that a page is told of, backwards and forwards.
 LISTED_STEPS = 50
+
+#: Views, and the region of each that changed.
+Changes = Sequence[tuple[int, Region]]
 
 
 class History:
@@ -29,9 +34,11 @@ class History:
         self._store, self._views, self._live_answer = store, views, live_answer
 
     def close_stroke(self, label: str) -> None:
-        """Append the open stroke as a step, if there is one."""
-        if patches := self._views.stroke_patches():
-            self._store.append(Step("stroke", label, {}, patches))
+        """Append the open stroke, or the open change of the layers, as a step, if there is one."""
+        change, patches = self._views.open_change()
+        if change or patches:
+            fields = {"stack": change} if change else {}
+            self._store.append(Step("stroke" if patches else "layers", label, fields, patches))
         self._views.close()
 
     def append_requests(self, label: str, requests: SessionRequests) -> None:
@@ -44,19 +51,23 @@ class History:
         self._live_answer.set_requests(requests)
 
     def replace_all(
-        self, paintings: Mapping[int, Pixels], requests: SessionRequests, label: str
-    ) -> Sequence[Patch]:
-        """Replace the paintings, by view, and the requests: one step. Returns its patches."""
-        patches = self._views.replacement_patches(paintings)
-        before = self._live_answer.requests
-        fields = {"before": before.as_json(), "after": requests.as_json()}
-        self._store.append(Step("look_loaded", label, fields, patches))
-        self._views.put(patches)
+        self, layers: LayerStack, patches: Sequence[Patch], requests: SessionRequests, label: str
+    ) -> Changes:
+        """Replace the layers, their pixels and the requests: one step. Returns what changed."""
+        before, change = self._live_answer.requests, self._views.layers.change_to(layers)
+        fields: dict[str, Any] = {"before": before.as_json(), "after": requests.as_json()}
+        fields |= {"stack": change} if change else {}
+        self._store.append(Step("look_loaded", label, fields, tuple(patches)))
+        changes = self._views.move(layers, patches, self._done_steps)
         self._live_answer.set_requests(requests)
-        return patches
+        return changes
 
-    def move(self, by: int) -> Sequence[Patch]:
-        """Move back or forth by one step, and return the patches that it has changed.
+    @property
+    def _done_steps(self) -> Sequence[Step]:
+        return self._store.steps[: self._store.position]
+
+    def move(self, by: int) -> Changes:
+        """Move back or forth by one step, and return what it has changed.
 
         Raises NothingToUndoError at either end, PaintError for a step whose pixels are lost.
         """
@@ -66,16 +77,16 @@ class History:
             raise NothingToUndoError(f"There is nothing to {'undo' if is_back else 'redo'}.")
         step = steps[position] if is_back else steps[current]
         try:
-            states = [patch.before if is_back else patch.after for patch in step.patches]
+            for patch in step.patches:
+                _ = patch.before if is_back else patch.after
         except DamagedError:
             raise PaintError(self._store.recover()) from None
         self._store.move_to(position)
-        for patch, pixels in zip(step.patches, states, strict=True):
-            self._views[patch.view].put(patch.region, pixels)
-        if step.fields:
-            requests = step.fields["before" if is_back else "after"]
+        layers = self._views.layers.changed(step.fields.get("stack", {}), is_back=is_back)
+        changes = self._views.move(layers, step.patches, self._done_steps, is_back=is_back)
+        if requests := step.fields.get("before" if is_back else "after"):
             self._live_answer.set_requests(SessionRequests.of(requests))
-        return step.patches
+        return changes
 
     def info(self) -> HistoryInfo:
         """Return the labels of the steps that can be undone and redone."""
@@ -88,9 +99,9 @@ class History:
 
     def _label(self, step: Step) -> str:
         """Return the label of a step for undo, with the view's name if there are several."""
-        view_names = [self._views[patch.view].name for patch in step.patches]
-        names_view = len(self._views) > 1 and len(view_names) == 1
-        return f"{step.label}, {view_names[0]}" if names_view else step.label
+        views = {patch.view for patch in step.patches}
+        names_view = len(self._views) > 1 and len(views) == 1
+        return f"{step.label}, {self._views[views.pop()].name}" if names_view else step.label
 
 
 def restore(
@@ -98,7 +109,7 @@ def restore(
 ) -> tuple[Canvases, SessionRequests]:
     """Return the canvases and the requests after the steps of the store."""
     applied = store.steps[: store.position]
-    states = [step.fields["after"] for step in applied if step.fields]
+    states = [step.fields["after"] for step in applied if "after" in step.fields]
     requests = SessionRequests.of(states[-1]) if states else SessionRequests()
     requests.constraints()
     return Canvases(bases, presents, applied), requests

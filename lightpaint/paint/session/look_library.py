@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from lightpaint.arrays import as_rgb
 from lightpaint.errors import LightpaintError, PaintError
+from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.protocol import (
     CopyLook,
     DropLook,
@@ -101,7 +103,10 @@ class LookLibrary:
         paintings = dict(enumerate(self._paintings(look)))
         requests = SessionRequests.of(look.fields["wishes"])
         weights = np.asarray(look.arrays["weights"], np.float64)
-        return self._session.load(paintings, requests, f"look {look.fields['name']}", weights)
+        stored = look.fields.get("layers")
+        layers = None if stored is None else LayeredPaintings.from_fields(stored, look.arrays)
+        label = f"look {look.fields['name']}"
+        return self._session.load(paintings, requests, label, weights, layers=layers)
 
     def _paintings(self, look: StoredLook) -> list[Pixels]:
         """Return the paintings of all views; a view that was added later is unpainted."""
@@ -121,7 +126,15 @@ class LookLibrary:
     def _current_look(self, name: str) -> StoredLook:
         session = self._session
         paintings = [view.pixels(view.full_region) for view in session.views]
-        return self._make_look(name, paintings, session.requests, session.weights.copy())
+        look = self._make_look(name, paintings, session.requests, session.weights.copy())
+        return self._with_layers(look)
+
+    def _with_layers(self, look: StoredLook) -> StoredLook:
+        """Return a look of the painting as it is, with its layers; a plain painting has none."""
+        if self._session.views.layers == LayerStack():
+            return look
+        layers, pixels = LayeredPaintings.of(self._session.views).as_fields()
+        return StoredLook(look.id, {**look.fields, "layers": layers}, {**look.arrays, **pixels})
 
     def _mixed_look(self, message: MixLooks) -> StoredLook:
         """Return a mix of two looks: both paintings, weighted, and the lights locked between the
@@ -176,7 +189,9 @@ class LookLibrary:
                 f"{len(proposals)} proposals are there already: let who paints drop some"
             )
         paintings = [view.pixels(view.full_region) for view in session.views]
-        look_ = self._make_look(name, paintings, self._lock_all(weights), weights)
+        look_ = self._with_layers(
+            self._make_look(name, paintings, self._lock_all(weights), weights)
+        )
         number = same[0].id if same else look_.id
         return StoredLook(number, {**look_.fields, "is_proposal": True}, look_.arrays)
 

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 from lightpaint.basis.basis import Basis
 from lightpaint.errors import PaintError
-from lightpaint.paint.session.canvas import Canvases
+from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.session.live_answer import LiveAnswer
 
 #: Poses of moved lights by name, as `SessionRequests.poses`.

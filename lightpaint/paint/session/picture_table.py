@@ -36,6 +36,14 @@ class PictureTable:
         self._counts: dict[str, int] = {}  # also of those that are withdrawn: none comes twice
         self._made: dict[str, Picture] = {}
         self._makers: dict[str, Callable[[], Picture]] = {}
+        self._families: dict[str, Callable[[str], Picture]] = {}
+
+    def offer_family(self, prefix: str, make: Callable[[str], Picture]) -> None:
+        """Add pictures that change under the brush, and of which no generations are kept.
+
+        prefix: what their names begin with, up to a slash. make: makes one by the rest of its name.
+        """
+        self._families[prefix] = make
 
     def offer(self, name: str, make: Callable[[], Picture]) -> None:
         """Add a picture that `make` makes, replacing an earlier one of that name."""
@@ -55,6 +63,9 @@ class PictureTable:
 
     def __getitem__(self, name: str) -> Picture:
         """Return a picture by name. Raises PaintError if there is none."""
+        prefix, _, rest = name.partition("/")
+        if prefix in self._families:
+            return self._families[prefix](rest)
         make = self._makers.get(name)
         if make is None:
             raise PaintError(f"there is no picture {name[:40]!r}")

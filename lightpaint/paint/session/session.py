@@ -23,6 +23,9 @@ from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint import protocol
+from lightpaint.paint.layers.layer import PAINTING_ID
+from lightpaint.paint.layers.layer_stack import LayerStack
+from lightpaint.paint.layers.layered_paintings import LayeredPaintings
 from lightpaint.paint.protocol import AnswerUpdate, Message
 from lightpaint.paint.session.answer_messages import Judgement, answer_findings
 from lightpaint.paint.session.edit_messages import canvas_patches, edit_state, unpainted_headline
@@ -189,6 +192,8 @@ class Session:
         match message:
             case protocol.Paint():
                 return [self._paint(message, arrays)]
+            case protocol.ChangeLayers():
+                return [self._change_layers(message)]
             case protocol.Drop():
                 return self._patch_messages(*self._drop_stroke())
             case protocol.Undo():
@@ -249,7 +254,7 @@ class Session:
     @property
     def edit_state(self) -> dict[str, Any]:
         """Steps that can be undone, and requests in effect: the fields of `EditState`."""
-        return edit_state(self._history, self.live_answer)
+        return edit_state(self._history, self.live_answer, self.views)
 
     def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
         """Replace the bases by ones of more samples, with the same lights and sizes.
@@ -257,7 +262,7 @@ class Session:
         An open stroke stays open.
         """
         moved = self._moved_lights.improve(bases, self.requests.poses)
-        self.views.improve(moved, presents, self.store.steps[: self.store.position])
+        self.views.improve(moved, presents)
         self.live_answer.set_views(self.views.live)
         self._update_answer()
 
@@ -288,39 +293,73 @@ class Session:
         requests: SessionRequests,
         label: str,
         weights: Doubles | None = None,
+        *,
+        layers: LayeredPaintings | None = None,
     ) -> list[Message]:
         """Replace the paintings, by view, and the requests: one step.
 
         weights: (n, 3), the answer that was kept with them. It shows until the exact one is found;
-        without it the solve starts at the answer to the previous painting.
+        without it the solve starts at the answer to the previous painting. layers: those that come
+        to these paintings; without them each painting becomes a layer's pixels as it is.
         """
         self._reset_slider()
         self.live_answer.check(requests)
         self._moved_lights.check(requests.poses)
         if self.views.is_open:
             self._drop_stroke()
-        patches = self._history.replace_all(paintings, requests, label)
+        if layers is not None:
+            stack, patches = layers.patches(self.views)
+        elif paintings:
+            stack, patches = LayerStack(), self.views.replacement_patches(paintings)
+        else:
+            stack, patches = self.views.layers, ()
+        changes = self._history.replace_all(stack, patches, requests, label)
         self._update_answer()
         if weights is not None:
             self.live_answer.weights = weights.copy()
-        return self._patch_messages(*((patch.view, patch.region) for patch in patches))
+        return self._patch_messages(*changes)
 
     # Paint
 
     def _paint(self, request: protocol.Paint, arrays: Mapping[str, npt.NDArray[Any]]) -> Message:
-        view = self.views[request.view]
-        pixels = view.check_pixels(request.region, arrays)
+        layers = self.views.layers
+        if request.properties is not None:
+            layers = layers.with_layers([request.properties])
+        layer = layers[request.layer if request.properties is None else request.properties.id]
+        pixels = self.views[request.view].check_pixels(layer, request.region, arrays)
         if request.stroke != self._stroke:
             # Of a stroke whose end was never heard, what is there is kept.
             self._history.close_stroke("stroke")
             self._stroke = request.stroke
-        view.paint(request.region, pixels)
+        self.views.open_layers(layers)
+        self.views.paint(request.view, layer.id, request.region, pixels)
         if request.done:
             try:
                 self._history.close_stroke(request.label)
             except LightpaintError:
                 self._drop_stroke()
                 raise
+        self._update_answer()
+        return self.answer_update(**(self.edit_state if request.done else {}))
+
+    def _change_layers(self, request: protocol.ChangeLayers) -> Message:
+        """Change layers, their order, or both; what is not done is open, as a stroke is."""
+        layers = self.views.layers.with_layers(request.layers, request.order)
+        copies = {int(number): source for number, source in request.copies.items()}
+        for number, source in copies.items():
+            if layers[number].kind != self.views.layers[source].kind:
+                raise PaintError(f"layer {number} is no copy of layer {source}")
+            if number in self.views.layers.ids:
+                raise PaintError(f"layer {number} is there already")
+        if any(view.is_open for view in self.views):
+            self._history.close_stroke("stroke")
+        self.views.open_layers(layers)
+        for number, source in copies.items():
+            self.views.copy_layer(source, number)
+        if request.order is not None and PAINTING_ID not in request.order:
+            self.views.clear_painting()
+        if request.done:
+            self._history.close_stroke(request.label)
         self._update_answer()
         return self.answer_update(**(self.edit_state if request.done else {}))
 
@@ -337,9 +376,9 @@ class Session:
         if self.views.is_open:
             self._history.close_stroke("stroke")
             self._update_answer()
-        patches = self._history.move(by)
+        changes = self._history.move(by)
         self._update_answer()
-        return self._patch_messages(*((patch.view, patch.region) for patch in patches))
+        return self._patch_messages(*changes)
 
     def _constrain_light(self, message: protocol.Ask) -> Message:
         name, requests = constrain_light(self.requests, self.basis.lights, message)

@@ -9,9 +9,12 @@ import numpy as np
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.denoised_planes import DenoisedPlanes, RoughPlanes, as_halves, scale_of
 from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.errors import PaintError
+from lightpaint.paint.layers.canvas import Canvas
+from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.protocol import ViewInfo
 from lightpaint.paint.session import picture_table
-from lightpaint.paint.session.canvas import Canvas
+from lightpaint.paint.session.edit_messages import layer_picture
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.store.steps import name_in_view
 
@@ -60,6 +63,18 @@ def offer_view(
     if basis.objects is not None:
         index = basis.objects.index
         offer("objects", lambda: index.astype(np.int16))
+
+
+def offer_layers(table: PictureTable, views: Canvases) -> None:
+    """Offer the pixels of the layers, as `layer/3`."""
+    table.offer_family("layer", partial(_layer, views))
+
+
+def _layer(views: Canvases, name: str) -> Picture:
+    number, _, view = name.partition("@")
+    if not (number.isdecimal() and (view or "0").isdecimal()):
+        raise PaintError(f"there is no picture {f'layer/{name}'[:40]!r}")
+    return layer_picture(views.layers[int(number)], views[int(view or 0)])
 
 
 def _plane(basis: Basis, k: int) -> Picture:

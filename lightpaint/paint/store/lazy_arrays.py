@@ -28,9 +28,9 @@ class StoredPatch(Patch):
     """A patch in a file. read: returns its pixels before and after."""
 
     def __init__(
-        self, view: int, region: Region, read: Callable[[], tuple[Pixels, Pixels]]
+        self, view: int, layer: int, region: Region, read: Callable[[], tuple[Pixels, Pixels]]
     ) -> None:
-        vars(self).update(view=view, region=region, _read=read)
+        vars(self).update(view=view, layer=layer, region=region, _read=read)
 
     @property
     def before(self) -> Pixels:

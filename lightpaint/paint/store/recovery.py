@@ -21,7 +21,7 @@ from lightpaint.paint.store.compression import unpack, unpack_patch
 from lightpaint.paint.store.damaged_rows import Losses, Row, read_row, readable_rows, row_numbers
 from lightpaint.paint.store.database import (
     APPLICATION,
-    VERSION,
+    READ_VERSIONS,
     damaged_error,
     free_name,
     open_database,
@@ -29,6 +29,7 @@ from lightpaint.paint.store.database import (
 )
 from lightpaint.paint.store.lazy_arrays import DTYPES
 from lightpaint.paint.store.session_requests import SessionRequests
+from lightpaint.paint.store.session_rows import parse_place
 from lightpaint.paint.store.steps import Identity, name_in_view
 from lightpaint.screen import some_names
 from lightpaint.storage.json_records import read_record, strict_json
@@ -90,7 +91,7 @@ def _copy_readable(copy: Path, new: Path, path: Path, identity: Identity | None)
             old.execute("PRAGMA trusted_schema = OFF")
             [(application,)] = old.execute("PRAGMA application_id")
             [(version,)] = old.execute("PRAGMA user_version")
-            if (application, version) != (APPLICATION, VERSION):
+            if application != APPLICATION or version not in READ_VERSIONS:
                 raise PaintError("not of this version")
             stored_identity = _read_identity(old) or identity
             steps, lost_steps = _read_steps(old, stored_identity)
@@ -168,18 +169,17 @@ def _check_step(row: Row | None, pixels: Row | None, identity: Identity | None) 
     values, stored_places = strict_json(fields), strict_json(places)
     if not (isinstance(kind, str) and isinstance(label, str) and isinstance(values, dict)):
         raise TypeError("other values")
-    if values:
-        for requests in (values["before"], values["after"]):
-            SessionRequests.of(requests).constraints()
+    for requests in (values["before"], values["after"]) if "before" in values else ():
+        SessionRequests.of(requests).constraints()
     regions = []
-    for view, top, bottom, left, right, *marked in stored_places:
+    for view, (top, bottom, left, right), marked, _ in map(parse_place, stored_places):
         if not (0 <= top <= bottom and 0 <= left <= right and view >= 0):
             raise ValueError("no region")
         if identity is not None and view < len(identity.views):
             height, width = identity.views[view].size
             if bottom > height or right > width:
                 raise ValueError("beyond the picture")
-        regions.append(((int(top), int(bottom), int(left), int(right)), bool(marked)))
+        regions.append(((top, bottom, left, right), marked))
     for k in range(len(regions)):
         if pixels is None:
             raise ValueError("no pixels")

@@ -3,10 +3,11 @@
 import json
 import sqlite3
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from lightpaint.errors import PaintError
 from lightpaint.files import first_line
+from lightpaint.paint.store.canvas_pixels import Region
 from lightpaint.paint.store.compression import is_marked
 from lightpaint.paint.store.lazy_arrays import PackedArray, PackedArrays
 from lightpaint.paint.store.steps import Patch
@@ -93,12 +94,31 @@ def array_row(database: sqlite3.Connection, look: int, name: str) -> PackedArray
 
 
 def places_json(patches: Sequence[Patch]) -> str:
-    """Return view and region of each patch as JSON, with a 1 if it is marked."""
-    places = [
-        [*map(int, (patch.view, *patch.region)), *([1] if is_marked(patch) else [])]
-        for patch in patches
-    ]
-    return json.dumps(places)
+    """Return the place of each patch as JSON, as `parse_place` reads it."""
+    return json.dumps([_place(patch) for patch in patches])
+
+
+def _place(patch: Patch) -> list[int]:
+    place = [*map(int, (patch.view, *patch.region))]
+    if patch.layer:
+        return [*place, int(is_marked(patch)), patch.layer]
+    return [*place, 1] if is_marked(patch) else place
+
+
+class PatchPlace(NamedTuple):
+    """Where a stored patch belongs. marked: whether it has "at least" marks."""
+
+    view: int
+    region: Region
+    marked: bool
+    layer: int
+
+
+def parse_place(place: Sequence[int]) -> PatchPlace:
+    """Return a place: view, region and, where they are not 0, marked and layer."""
+    view, top, bottom, left, right, *rest = map(int, place)
+    marked, layer = [*rest, 0, 0][:2]
+    return PatchPlace(view, (top, bottom, left, right), bool(marked), layer)
 
 
 def to_json(fields: Mapping[str, Any]) -> str:

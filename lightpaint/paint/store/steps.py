@@ -1,9 +1,9 @@
 """The history of a session: steps of paint, requests and looks.
 
 A step has the state before it and after it, so that it can be undone and redone without knowing how
-it came about. The canvas is the present look with all steps applied: `replay` works from the last
-step backwards, since a pixel is as the last patch on it left it, so that a long history costs no
-more than the patches that still show.
+it came about. The pixels of a layer are what its patches left: `replay` works from the last one
+backwards, since a pixel is as the last patch on it left it, so that a long history costs no more
+than the patches that still show.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,20 +23,23 @@ class Patch:
     """The pixels of one region of a view, before a step and after it.
 
     region: (top, bottom, left, right). before, after: its pixels. view: index in the session.
+    layer: id of the layer whose pixels they are; 0 is the painting that names none.
     """
 
     region: Region
     before: Pixels
     after: Pixels
     view: int = 0
+    layer: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
     """A change that can be undone.
 
-    kind: "stroke", "asked" (of lights, ties, settings) or "look_loaded". label: shown by undo.
-    fields: plain JSON values before and after. patches: the changed pixels, of one view or several.
+    kind: "stroke", "layers", "asked" (of lights, ties, settings) or "look_loaded". label: shown by
+    undo. fields: plain JSON: requests `before` and `after`, and the change of the layers, `stack`.
+    patches: the changed pixels, of one view or several.
     """
 
     kind: str
@@ -49,9 +52,10 @@ class Step:
 class StoredLook:
     """A named look. id: a number that no other look of the session has.
 
-    fields: its name, when it was kept (`stamp`, seconds since 1970) and the requests, as JSON.
-    arrays: weights, and of each view image, importance, `at_least` (uint8, if any mark is set) and
-    thumbnail, named by `name_in_view`.
+    fields: its name, when it was kept (`stamp`, seconds since 1970), the requests and, where there
+    are several, the layers, as JSON. arrays: weights, and of each view image, importance,
+    `at_least` (uint8, if any mark is set), thumbnail and the pixels of layers, named by
+    `name_in_view`.
     """
 
     id: int
@@ -98,17 +102,18 @@ class Identity:
         return max(prod(view.size) for view in self.views)
 
 
-def replay(steps: Sequence[Step], start: Pixels, view: int = 0) -> Pixels:
-    """Return the canvas of a view after `steps`, which began at `start`.
+def replay(patches: Sequence[Patch], start: Pixels, bounds: Region | None = None) -> Pixels:
+    """Return the pixels after `patches`, which began at `start`.
 
+    bounds: the region that `start` is of, which holds all patches; None for one from the corner.
     The result equals every patch put down in order; only patches that show are read.
     """
     image, importance, at_least = start.copy()
+    down, right = (0, 0) if bounds is None else (bounds[0], bounds[2])
     is_open = np.ones(importance.shape, dtype=bool)
-    for patch in (patch for step in reversed(steps) for patch in step.patches):
-        if patch.view != view:
-            continue
-        area = slices(patch.region)
+    for patch in reversed(patches):
+        top, bottom, left, end = patch.region
+        area = slices((top - down, bottom - down, left - right, end - right))
         is_visible = is_open[area]
         if not is_visible.any():
             continue

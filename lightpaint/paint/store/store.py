@@ -41,6 +41,7 @@ from lightpaint.paint.store.session_rows import (
     insert_look,
     insert_step,
     look_rows,
+    parse_place,
     pixels_row,
     places_json,
     read_position,
@@ -248,14 +249,13 @@ class Store:
     def _make_step(
         self, number: int, kind: str, label: str, fields: str, stored_places: str
     ) -> Step:
-        views, places = list[int](), list[tuple[Region, bool]]()
-        for view, top, bottom, left, right, *marked in strict_json(stored_places):
-            region = int(top), int(bottom), int(left), int(right)
-            views.append(int(view))
-            places.append((region, bool(marked)))
+        stored = [parse_place(place) for place in strict_json(stored_places)]
+        places = [(place.region, place.marked) for place in stored]
         patches = tuple(
-            StoredPatch(view, region, partial(self._read_pixels, number, places, k))
-            for k, (view, (region, _)) in enumerate(zip(views, places, strict=True))
+            StoredPatch(
+                place.view, place.layer, place.region, partial(self._read_pixels, number, places, k)
+            )
+            for k, place in enumerate(stored)
         )
         return Step(str(kind), str(label), strict_json(fields), patches)
 

@@ -14,7 +14,7 @@ from lightpaint.basis.cache.denoised_planes import (
     read_denoised_planes,
 )
 from lightpaint.basis.denoised_mixes import denoise_present_look
-from lightpaint.paint.session.canvas import Canvas
+from lightpaint.paint.layers.canvas import Canvas
 from lightpaint.paint.session.picture_table import Picture
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import name_in_view

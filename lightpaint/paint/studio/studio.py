@@ -43,7 +43,7 @@ from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import offered_transforms, state_fields
 from lightpaint.paint.session.snapshot import SessionSnapshot
-from lightpaint.paint.session.view_pictures import offer_transforms, offer_view
+from lightpaint.paint.session.view_pictures import offer_layers, offer_transforms, offer_view
 from lightpaint.paint.store.canvas_pixels import Pixels
 from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.paint.store.steps import Identity
@@ -357,6 +357,7 @@ class Studio:
             for view, basis, clean in zip(session.views, bases, clean_planes, strict=True):
                 offer_view(self.pictures, view, basis, session.transform, clean)
             offer_transforms(self.pictures, offered_transforms(session))
+            offer_layers(self.pictures, session.views)
             self._mover.offer_all(session)
         self.publish_made(self.state)
         self._mover.render_behind()

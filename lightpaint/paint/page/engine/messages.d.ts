@@ -10,6 +10,28 @@ export type RGB = [number, number, number];
 export type Region = [top: number, bottom: number, left: number, right: number];
 
 /**
+ * A layer of a painting, without its pixels. Ids are never used twice in a session.
+ *
+ * kind: `pixels` replaces what is below by light that counts as much as its importance; `paint`
+ * mixes a colour over it by its coverage; `adjust` scales its luminance by `gain` and its colour
+ * by `tint`, and `weigh` its importance by `times`, where the layer's mask covers; `group` has no
+ * pixels, and holds the layers whose `group` is its id. strength: 0 to 2; `adjust` and `weigh`
+ * take it as a power, so that 2 is twice the stops. importance: factor of how much it counts.
+ */
+export interface Layer {
+  id: number;
+  kind: 'pixels' | 'paint' | 'adjust' | 'weigh' | 'group';
+  name: string;
+  is_visible: boolean;
+  strength: number;
+  importance: number;
+  group: number | null;
+  gain: number;
+  tint: RGB;
+  times: number;
+}
+
+/**
  * The constant properties of a light.
  *
  * present: its emission before anything was painted. parameter, plugin: where the scene defines
@@ -75,6 +97,36 @@ export interface ViewInfo {
   size: [number, number];
   objects: string[];
   scales: number[];
+}
+
+/**
+ * A layer, and where its pixels are: the picture `layer/ID`, in each view.
+ *
+ * regions: of that picture, by view; empty where it covers nothing. accents: by how much it counts
+ * more there, since all of the picture is painted. revision: grows when its pixels change.
+ */
+export interface LayerInfo {
+  id: number;
+  kind: 'pixels' | 'paint' | 'adjust' | 'weigh' | 'group';
+  name: string;
+  is_visible: boolean;
+  strength: number;
+  importance: number;
+  group: number | null;
+  gain: number;
+  tint: RGB;
+  times: number;
+  regions: Region[];
+  accents: number[];
+  revision: number;
+}
+
+/**
+ * The layers of the painting, the lowest first. next: the id of the next new one.
+ */
+export interface LayerList {
+  layers: LayerInfo[];
+  next: number;
 }
 
 /**
@@ -199,7 +251,7 @@ export interface Findings {
  *
  * asked: constraints by name of light, keys and values as in a lights file. ties: names on one
  * dimmer. settings: set by somebody. resolved: the values in effect. poses: of lights that were
- * moved, by name.
+ * moved, by name. layers: what the painting is made of.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -208,6 +260,7 @@ export interface EditState {
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
   resolved?: ResolvedFit;
+  layers?: LayerList;
 }
 
 /**
@@ -230,6 +283,7 @@ export interface SessionState {
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
   resolved?: ResolvedFit;
+  layers?: LayerList;
   version: number;
   scene: string;
   folder: string;
@@ -296,6 +350,7 @@ export interface AnswerUpdate {
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
   resolved?: ResolvedFit;
+  layers?: LayerList;
   version: number;
   stroke: number;
   exact: boolean;
@@ -319,6 +374,7 @@ export interface CanvasPatch {
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
   resolved?: ResolvedFit;
+  layers?: LayerList;
   region: Region;
   view: number;
   views: number[];
@@ -545,7 +601,9 @@ export interface Hello {
  *
  * stroke: number of the stroke, which the page counts. done: whether the brush has left the
  * picture with it: only then is the stroke kept. label: what undo calls it. view: of which picture
- * it is.
+ * it is. layer: id of the layer whose pixels these are; `importance` is its coverage, 0 to 1, of
+ * all but `pixels`, and masks need no `image`. properties: of the layer, from now on; with them a
+ * new one lies on top.
  */
 export interface Paint {
   stroke: number;
@@ -553,6 +611,24 @@ export interface Paint {
   done?: boolean;
   label?: string;
   view?: number;
+  layer?: number;
+  properties?: Layer | null;
+}
+
+/**
+ * Other properties, another order or other layers from now on: one step. Answered by `answer`.
+ *
+ * layers: those that are new or changed; new ones lie on top. order: ids of all that stay, the
+ * lowest first; null for the order as it is. copies: ids of layers by the id of each copy, which
+ * is among `layers`. done: whether it becomes a step; false while a slider moves. label: what undo
+ * calls it.
+ */
+export interface ChangeLayers {
+  layers?: Layer[];
+  order?: number[] | null;
+  copies?: Record<string, number>;
+  done?: boolean;
+  label?: string;
 }
 
 /**
@@ -809,6 +885,7 @@ export interface Events {
 export interface Requests {
   hello: Hello;
   paint: Paint;
+  change_layers: ChangeLayers;
   drop: Drop;
   undo: Undo;
   redo: Redo;

@@ -1,0 +1,282 @@
+"""The painting of one view: its pixels, and the open stroke."""
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.colour.display.view_transform import ViewTransform
+from lightpaint.errors import PaintError
+from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.paint.layers.composition import ShownLayer, accents, compose
+from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_pixels import LayerPixels, enclosing, is_empty
+from lightpaint.paint.layers.layer_stack import (
+    LayerStack,
+)
+from lightpaint.paint.layers.open_stroke import OpenStroke
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+from lightpaint.paint.store.steps import Patch, Step
+from lightpaint.target.target import Target
+
+#: Largest importance, and largest light, that a page may paint.
+MAX_IMPORTANCE, MAX_LIGHT = 1e4, 1e9
+
+
+class Canvas:
+    """The painting of one view: its layers, and the target that they come to. Updated in place.
+
+    Attributes:
+        basis: The planes of its lights.
+        present: (h, w, 3) linear, the present look, denoised: it shows where nothing is painted.
+        painting: The target; `at_least` is None as long as none is marked so.
+        live: The sums that follow the target.
+    """
+
+    def __init__(
+        self, view: int, basis: Basis, present: Floats, layers: LayerStack, steps: Sequence[Step]
+    ) -> None:
+        self.view = view
+        self._open_strokes: dict[int, OpenStroke] = {}
+        patches = _patches_by_layer(steps, view)
+        self._layers = {
+            number: LayerPixels.replayed(basis.size, patches.get(number, ()))
+            for number in layers.ids
+        }
+        self._shown = self._with_accents(layers)
+        self.improve(basis, present)
+
+    def improve(self, basis: Basis, present: Floats) -> None:
+        """Replace the basis by one of more samples; open strokes stay open."""
+        self.basis, self.present = basis, np.asarray(present, np.float32)
+        self.painting = compose(self._shown, self.present, self.full_region)
+        self.live = LiveView(basis, self.image, self.importance)
+
+    def replace_planes(self, basis: Basis, lights: Collection[int]) -> None:
+        """Continue with a basis in which the planes of some lights, by number, are others.
+
+        The present look stays that of before these lights moved.
+        """
+        self.basis = basis
+        self.live.replace_planes(basis, lights)
+
+    @property
+    def image(self) -> npt.NDArray[np.float32]:
+        """(h, w, 3) linear; where nothing is painted, the present look."""
+        return self.painting.image
+
+    @property
+    def importance(self) -> npt.NDArray[np.float32]:
+        """(h, w), above 0 where something is painted."""
+        return self.painting.importance
+
+    @property
+    def name(self) -> str:
+        """Name of its sensor."""
+        return self.basis.origin.sensor
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(height, width) of the picture."""
+        return self.basis.size
+
+    @property
+    def full_region(self) -> Region:
+        """Region of the whole picture."""
+        return (0, self.size[0], 0, self.size[1])
+
+    @property
+    def is_painted(self) -> bool:
+        """True if any pixel counts."""
+        return bool(self.importance.any())
+
+    @property
+    def is_open(self) -> bool:
+        """True while a stroke is open."""
+        return any(self._open_strokes.values())
+
+    def layer(self, number: int) -> LayerPixels:
+        """Return the pixels of a layer. Raises PaintError if there is none."""
+        if number not in self._layers:
+            raise PaintError(f"there is no layer {number}")
+        return self._layers[number]
+
+    def accent(self, number: int) -> float:
+        """Return the accent of a layer; 1 for one that does not show."""
+        return next((shown.accent for shown in self._shown if shown.layer.id == number), 1.0)
+
+    def pixels(self, region: Region) -> Pixels:
+        """Return a copy of the pixels of a region."""
+        return self.painting.part(region).copy()
+
+    def target(self, name: str, transform: ViewTransform, *, is_sketch: bool) -> Target | None:
+        """Return a copy of the painting as a target; None where nothing is painted.
+
+        Solved elsewhere it has the same answer: a literal painting, which is no sketch, is light
+        over nothing.
+        """
+        if not self.is_painted:
+            return None
+        image, importance, at_least = self.pixels(self.full_region)
+        return Target(
+            name,
+            image,
+            importance,
+            everything=False,
+            at_least=at_least,
+            transform=transform,
+            through_view=is_sketch,
+            over_look=is_sketch,
+        )
+
+    def put(self, layer: int, region: Region, pixels: Pixels) -> None:
+        """Put pixels into a layer."""
+        self.layer(layer).put(region, pixels)
+        self._compose(region)
+
+    def paint(self, layer: int, region: Region, pixels: Pixels) -> None:
+        """Paint pixels by hand: they belong to the open stroke on that layer."""
+        stroke = self._open_strokes.setdefault(layer, OpenStroke())
+        target = self.layer(layer)
+        stroke.touch(region, target)
+        self.put(layer, region, _with_marks(pixels, target.part(region)))
+
+    def show(
+        self, layers: LayerStack, steps: Sequence[Step] = (), *, at_rest: bool = True
+    ) -> Region:
+        """Show other layers, or the same with other properties; return where that matters.
+
+        steps: the pixels of layers that come back are those after these. at_rest: whether accents
+        follow what the layers cover by now; under the brush they stay.
+        """
+        missing = set(layers.ids) - set(self._layers)
+        patches = _patches_by_layer(steps, self.view) if missing and steps else {}
+        for number in missing:
+            self._layers[number] = LayerPixels.replayed(self.size, patches.get(number, ()))
+        before = self._shown
+        self._shown = self._with_accents(layers, None if at_rest else before)
+        same_below = _equal_count(before, self._shown)
+        same_above = _equal_count(before[same_below:][::-1], self._shown[same_below:][::-1])
+        changed = [
+            *before[same_below : len(before) - same_above],
+            *self._shown[same_below : len(self._shown) - same_above],
+        ]
+        region = enclosing([shown.pixels.bounds for shown in changed])
+        self._layers = {number: self._layers[number] for number in layers.ids}
+        self._compose(region)
+        return region
+
+    def _with_accents(
+        self, layers: LayerStack, before: Sequence[ShownLayer] | None = None
+    ) -> list[ShownLayer]:
+        """Return the layers that show. before: those whose accents are kept."""
+        pairs = [(layer, self._layers[layer.id]) for layer in layers.shown()]
+        kept = {} if before is None else {shown.layer.id: shown.accent for shown in before}
+        return [
+            ShownLayer(layer, pixels, kept.get(layer.id, now))
+            for (layer, pixels), now in zip(pairs, accents(pairs), strict=True)
+        ]
+
+    def _compose(self, region: Region) -> None:
+        """Compose the layers anew in a region."""
+        if is_empty(region):
+            return
+        area = slices(region)
+        image, importance, at_least = compose(self._shown, self.present, region)
+        self.image[area] = image
+        is_same_importance = np.array_equal(self.importance[area], importance)
+        self.importance[area] = importance
+        if at_least is not None and self.painting.at_least is None:
+            self.painting = self.painting._replace(at_least=np.zeros(self.image.shape, bool))
+        if self.painting.at_least is not None:
+            self.painting.at_least[area] = False if at_least is None else at_least
+        self.live.update(area, with_importance=not is_same_importance)
+
+    def drop(self) -> Region:
+        """Drop the open strokes, and return their region."""
+        for number, stroke in self._open_strokes.items():
+            self.put(number, stroke.region, stroke.pixels_before(self.layer(number)))
+        region = enclosing([stroke.region for stroke in self._open_strokes.values()])
+        self.close()
+        return region
+
+    def stroke_patches(self) -> list[Patch]:
+        """Return the changes of the open strokes; none of one that changed nothing."""
+        patches = []
+        for number, stroke in self._open_strokes.items():
+            layer = self.layer(number)
+            region, before = stroke.region, stroke.pixels_before(layer)
+            after = layer.part(region)
+            if before.at_least is not None:
+                # A stroke may take pixels back while it lasts: unchanged ones keep their marks.
+                after = _with_marks(after, before)
+                self.put(number, region, after)
+            # A page sends a stroke again if its answer was lost; that changes nothing.
+            if not is_empty(region) and not before.equals(after):
+                patches.append(Patch(region, before, after, self.view, number))
+        return patches
+
+    def close(self) -> None:
+        """Close the open strokes."""
+        self._open_strokes = {}
+
+    def check_pixels(
+        self, layer: Layer, region: Region, arrays: Mapping[str, npt.NDArray[Any]]
+    ) -> Pixels:
+        """Return the pixels that a page sent for a region of a layer. Raises PaintError if invalid.
+
+        Of a mask they have no colour, and their `importance` is its coverage.
+        """
+        top, bottom, left, right = region
+        height, width = self.size
+        if not (0 <= top <= bottom <= height and 0 <= left <= right <= width):
+            raise PaintError(f"paint at {list(region)}, and the picture is {width}x{height}")
+        shape = bottom - top, right - left
+        if layer.is_mask:
+            arrays = {**arrays, "image": np.broadcast_to(np.float32(0), (*shape, 3))}
+        try:
+            image, importance = arrays["image"], arrays["importance"]
+        except KeyError:
+            raise PaintError("paint without its image and importance") from None
+        if image.shape != (*shape, 3) or importance.shape != shape:
+            raise PaintError(
+                f"paint of {list(image.shape)} and {list(importance.shape)} at {list(region)}"
+            )
+        if not (np.isfinite(image).all() and np.isfinite(importance).all()):
+            raise PaintError("paint of NaN or Inf")
+        most = MAX_IMPORTANCE if layer.kind == "pixels" else 1.0
+        if importance.size and not (importance.min() >= 0 and importance.max() <= most):
+            what = "importance" if layer.kind == "pixels" else "coverage"
+            raise PaintError(f"{what} beyond 0 to {most:g}")
+        if image.size and not (image.min() >= 0 and image.max() <= MAX_LIGHT):
+            # A target set in a notebook may hold such light, and a stroke beside it resends it.
+            beyond = (image < 0) | (image > MAX_LIGHT)
+            if not np.array_equal(image[beyond], self.layer(layer.id).part(region).image[beyond]):
+                raise PaintError(f"light beyond 0 to {MAX_LIGHT:g}")
+        return Pixels(image.astype(np.float32), importance.astype(np.float32))
+
+
+def _patches_by_layer(steps: Sequence[Step], view: int) -> dict[int, list[Patch]]:
+    """Return the patches of a view, in order, by the layer that they change."""
+    patches: dict[int, list[Patch]] = {}
+    for patch in (patch for step in steps for patch in step.patches):
+        if patch.view == view:
+            patches.setdefault(patch.layer, []).append(patch)
+    return patches
+
+
+def _equal_count(first: Sequence[ShownLayer], second: Sequence[ShownLayer]) -> int:
+    """Return how many of the first layers are the same."""
+    pairs = enumerate(zip(first, second, strict=False))
+    return next((k for k, (one, other) in pairs if one != other), min(len(first), len(second)))
+
+
+def _with_marks(pixels: Pixels, before: Pixels) -> Pixels:
+    """Return `pixels`, marked "at least" where they equal pixels of `before` that are."""
+    if before.at_least is None:
+        return pixels
+    left_alone = (pixels.image == before.image).all(axis=-1) & (pixels.importance > 0)
+    return pixels._replace(at_least=before.at_least & left_alone[..., None])

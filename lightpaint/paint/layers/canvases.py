@@ -1,0 +1,175 @@
+"""The paintings of all views, which share one stack of layers."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from lightpaint.arrays import Floats
+from lightpaint.basis.basis import Basis
+from lightpaint.errors import PaintError
+from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.paint.layers.canvas import Canvas
+from lightpaint.paint.layers.layer import PAINTING
+from lightpaint.paint.layers.layer_pixels import enclosing, is_empty
+from lightpaint.paint.layers.layer_stack import (
+    LayerStack,
+    StackChange,
+    next_layer_id,
+    stack_after,
+)
+from lightpaint.paint.store.canvas_pixels import Pixels, Region
+from lightpaint.paint.store.steps import Patch, Step
+
+
+class Canvases:
+    """The canvases of all views, which have one stack of layers: a stroke goes to one of them, a
+    look to all.
+
+    Attributes:
+        layers: The layers as they are.
+        next_layer: The first id that no layer has had.
+    """
+
+    def __init__(
+        self, bases: Sequence[Basis], presents: Sequence[Floats], steps: Sequence[Step]
+    ) -> None:
+        self.layers = self._layers_at_rest = stack_after(steps)
+        self.next_layer = next_layer_id(steps)
+        self._canvases = tuple(
+            Canvas(k, basis, present, self.layers, steps)
+            for k, (basis, present) in enumerate(zip(bases, presents, strict=True))
+        )
+
+    def __len__(self) -> int:
+        return len(self._canvases)
+
+    def __iter__(self) -> Iterator[Canvas]:
+        return iter(self._canvases)
+
+    def __getitem__(self, view: int) -> Canvas:
+        """Return the canvas of a view. Raises PaintError if there is none."""
+        if view >= len(self):
+            raise PaintError(f"no view {view}: there are {len(self)}")
+        return self._canvases[view]
+
+    def improve(self, bases: Sequence[Basis], presents: Sequence[Floats]) -> None:
+        """Improve each canvas."""
+        for view, basis, present in zip(self, bases, presents, strict=True):
+            view.improve(basis, present)
+
+    def replace_planes(self, bases: Sequence[Basis], lights: Collection[int]) -> None:
+        """Continue with bases in which the planes of some lights, by number, are others."""
+        for view, basis in zip(self, bases, strict=True):
+            view.replace_planes(basis, lights)
+
+    @property
+    def live(self) -> list[LiveView]:
+        """Live sums of each view."""
+        return [view.live for view in self]
+
+    @property
+    def is_painted(self) -> bool:
+        """True if any pixel counts."""
+        return any(view.is_painted for view in self)
+
+    @property
+    def is_open(self) -> bool:
+        """True while a stroke, or a change of the layers, is open."""
+        return self.layers != self._layers_at_rest or any(view.is_open for view in self)
+
+    def open_layers(self, layers: LayerStack) -> None:
+        """Show other layers until the change is closed or dropped. Raises PaintError for an id
+        that another layer had.
+        """
+        if used := [n for n in layers.ids if n not in self.layers.ids and n < self.next_layer]:
+            raise PaintError(f"layer {used[0]} was another one: the next is {self.next_layer}")
+        self.layers = layers
+        self.next_layer = max(self.next_layer, 1 + max(layers.ids))
+        for view in self:
+            view.show(layers, at_rest=False)
+
+    def paint(self, view: int, layer: int, region: Region, pixels: Pixels) -> None:
+        """Paint pixels of a layer by hand: they belong to the open stroke on it."""
+        canvas = self[view]
+        canvas.paint(layer, region, pixels)
+        if layer not in self._layers_at_rest.ids:  # how much it covers decides how much it counts
+            canvas.show(self.layers)
+
+    def copy_layer(self, source: int, number: int) -> None:
+        """Copy the pixels of a layer into a new one that is shown already: open strokes."""
+        for view in self:
+            pixels = view.layer(source)
+            if not is_empty(pixels.bounds):
+                view.paint(number, pixels.bounds, pixels.part(pixels.bounds))
+
+    def clear_painting(self) -> None:
+        """Clear the painting that names no layer, which is always there: open strokes."""
+        for view in self:
+            top, bottom, left, right = bounds = view.layer(PAINTING.id).bounds
+            if not is_empty(bounds):
+                empty = Pixels.unpainted(np.zeros((bottom - top, right - left, 3), np.float32))
+                view.paint(PAINTING.id, bounds, empty)
+
+    def open_change(self) -> tuple[StackChange, tuple[Patch, ...]]:
+        """Return the open change of the layers, and the changes of open strokes on them."""
+        patches = tuple(patch for view in self for patch in view.stroke_patches())
+        kept = tuple(patch for patch in patches if patch.layer in self.layers.ids)
+        return self._layers_at_rest.change_to(self.layers), kept
+
+    def close(self) -> None:
+        """Close the open strokes and the open change; accents follow what layers cover now."""
+        for view in self:
+            view.close()
+        self._layers_at_rest = self.layers
+        for view in self:
+            view.show(self.layers)
+
+    def drop(self) -> list[tuple[int, Region]]:
+        """Drop all that is open; return views and their regions that changed."""
+        regions = [view.drop() for view in self]
+        self.layers = self._layers_at_rest
+        shown = [view.show(self.layers) for view in self]
+        both = [enclosing(pair) for pair in zip(regions, shown, strict=True)]
+        return [(k, region) for k, region in enumerate(both) if not is_empty(region)]
+
+    def move(
+        self,
+        layers: LayerStack,
+        patches: Sequence[Patch],
+        steps: Sequence[Step],
+        *,
+        is_back: bool = False,
+    ) -> list[tuple[int, Region]]:
+        """Go to the layers and pixels after a step, or before it; return the regions that changed.
+
+        steps: those that are done then; of them layers that come back have their pixels.
+        """
+        for patch in patches:
+            if patch.layer in self.layers.ids:
+                pixels = patch.before if is_back else patch.after
+                self[patch.view].put(patch.layer, patch.region, pixels)
+        self.layers = self._layers_at_rest = layers
+        self.next_layer = max(self.next_layer, 1 + max(layers.ids))
+        regions = []
+        for view in self:
+            put = [patch.region for patch in patches if patch.view == view.view]
+            region = enclosing([view.show(layers, steps), *put])
+            if not is_empty(region):
+                regions.append((view.view, region))
+        return regions
+
+    def replacement_patches(self, paintings: Mapping[int, Pixels]) -> tuple[Patch, ...]:
+        """Return the patches that replace all layers by these paintings, by view.
+
+        A view without one keeps what its layers come to.
+        """
+        patches, whole = [], dict(paintings)
+        if self.layers != LayerStack():
+            whole = {k: view.pixels(view.full_region) for k, view in enumerate(self)} | whole
+        for k, (image, importance, at_least) in whole.items():
+            view = self[k]
+            light, counts = np.asarray(image, np.float32), np.asarray(importance, np.float32)
+            pixels = Pixels(light, counts, at_least).copy()
+            before = view.layer(PAINTING.id).part(view.full_region)
+            patches.append(Patch(view.full_region, before, pixels, k))
+        return tuple(patches)

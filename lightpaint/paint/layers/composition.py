@@ -1,0 +1,139 @@
+"""The target that layers come to: light and importance of each pixel, from the lowest layer up.
+
+Everything is float32 arithmetic on single pixels, in NumPy, so that any partition of the picture
+into regions gives the same bits. A layer's accent alone depends on more than its pixel: where all
+of the picture is painted (a whole that was asked to be darker, say), a layer over a small part of
+it is to come about as it does over a picture whose rest is held, so it counts more than the rest.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import RGB, Bools, Floats
+from lightpaint.colour.color import LUMINANCE
+from lightpaint.paint.layers.layer import Layer
+from lightpaint.paint.layers.layer_pixels import MIN_COVERAGE, LayerPixels
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+
+#: Importance of the rest of a fully painted picture beside that of one layer, and the largest
+#: accent: it makes up for a layer over a fortieth of the picture.
+REST_SHARE, MAX_ACCENT = 4.0, 10.0
+
+#: Importance that weighing leaves or reaches at most, however often.
+MIN_WEIGHED, MAX_WEIGHED = 0.01, 1000.0
+
+#: Brightest light that a layer makes: the largest half float, so that both views can show it.
+MAX_LIGHT = 65504.0
+
+_Array = npt.NDArray[np.float32]
+
+
+class ShownLayer(NamedTuple):
+    """A layer that shows, with its pixels in one view, and its accent there."""
+
+    layer: Layer
+    pixels: LayerPixels
+    accent: float
+
+
+def accent(part: float) -> float:
+    """Return by how much a layer over that part of a fully painted picture counts more."""
+    if part <= 0:
+        return MAX_ACCENT
+    return min(MAX_ACCENT, max(1.0, (1 - part) / (REST_SHARE * part)))
+
+
+def accents(layers: Sequence[tuple[Layer, LayerPixels]]) -> list[float]:
+    """Return the accent of each of the layers that show, in one view.
+
+    It follows from what they cover alone, and not from when they were made.
+    """
+    covering = [layer.id for layer, pixels in layers if pixels.covers_all]
+    return [
+        accent(pixels.mean_coverage) if set(covering) - {layer.id} else 1.0
+        for layer, pixels in layers
+    ]
+
+
+def compose(layers: Sequence[ShownLayer], present: Floats, region: Region) -> Pixels:
+    """Return the target in a region.
+
+    layers: those that show, the lowest first. present: (h, w, 3) linear, the present look.
+    """
+    light = np.array(present[slices(region)], np.float32)
+    result = Pixels(light, np.zeros(light.shape[:2], np.float32))
+    for shown in layers:
+        if shown.pixels.overlaps(region):
+            result = _compose_layer(shown, shown.pixels.part(region), result)
+    return result
+
+
+def _compose_layer(shown: ShownLayer, pixels: Pixels, below: Pixels) -> Pixels:
+    """Return what a layer makes of the pixels below it."""
+    layer = shown.layer
+    factor = np.float32(shown.accent * layer.importance)
+    if layer.kind == "pixels":
+        return _replace(layer, pixels, below, factor)
+    coverage = pixels.importance
+    covered = coverage >= np.float32(MIN_COVERAGE)
+    if layer.kind == "weigh":
+        times = np.float32(layer.times**layer.strength)
+        base = np.where(below.importance > 0, below.importance, np.float32(1))
+        weighed = below.importance + coverage * (_weighed(base, times) - below.importance)
+        return below._replace(importance=np.where(covered, weighed, below.importance))
+    if layer.kind == "paint":
+        to, share = pixels.image, coverage * np.float32(layer.strength)
+    else:
+        gain, tint = layer.gain**layer.strength, [t**layer.strength for t in layer.tint]
+        to, share = adjusted(below.image, gain, (tint[0], tint[1], tint[2])), coverage
+    light = below.image + share[..., None] * (to - below.image)
+    light = np.minimum(np.maximum(light, np.float32(0)), np.float32(MAX_LIGHT))
+    grown = below.importance + coverage * (factor - below.importance)
+    counts = np.where(covered & (below.importance < factor), grown, below.importance)
+    image = np.where(covered[..., None], light, below.image)
+    return Pixels(image, counts, _unmarked(below.at_least, covered))
+
+
+def _replace(layer: Layer, pixels: Pixels, below: Pixels, factor: np.float32) -> Pixels:
+    """Return the pixels of a layer that replaces what is below it, where it is painted."""
+    painted = pixels.importance > 0
+    image = pixels.image
+    if layer.strength != 1:
+        light = below.image + np.float32(layer.strength) * (image - below.image)
+        image = np.maximum(light, np.float32(0))
+    marks = _unmarked(below.at_least, painted)
+    if pixels.at_least is not None:
+        own = pixels.at_least & painted[..., None]
+        marks = own if marks is None else marks | own
+    counts = np.where(painted, pixels.importance * factor, below.importance)
+    return Pixels(np.where(painted[..., None], image, below.image), counts, marks)
+
+
+def adjusted(light: Floats, gain: float, tint: RGB) -> _Array:
+    """Return light (..., 3) whose luminance is `gain` times as much, and its colour tinted."""
+    tinted = np.asarray(light, np.float32) * np.asarray(tint, np.float32)
+    before, after = _luminance(light), _luminance(tinted)
+    lit = after > 0
+    level = np.where(
+        lit, np.float32(gain) * before / np.where(lit, after, np.float32(1)), np.float32(gain)
+    )
+    return np.asarray(tinted * level[..., None], np.float32)
+
+
+def _luminance(light: Floats) -> _Array:
+    r, g, b = (np.float32(x) for x in LUMINANCE)
+    return np.asarray(r * light[..., 0] + g * light[..., 1] + b * light[..., 2], np.float32)
+
+
+def _weighed(importance: _Array, times: np.float32) -> _Array:
+    """Return so many times as much, within bounds; what is beyond them already stays there."""
+    least = np.minimum(importance, np.float32(MIN_WEIGHED))
+    most = np.maximum(importance, np.float32(MAX_WEIGHED))
+    return np.asarray(np.minimum(most, np.maximum(least, importance * times)), np.float32)
+
+
+def _unmarked(marks: Bools | None, covered: Bools) -> Bools | None:
+    return None if marks is None else marks & ~covered[..., None]

@@ -1,0 +1,79 @@
+"""A layer of a painting: one wish, with its name, eye, strength and importance."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Any, Literal
+
+from lightpaint.arrays import RGB
+
+#: What a layer does to the pixels below it.
+LayerKind = Literal["pixels", "paint", "adjust", "weigh", "group"]
+
+#: The layer of paint that names none; sessions from before there were layers consist of it.
+PAINTING_ID = 0
+
+#: Largest strength and importance of a layer, and characters of its name.
+MAX_STRENGTH, MAX_FACTOR, MAX_NAME_LENGTH = 2.0, 1e4, 80
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A layer of a painting, without its pixels. Ids are never used twice in a session.
+
+    kind: `pixels` replaces what is below by light that counts as much as its importance; `paint`
+    mixes a colour over it by its coverage; `adjust` scales its luminance by `gain` and its colour
+    by `tint`, and `weigh` its importance by `times`, where the layer's mask covers; `group` has no
+    pixels, and holds the layers whose `group` is its id. strength: 0 to 2; `adjust` and `weigh`
+    take it as a power, so that 2 is twice the stops. importance: factor of how much it counts.
+    """
+
+    id: int
+    kind: LayerKind
+    name: str = ""
+    is_visible: bool = True
+    strength: float = 1.0
+    importance: float = 1.0
+    group: int | None = None
+    gain: float = 1.0
+    tint: RGB = (1.0, 1.0, 1.0)
+    times: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.id < 2**53:
+            raise ValueError(f"layer {self.id}: expected a number from 0, below 2**53")
+        if len(self.name) > MAX_NAME_LENGTH:
+            raise ValueError(f"a name of {len(self.name)} characters: at most {MAX_NAME_LENGTH}")
+        if not 0 <= self.strength <= MAX_STRENGTH:
+            raise ValueError(f"strength {self.strength:g}: expected 0 to {MAX_STRENGTH:g}")
+        if not 0 < self.importance <= MAX_FACTOR:
+            raise ValueError(f"importance {self.importance:g}: expected above 0, to {MAX_FACTOR:g}")
+        for name, factors in (
+            ("gain", (self.gain,)),
+            ("tint", self.tint),
+            ("times", (self.times,)),
+        ):
+            if not all(isfinite(x) and 0 < x <= MAX_FACTOR for x in factors):
+                raise ValueError(f"{name} {factors}: expected above 0, to {MAX_FACTOR:g}")
+        if self.group is not None and self.kind == "group":
+            raise ValueError("a group within a group: expected layers alone")
+
+    @property
+    def is_mask(self) -> bool:
+        """True if its pixels have no colour."""
+        return self.kind in ("adjust", "weigh")
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> "Layer":
+        """Return the layer that `as_json` wrote. Raises TypeError or ValueError for another."""
+        return cls(**{**data, "tint": tuple(data.get("tint", (1.0, 1.0, 1.0)))})
+
+    def as_json(self) -> dict[str, Any]:
+        """Return plain values, without those that are the default."""
+        default = asdict(Layer(self.id, self.kind))
+        values = {k: v for k, v in asdict(self).items() if k in ("id", "kind") or v != default[k]}
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+
+
+#: The painting of a session without other layers.
+PAINTING = Layer(PAINTING_ID, "pixels", "Painting")

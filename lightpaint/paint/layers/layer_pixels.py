@@ -1,0 +1,190 @@
+"""The pixels of one layer in one view, kept in tiles, and only where it covers something."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpaint.arrays import Bools
+from lightpaint.paint.store.canvas_pixels import Pixels, Region, slices
+from lightpaint.paint.store.steps import Patch, replay
+
+#: Side of a tile, in pixels.
+TILE_SIDE = 64
+
+#: Coverage, or importance, that counts as none.
+MIN_COVERAGE = 1e-3
+
+
+class _Tile(NamedTuple):
+    """Pixels of a tile; arrays of one value take no memory. total, least: of its coverage."""
+
+    pixels: Pixels
+    total: float
+    least: float
+
+
+class LayerPixels:
+    """Colour and coverage of a layer. Updated in place.
+
+    They are exchanged as `Pixels`: `image` is the colour, `importance` the coverage (of a layer
+    `pixels`, its importance). Where nothing is covered the colour is black, so that two layers
+    that came about in different ways are equal to the bit.
+
+    Attributes:
+        revision: A number that grows with every change.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self.size, self.revision = size, 0
+        self._tiles: dict[tuple[int, int], _Tile] = {}
+        self._summary: tuple[float, float] | None = None
+
+    @classmethod
+    def replayed(cls, size: tuple[int, int], patches: Sequence[Patch]) -> "LayerPixels":
+        """Return a layer after its patches, which are all of one view and layer."""
+        layer = cls(size)
+        bounds = enclosing([patch.region for patch in patches])
+        if is_empty(bounds):
+            return layer
+        top, bottom, left, right = bounds
+        black = np.zeros((bottom - top, right - left, 3), np.float32)
+        layer.put(bounds, replay(patches, Pixels.unpainted(black), bounds))
+        return layer
+
+    @property
+    def bounds(self) -> Region:
+        """The smallest region of whole tiles that holds all that is covered."""
+        return enclosing([self._tile_region(key) for key in self._tiles])
+
+    @property
+    def mean_coverage(self) -> float:
+        """Mean over the view of the coverage, or importance, up to 1."""
+        return self._totals()[0]
+
+    @property
+    def covers_all(self) -> bool:
+        """True if no pixel of the view is uncovered."""
+        return self._totals()[1] >= MIN_COVERAGE
+
+    def overlaps(self, region: Region) -> bool:
+        """Return whether anything may be covered in a region."""
+        return any(key in self._tiles for key in self._keys(region))
+
+    def part(self, region: Region) -> Pixels:
+        """Return a copy of the pixels of a region."""
+        top, bottom, left, right = region
+        shape = bottom - top, right - left
+        image, coverage = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
+        marks: Bools | None = None
+        for key in self._keys(region):
+            if (tile := self._tiles.get(key)) is None:
+                continue
+            to, source = self._areas(key, region)
+            image[to], coverage[to] = tile.pixels.image[source], tile.pixels.importance[source]
+            if tile.pixels.at_least is not None:
+                marks = np.zeros(image.shape, bool) if marks is None else marks
+                marks[to] = tile.pixels.at_least[source]
+        return Pixels(image, coverage, marks)
+
+    def put(self, region: Region, pixels: Pixels) -> None:
+        """Replace the pixels of a region."""
+        self._summary = None
+        self.revision += 1
+        for key in self._keys(region):
+            source, to = self._areas(key, region)
+            tile_region = self._tile_region(key)
+            tile = self.part(tile_region)
+            is_covered = pixels.importance[source] > 0
+            tile.image[to] = np.where(is_covered[..., None], pixels.image[source], np.float32(0))
+            tile.importance[to] = pixels.importance[source]
+            marks = tile.at_least
+            if pixels.at_least is not None or marks is not None:
+                marks = np.zeros(tile.image.shape, bool) if marks is None else marks
+                marks[to] = (
+                    False
+                    if pixels.at_least is None
+                    else pixels.at_least[source] & is_covered[..., None]
+                )
+            self._keep(key, Pixels(tile.image, tile.importance, marks))
+
+    def copy(self) -> "LayerPixels":
+        """Return a copy, which shares no array that changes."""
+        copied = LayerPixels(self.size)
+        copied._tiles = dict(self._tiles)  # tiles are replaced, and never written to
+        return copied
+
+    def _keep(self, key: tuple[int, int], pixels: Pixels) -> None:
+        """Replace a tile."""
+        if not pixels.importance.any():
+            self._tiles.pop(key, None)
+            return
+        counted = np.minimum(pixels.importance, 1)
+        total, least = float(counted.sum(dtype=np.float64)), float(counted.min())
+        marks = pixels.at_least if pixels.at_least is not None and pixels.at_least.any() else None
+        packed = Pixels(_packed(pixels.image), _packed(pixels.importance), marks)
+        self._tiles[key] = _Tile(packed, total, least)
+
+    def _totals(self) -> tuple[float, float]:
+        """Return mean and least coverage of the view."""
+        if self._summary is None:
+            height, width = self.size
+            tiles = [self._tiles[key] for key in sorted(self._tiles)]  # one order, one sum
+            count = -(-height // TILE_SIDE) * -(-width // TILE_SIDE)
+            least = min((tile.least for tile in tiles), default=0.0)
+            mean = sum(tile.total for tile in tiles) / (height * width)
+            self._summary = mean, least if len(tiles) == count else 0.0
+        return self._summary
+
+    def _keys(self, region: Region) -> Iterator[tuple[int, int]]:
+        top, bottom, left, right = region
+        if is_empty(region):
+            return
+        for row in range(top // TILE_SIDE, -(-bottom // TILE_SIDE)):
+            for column in range(left // TILE_SIDE, -(-right // TILE_SIDE)):
+                yield row, column
+
+    def _tile_region(self, key: tuple[int, int]) -> Region:
+        top, left = (TILE_SIDE * k for k in key)
+        height, width = self.size
+        return top, min(top + TILE_SIDE, height), left, min(left + TILE_SIDE, width)
+
+    def _areas(
+        self, key: tuple[int, int], region: Region
+    ) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+        """Return where a tile lies in a region, and the region in the tile."""
+        tile = self._tile_region(key)
+        shared = (
+            *(max(tile[0], region[0]), min(tile[1], region[1])),
+            *(max(tile[2], region[2]), min(tile[3], region[3])),
+        )
+        return slices(_relative(shared, region)), slices(_relative(shared, tile))
+
+
+def enclosing(regions: Sequence[Region]) -> Region:
+    """Return the smallest region that holds all of these; an empty one for none."""
+    filled = [region for region in regions if not is_empty(region)]
+    if not filled:
+        return 0, 0, 0, 0
+    tops, bottoms, lefts, rights = zip(*filled, strict=True)
+    return min(tops), max(bottoms), min(lefts), max(rights)
+
+
+def is_empty(region: Region) -> bool:
+    """Return whether a region has no pixel."""
+    top, bottom, left, right = region
+    return top >= bottom or left >= right
+
+
+def _relative(region: tuple[int, ...], origin: Region) -> Region:
+    top, bottom, left, right = region
+    return top - origin[0], bottom - origin[0], left - origin[2], right - origin[2]
+
+
+def _packed(array: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Return an array of the same values, without memory for them if all are one."""
+    first = array.reshape(-1)[0]
+    if array.reshape(-1)[-1] == first and (array == first).all() and not np.signbit(first):
+        return np.broadcast_to(np.float32(first), array.shape)
+    return array
