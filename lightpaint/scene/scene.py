@@ -17,9 +17,9 @@ import numpy as np
 from lightpaint.arrays import RGB, Floats, Position
 from lightpaint.errors import SceneError
 from lightpaint.keywords import keywords
-from lightpaint.scene.lights.emitters import Emitter, point_emitter
-from lightpaint.scene.lights.light import Light, free_names, light_named, lights_of, settings_for
-from lightpaint.scene.lights.light_choice import REST
+from lightpaint.scene.changed_emitters import darkened, with_elements, with_motions
+from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.lights.light import Light, light_named, lights_of, settings_for
 from lightpaint.scene.lights.lights_file import SceneRequests, lights_file_beside
 from lightpaint.scene.lights.new_emitter import NewEmitter, moved_emitter
 from lightpaint.scene.properties.emission import EmitterSetting
@@ -60,6 +60,7 @@ class Scene(Shown):
             scene without its lights, but with the shapes of area lights.
         lights_file: The lights file that went into `lights`, if one did.
         requests: The constraints that it asks for.
+        parsed: Its nodes, by Mitsuba's parser; for this folder's modules alone.
         chosen: Names of the lights that `only` left; none where all are there.
         added: Emitters of `with_new_emitters`, which are in no file.
         old_sites: Where emitters that `moved` has moved are in the file, by name.
@@ -88,7 +89,7 @@ class Scene(Shown):
     unlit_content: str
     lights_file: Path | None
     requests: SceneRequests
-    _parsed: ParsedScene
+    parsed: ParsedScene
     chosen: tuple[str, ...] = ()
     added: tuple[NewEmitter, ...] = ()
     old_sites: Mapping[str, Site] = field(default_factory=dict)
@@ -174,34 +175,6 @@ class Scene(Shown):
         """Return the position of that sensor, as an `mi.Point3f`."""
         return self.camera(loaded).world_transform().translation()
 
-    def lit_by_points(self, positions: Sequence[Position]) -> "Scene":
-        """Return this scene under point lights alone, one at each of `positions`, in their order.
-
-        Its own emitters stay where they are, black: what blocks or reflects light still does.
-        They are the last light, which is fixed.
-        """
-        names = free_names("candidate", len(positions), [x.name for x in self.emitters])
-        dark = {x.node: EmitterSetting(x.kind, (0.0, 0.0, 0.0), 0.0) for x in self.emitters}
-        parsed = self._parsed.lit_by_points(dark, dict(zip(names, positions, strict=True)))
-        points = tuple(
-            point_emitter(name, node, position)
-            for name, node, position in zip(
-                names, parsed.emitter_nodes[-len(names) :], positions, strict=True
-            )
-        )
-        members = {name: [name] for name in names}
-        members |= {free_names(REST, 1, members)[0]: [x.name for x in self.emitters]}
-        lit_by = hashlib.sha256(repr((self.content, positions)).encode()).hexdigest()[:32]
-        emitters = (*self.emitters, *points)
-        return replace(
-            self,
-            emitters=emitters,
-            lights=lights_of(emitters, members, fixed=[*members][-1:]),
-            content=lit_by,
-            requests=SceneRequests(),
-            _parsed=parsed,
-        )
-
     def only(self, names: Collection[str]) -> "Scene":
         """Return this scene with the lights `names` alone.
 
@@ -233,7 +206,7 @@ class Scene(Shown):
             lights=lights,
             content=content,
             chosen=names,
-            _parsed=self._parsed.darkened(dark),
+            parsed=darkened(self.parsed, dark),
         )
 
     @MITSUBA.acquired()
@@ -265,7 +238,7 @@ class Scene(Shown):
             else:
                 motions[emitter.node] = motion
                 old_sites.setdefault(emitter.name, emitter.site)
-        parsed = self._parsed.with_motions(motions).with_elements(elements)
+        parsed = with_elements(with_motions(self.parsed, motions), elements)
         moved_scene = self._inspected(parsed, ())
         return replace(moved_scene, added=tuple(added.values()), old_sites=old_sites)
 
@@ -307,7 +280,7 @@ class Scene(Shown):
                     "name"
                 )
             taken.add(emitter.name)
-        parsed = self._parsed.with_elements({x.name: "".join(x.lines()) for x in emitters})
+        parsed = with_elements(self.parsed, {x.name: "".join(x.lines()) for x in emitters})
         extended = self._inspected(parsed, [x.name for x in emitters])
         return replace(extended, added=(*self.added, *emitters))
 
@@ -324,7 +297,7 @@ class Scene(Shown):
             self,
             **facts | {"film": self.film},
             lights=tuple(replace(x, is_found=x.name in found_names) for x in lights),
-            _parsed=parsed,
+            parsed=parsed,
         )
 
     def _emitter(self, name: str) -> Emitter:
@@ -342,7 +315,7 @@ class Scene(Shown):
     @property
     def up(self) -> Position:
         """The axis of the scene that is nearest to what its camera has upwards."""
-        node = self._parsed.state.nodes[self._parsed.sensor_nodes[self.sensor]]
+        node = self.parsed.state.nodes[self.parsed.sensor_nodes[self.sensor]]
         return upward_axis(node.props)
 
     @property
@@ -351,16 +324,16 @@ class Scene(Shown):
 
         Each with its file, the byte offset of its `<`, and the children to set: XML by name.
         """
-        nodes = self._parsed.state.nodes
+        nodes = self.parsed.state.nodes
         return tuple(
             (self.files[nodes[k].file_index], int(nodes[k].offset) - 1, children)
-            for k, children in self._parsed.moved.items()
+            for k, children in self.parsed.moved.items()
         )
 
     @property
     def originals(self) -> tuple[Path, ...]:
         """All files the scene consists of: XML, meshes, textures, tables."""
-        return (*self.files, *self._parsed.assets())
+        return (*self.files, *self.parsed.assets())
 
     @property
     def read_files(self) -> tuple[Path, ...]:
@@ -371,12 +344,12 @@ class Scene(Shown):
     def places(self) -> frozenset[Path]:
         """Places of its files, and of files that would change the scene if they existed."""
         beside = self.lights_file or lights_file_beside(self.path)
-        return frozenset({*self._parsed.places(), beside})
+        return frozenset({*self.parsed.places(), beside})
 
     def relocated(self, old: Path, new: Path) -> "Scene":
         """Return this scene after the folder `old`, which contains its XML, has moved to `new`."""
-        parsed = self._parsed.relocated(old, new)
-        return replace(self, path=parsed.path, files=parsed.files, _parsed=parsed)
+        parsed = self.parsed.relocated(old, new)
+        return replace(self, path=parsed.path, files=parsed.files, parsed=parsed)
 
     @MITSUBA.acquired()
     def load(
@@ -391,7 +364,7 @@ class Scene(Shown):
         views: this scene through other sensors, whose films are replaced, too.
         """
         settings = settings_for(self.lights, self.emitters, emission or {}, scene=str(self.path))
-        return self._parsed.instantiate(settings, self.film, *(view.film for view in views))
+        return self.parsed.instantiate(settings, self.film, *(view.film for view in views))
 
     @MITSUBA.acquired()
     def while_loaded(
@@ -413,19 +386,19 @@ class Scene(Shown):
     @cached_property
     def shape_names(self) -> tuple[str, ...]:
         """Names of the shapes, in the order of a loaded scene's."""
-        return shape_names(self._parsed)
+        return shape_names(self.parsed)
 
     @property
     def replaced_integrators(self) -> tuple[tuple[Path, int], ...]:
         """Integrators that `instead` replaces: file, and byte offset of the element."""
-        return tuple((self.files[file], offset) for file, offset in self._parsed.replaced)
+        return tuple((self.files[file], offset) for file, offset in self.parsed.replaced)
 
     def emitted_image(self, emitter: Emitter) -> Floats:
         """Return the image that `emitter` emits, (h, w, 3) linear Rec.709, without its scale."""
         import mitsuba as mi
 
         assert emitter.kind is not None
-        path, raw = self._parsed.image_file(emitter.node, emitter.kind.parameter)
+        path, raw = self.parsed.image_file(emitter.node, emitter.kind.parameter)
         bitmap = mi.Bitmap(str(path))
         if raw:
             bitmap.set_srgb_gamma(False)

@@ -96,6 +96,6 @@ def load_scene(
         ),
         lights_file=selection.path,
         requests=selection.requests,
-        _parsed=parsed,
+        parsed=parsed,
         **facts,
     )

@@ -12,7 +12,6 @@ from copy import copy
 from pathlib import Path
 from typing import Any
 
-from lightpaint.arrays import Position
 from lightpaint.errors import SceneError
 from lightpaint.scene.checks.assets import check_assets
 from lightpaint.scene.checks.required import check_required
@@ -27,7 +26,6 @@ from lightpaint.scene.properties.integrator import (
     read_integrator,
     replace_integrator,
 )
-from lightpaint.scene.properties.pose import Motion, moved_parameters
 from lightpaint.scene.runtime.mitsuba_errors import mitsuba_errors
 from lightpaint.scene.runtime.plugins import check_plugins
 
@@ -168,87 +166,6 @@ class ParsedScene:
         shape = self.shape_of.get(emitter)
         return "" if shape is None else str(self.state.nodes[shape].props.plugin_name())
 
-    def with_motions(self, motions: Mapping[int, Motion]) -> "ParsedScene":
-        """Return this scene with emitters moved. motions: by the nodes of emitters."""
-        import mitsuba as mi
-
-        other = copy(self)
-        other.state = mi.parser.ParserState(self.state)
-        other.moved = dict(self.moved)
-        for emitter, motion in motions.items():
-            node = self.shape_of.get(emitter, emitter)
-            props = other.state.nodes[node].props
-            parameters = moved_parameters(props, motion)
-            for parameter in parameters:
-                props[parameter.name] = parameter.value
-            other.moved[node] = {**self.moved.get(node, {}), **{p.name: p.xml for p in parameters}}
-        return other
-
-    def darkened(self, dark: Mapping[int, EmitterSetting]) -> "ParsedScene":
-        """Return this scene with the settings `dark` made, by the nodes of emitters."""
-        import mitsuba as mi
-
-        other = copy(self)
-        other.state = mi.parser.ParserState(self.state)
-        for node, setting in dark.items():
-            set_emission(other.state, node, setting, on_shape=node in self.shape_of)
-        return other
-
-    def with_elements(self, elements: Mapping[str, str]) -> "ParsedScene":
-        """Return this scene with emitters added, or others in the place of added ones.
-
-        elements: XML by the name that its emitter gets, a name that no emitter of the files has.
-        """
-        import mitsuba as mi
-
-        other = copy(self)
-        other.state = mi.parser.ParserState(self.state)
-        other.emitter_nodes, other.names = [*self.emitter_nodes], dict(self.names)
-        other.shape_of = dict(self.shape_of)
-        node_of = {name: node for node, name in self.names.items()}
-        for name, text in elements.items():
-            fragment = mi.parser.parse_string(self.config, f'<scene version="3.0.0">{text}</scene>')
-            mi.parser.transform_all(self.config, fragment)
-            kinds = [node.type for node in fragment.nodes]
-            inner = kinds.index(mi.ObjectType.Emitter)
-            if name in node_of:
-                first = node_of[name] - inner + 1
-            else:
-                first = len(other.state.nodes)
-                other.emitter_nodes.append(first + inner - 1)
-                other.names[first + inner - 1] = name
-                if inner > 1:
-                    other.shape_of[first + inner - 1] = first
-                root = other.state.nodes[0].props
-                root[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(first)
-            _put_nodes(other.state, first, fragment)
-        return other
-
-    def lit_by_points(
-        self, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
-    ) -> "ParsedScene":
-        """Return this scene with point lights of intensity 1 added, and the settings `dark` made.
-
-        positions: by the names of the new lights, which no other has. The nodes of these come
-        last, in that order.
-        """
-        import mitsuba as mi
-
-        other = self.darkened(dark)
-        other.emitter_nodes, other.names = [*self.emitter_nodes], dict(self.names)
-        for name, position in positions.items():
-            node = mi.parser.SceneNode()
-            node.type = mi.ObjectType.Emitter
-            node.props = mi.Properties("point")
-            node.props["position"] = mi.ScalarPoint3f(*position)
-            node.props["intensity"] = mi.ScalarColor3f(1)
-            other.state.nodes.append(node)
-            k = len(other.state.nodes) - 1
-            other.state.nodes[0].props[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(k)
-            other.emitter_nodes.append(k)
-            other.names[k] = name
-        return other
-
     def relocated(self, old: Path, new: Path) -> "ParsedScene":
         """Return this scene, whose files in the folder `old` are about to move to `new`."""
         import mitsuba as mi
@@ -335,22 +252,6 @@ class ParsedScene:
             yield
         finally:
             mi.set_file_resolver(before)
-
-
-def _put_nodes(state: Any, first: int, fragment: Any) -> None:
-    """Put the nodes of a parsed fragment, but for its root, to `first` and on in `state`."""
-    import mitsuba as mi
-
-    reference = mi.Properties.Type.ResolvedReference
-    for k, node in enumerate(list(fragment.nodes)[1:]):
-        for key in list(node.props):
-            if node.props.type(key) == reference:
-                child = node.props[key].index() - 1 + first
-                node.props[key] = mi.Properties.ResolvedReference(child)
-        if first + k < len(state.nodes):
-            state.nodes[first + k] = node
-        else:
-            state.nodes.append(node)
 
 
 def relocated_path(path: Path, old: Path, new: Path) -> Path:

@@ -32,6 +32,7 @@ from lightpaint.placement.suggestions.suggestion import Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.light import free_names
+from lightpaint.scene.point_lights import lit_by_points
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
@@ -163,7 +164,7 @@ def _too_near(places: Floats, space: FreeSpace) -> npt.NDArray[np.bool_]:
 def _render(small: Scene, places: Floats, seed: int) -> Basis:
     height, width = small.size
     spp = max(4, SAMPLES // (height * width))
-    lit = small.lit_by_points([as_position(place) for place in places])
+    lit = lit_by_points(small, [as_position(place) for place in places])
     return render_planes_only(lit, spp=spp, seed=seed)
 
 

@@ -1,0 +1,111 @@
+"""Parsed scenes with other emitters: moved, black or added, without reading their files again."""
+
+from collections.abc import Mapping
+from copy import copy
+from typing import Any
+
+from lightpaint.arrays import Position
+from lightpaint.scene.properties.emission import EmitterSetting, set_emission
+from lightpaint.scene.properties.pose import Motion, moved_parameters
+from lightpaint.scene.scene_tree import ParsedScene
+
+
+def with_motions(parsed: ParsedScene, motions: Mapping[int, Motion]) -> ParsedScene:
+    """Return a scene with emitters moved. motions: by the nodes of emitters."""
+    import mitsuba as mi
+
+    other = copy(parsed)
+    other.state = mi.parser.ParserState(parsed.state)
+    other.moved = dict(parsed.moved)
+    for emitter, motion in motions.items():
+        node = parsed.shape_of.get(emitter, emitter)
+        props = other.state.nodes[node].props
+        parameters = moved_parameters(props, motion)
+        for parameter in parameters:
+            props[parameter.name] = parameter.value
+        other.moved[node] = {**parsed.moved.get(node, {}), **{p.name: p.xml for p in parameters}}
+    return other
+
+
+def darkened(parsed: ParsedScene, dark: Mapping[int, EmitterSetting]) -> ParsedScene:
+    """Return a scene with the settings `dark` made, by the nodes of emitters."""
+    import mitsuba as mi
+
+    other = copy(parsed)
+    other.state = mi.parser.ParserState(parsed.state)
+    for node, setting in dark.items():
+        set_emission(other.state, node, setting, on_shape=node in parsed.shape_of)
+    return other
+
+
+def with_elements(parsed: ParsedScene, elements: Mapping[str, str]) -> ParsedScene:
+    """Return a scene with emitters added, or others in the place of added ones.
+
+    elements: XML by the name that its emitter gets, a name that no emitter of the files has.
+    """
+    import mitsuba as mi
+
+    other = copy(parsed)
+    other.state = mi.parser.ParserState(parsed.state)
+    other.emitter_nodes, other.names = [*parsed.emitter_nodes], dict(parsed.names)
+    other.shape_of = dict(parsed.shape_of)
+    node_of = {name: node for node, name in parsed.names.items()}
+    for name, text in elements.items():
+        fragment = mi.parser.parse_string(parsed.config, f'<scene version="3.0.0">{text}</scene>')
+        mi.parser.transform_all(parsed.config, fragment)
+        kinds = [node.type for node in fragment.nodes]
+        inner = kinds.index(mi.ObjectType.Emitter)
+        if name in node_of:
+            first = node_of[name] - inner + 1
+        else:
+            first = len(other.state.nodes)
+            other.emitter_nodes.append(first + inner - 1)
+            other.names[first + inner - 1] = name
+            if inner > 1:
+                other.shape_of[first + inner - 1] = first
+            root = other.state.nodes[0].props
+            root[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(first)
+        _put_nodes(other.state, first, fragment)
+    return other
+
+
+def with_points(
+    parsed: ParsedScene, dark: Mapping[int, EmitterSetting], positions: Mapping[str, Position]
+) -> ParsedScene:
+    """Return a scene with point lights of intensity 1 added, and the settings `dark` made.
+
+    positions: by the names of the new lights, which no other has. The nodes of these come
+    last, in that order.
+    """
+    import mitsuba as mi
+
+    other = darkened(parsed, dark)
+    other.emitter_nodes, other.names = [*parsed.emitter_nodes], dict(parsed.names)
+    for name, position in positions.items():
+        node = mi.parser.SceneNode()
+        node.type = mi.ObjectType.Emitter
+        node.props = mi.Properties("point")
+        node.props["position"] = mi.ScalarPoint3f(*position)
+        node.props["intensity"] = mi.ScalarColor3f(1)
+        other.state.nodes.append(node)
+        k = len(other.state.nodes) - 1
+        other.state.nodes[0].props[f"{name} of lightpaint"] = mi.Properties.ResolvedReference(k)
+        other.emitter_nodes.append(k)
+        other.names[k] = name
+    return other
+
+
+def _put_nodes(state: Any, first: int, fragment: Any) -> None:
+    """Put the nodes of a parsed fragment, but for its root, to `first` and on in `state`."""
+    import mitsuba as mi
+
+    reference = mi.Properties.Type.ResolvedReference
+    for k, node in enumerate(list(fragment.nodes)[1:]):
+        for key in list(node.props):
+            if node.props.type(key) == reference:
+                child = node.props[key].index() - 1 + first
+                node.props[key] = mi.Properties.ResolvedReference(child)
+        if first + k < len(state.nodes):
+            state.nodes[first + k] = node
+        else:
+            state.nodes.append(node)
