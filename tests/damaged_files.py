@@ -148,7 +148,7 @@ def _worker(folder: Path) -> tuple[list[str], str]:
 def _read_all(folder: Path) -> None:
     kind, whole, cases = pickle.loads((folder / "cases.pickle").read_bytes())
     out = os.fdopen(os.dup(1), "w")
-    from lightpaint.colour.colour_science import colour_science
+    from lightpaint.colour.primaries import colour_science
 
     reader = Reader(kind)
     known = {}

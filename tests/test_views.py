@@ -15,7 +15,7 @@ from renderer import LIGHTS, write_room
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.cli import main
-from lightpaint.cli.commands.session_options import solve_command
+from lightpaint.cli.commands.paint import solve_command
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import BasisError, OutputError, TargetError
 from lightpaint.images.formats.exr import write_rgb

@@ -299,6 +299,13 @@ class Basis(Shown):
         """Power and totals of one walk, (n, 3) each."""
         return power_and_totals(self.planes, ~self.emitters_seen)
 
+    def set_power_and_totals(self, power: Doubles, totals: Doubles) -> None:
+        """Keep `power` and `totals` that are known already, so that no walk computes them.
+
+        power, totals: (n, 3) float64, of just these planes. Call it before either is read.
+        """
+        vars(self)["_power_and_totals"] = power, totals  # the place of the cached property's value
+
     def mix(self, weights: Doubles) -> npt.NDArray[np.float32]:
         """Return the image Σ w_i Φ_i, (h, w, 3) float32. weights: (n, 3) in the order of the
         lights.

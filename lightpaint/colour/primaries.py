@@ -1,14 +1,29 @@
 """Conversion from the primaries that a file declares to linear Rec.709."""
 
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache, lru_cache
+from types import ModuleType
+from typing import cast
 
 import numpy as np
 
 from lightpaint.arrays import Doubles, Floats
-from lightpaint.colour.colour_science import colour_science
 from lightpaint.errors import ImageError
+from lightpaint.signals import interruptible_between_pieces
+
+
+@cache
+def colour_science() -> ModuleType:
+    """Return the module `colour`."""
+    # An interrupt in the middle of the import would cause complaints when the process ends.
+    with interruptible_between_pieces(), warnings.catch_warnings():
+        # It warns about missing plotting libraries, which are not needed here.
+        warnings.simplefilter("ignore")
+        import colour
+    return cast("ModuleType", colour)
+
 
 #: CIE xy of red, green, blue and white of Rec.709, the primaries of every image in memory.
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)

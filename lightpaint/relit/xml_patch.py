@@ -8,7 +8,8 @@ from pathlib import Path
 from lightpaint.arrays import RGB
 from lightpaint.errors import OutputError, SceneError
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.relight import relit_files, scene_of, settings_of
+from lightpaint.relit.relight import scene_of
+from lightpaint.relit.relit_files import relit_files, settings_of
 from lightpaint.scene.checks.tokens import tag
 from lightpaint.scene.lights.emitters import Emitter
 from lightpaint.scene.properties.emission import Scaling

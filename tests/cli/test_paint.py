@@ -27,7 +27,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from lightpaint.basis.file.basis_file import write_basis
-from lightpaint.cli.commands.session_options import solve_command
+from lightpaint.cli.commands.paint import solve_command
 from lightpaint.cli.options.command_arguments import values_of
 from lightpaint.cli.options.job_options import settings_of
 from lightpaint.cli.options.parser import command_parser

@@ -14,8 +14,7 @@ from lightpaint.colour.color import (
     luminance,
     rgb_to_hex,
 )
-from lightpaint.colour.colour_science import colour_science
-from lightpaint.colour.primaries import adaptation
+from lightpaint.colour.primaries import adaptation, colour_science
 from lightpaint.errors import ColorError
 
 # Linear Rec.709 from the chromaticities of ITU-R BT.709: columns are the primaries' XYZ.

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.color_difference import ciede2000, delta_e, lab
-from lightpaint.colour.colour_science import colour_science
-from lightpaint.colour.primaries import REC709, rgb_to_xyz
+from lightpaint.colour.primaries import REC709, colour_science, rgb_to_xyz
 
 
 @pytest.mark.parametrize(

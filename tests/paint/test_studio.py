@@ -21,7 +21,7 @@ from lightpaint.basis.cache.denoised_planes import (
     cache_denoised_planes,
     read_denoised_planes,
 )
-from lightpaint.cli.commands.session_options import solve_command
+from lightpaint.cli.commands.paint import solve_command
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.paint import protocol, subject
 from lightpaint.paint.protocol import Message

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightpaint.colour.display.view_transform import ViewTransform
-from lightpaint.lighting.analysis.constraint_cost import without_constraints
+from lightpaint.lighting.analysis.analysis import without_constraints
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solve

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lightpaint.images.estimate import Estimate
-from lightpaint.lighting.analysis.constraint_cost import without_constraints
+from lightpaint.lighting.analysis.analysis import without_constraints
 from lightpaint.lighting.analysis.diagnosis import diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.combination import combine

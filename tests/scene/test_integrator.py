@@ -15,7 +15,7 @@ from lightpaint.basis.file.basis_reader import read_origin
 from lightpaint.errors import SceneError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting import Lighting
-from lightpaint.relit.relight import relit_files
+from lightpaint.relit.relit_files import relit_files
 from lightpaint.scene.properties.integrator import IntegratorChoice
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene

@@ -6,8 +6,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from threading import Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.output import lines, terminal
 from lightpaint.cli.output.output_mode import CommandOutcome, output_mode
@@ -15,6 +16,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import OutputError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.paint.server.address import Reach
+from lightpaint.paint.store.session_requests import SessionRequests
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
 
@@ -56,7 +58,6 @@ def paint(
     from lightpaint.paint.subject_factory import make_subjects
 
     check_installed()
-    from lightpaint.cli.commands.session_options import solve_command
     from lightpaint.cli.output.vocabulary import from_any_folder
 
     def command(paintings: Mapping[str, str], requests: "SessionRequests") -> str:
@@ -135,3 +136,59 @@ def _has_browser() -> bool:
     ):
         return False
     return True
+
+
+def solve_command(
+    source: str, paintings: Mapping[str, str], options: Sequence[str], requests: SessionRequests
+) -> str:
+    """Return the command that gives the same answer to exported paintings as their session.
+
+    paintings: paths by sensor, "" for that of the only view. source, options: those of the painter.
+    """
+    words = ["lightpaint solve", quote(source)]
+    for sensor, path in paintings.items():
+        words.append(f"--target {quote(f'{sensor}={path}')}" if sensor else quote(path))
+    return " ".join([*words, *options, *options_of(requests)])
+
+
+def options_of(requests: SessionRequests) -> list[str]:
+    """Return requests as options of `lightpaint solve`."""
+    options = []
+    for name, constraint in requests.lights.items():
+        options += [option for key in constraint for option in _options(name, key, constraint)]
+    for names in requests.ties:
+        options.append(f"--tie {quote(','.join(names))}")
+    for key, value in requests.values.items():
+        option = f"--{key.replace('_', '-')}"
+        options.append(option if value is True else f"{option} {value}")
+    return options
+
+
+def _options(name: str, key: str, constraint: Mapping[str, Any]) -> list[str]:
+    """Return one request for a light as options; duv goes with its kelvin."""
+    value = constraint[key]
+    if key in ("off", "lock") and value is True:
+        return [f"--{key} {quote(name)}"]
+    if key == "limits":
+        ends = ":".join(
+            "" if end not in value else _value_text(value[end]) for end in ("min", "max")
+        )
+        return [f"--limit {quote(f'{name}={ends}')}"]
+    if key == "kelvin":
+        duv = f",duv={constraint['duv']:g}" if "duv" in constraint else ""
+        kelvin = (
+            ":".join(map(_value_text, value))
+            if isinstance(value, list | tuple)
+            else _value_text(value)
+        )
+        return [f"--kelvin {quote(f'{name}={kelvin}{duv}')}"]
+    if key == "duv":
+        return []
+    return [f"--{key} {quote(f'{name}={_value_text(value)}')}"]
+
+
+def _value_text(value: Any) -> str:
+    """Return a value of a lights file as an option has it, with all digits."""
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return ",".join(map(_value_text, value))
+    return repr(float(value)) if isinstance(value, int | float) else str(value)

@@ -1,7 +1,7 @@
 """The whole analysis of an answer, computed once: its errors, its reasons, and their costs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -14,10 +14,13 @@ from lightpaint.lighting.analysis.appearance.color_choices import (
     best_by_colors,
     color_choices,
 )
-from lightpaint.lighting.analysis.constraint_cost import without_constraints
 from lightpaint.lighting.analysis.diagnosis import Diagnosis, diagnose
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty, error_bars, with_error_bars
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.linear_problem import reduce_lights
+from lightpaint.lighting.problem import gamuts_for
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
 from lightpaint.screen import short_repr
 
 
@@ -125,3 +128,24 @@ def _certificate_fields(appearance: Appearance) -> dict[str, float]:
         "delta_e_noise": appearance.noise,
         "delta_e_asked": appearance.requested_change,
     }
+
+
+def without_constraints(solution: Solution) -> Solution | None:
+    """Solve without constraints; return None if there are none.
+
+    Also None for one of several views, whose lighting answers the others, too.
+    """
+    problem = solution.problem
+    if not problem.constraints or solution.whole is not None:
+        return None
+    gamuts = gamuts_for(problem.basis, problem.views, problem.fit)
+    free = reduce_lights(Constraints(), problem.lights, problem.fit, gamuts)
+    anew = replace(
+        problem,
+        constraints=Constraints(),
+        reduction=free,
+        full=free,
+        dimming=None,
+        fit=replace(problem.fit, method="polished"),
+    )
+    return solution_of(anew, start=solution.weights)

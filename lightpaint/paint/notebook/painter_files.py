@@ -1,4 +1,4 @@
-"""Files of a painter in a notebook: that of its session, and what `save` writes."""
+"""Files of a painter in a notebook: its session, what `save` writes, and its one-script page."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +13,7 @@ from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.steps import Identity
 from lightpaint.paint.store.store import MemoryStore, Store
 from lightpaint.target.painting_file import write_painting
+from lightpaint.viewer.bundle import bundled, styles
 
 
 class Closable(Protocol):
@@ -62,3 +63,13 @@ def save_answer(
         raise PaintError("nothing is painted yet: there is no painting to keep")
     else:
         write_painting(path, target)
+
+
+def widget_script() -> str:
+    """Return the painter as one ES module, whose default export is an anywidget's."""
+    return bundled("paint/page/widget.js")
+
+
+def widget_style() -> str:
+    """Return the style sheet of the painter."""
+    return styles("paint/page/style.css")

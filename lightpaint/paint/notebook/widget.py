@@ -27,9 +27,10 @@ from lightpaint.paint.notebook.painter_files import (
     open_store,
     save_answer,
     store_path,
+    widget_script,
+    widget_style,
 )
 from lightpaint.paint.notebook.pending_values import PendingValues
-from lightpaint.paint.notebook.widget_files import widget_script, widget_style
 from lightpaint.paint.notebook.widget_views import WidgetViews
 from lightpaint.paint.protocol import AnswerUpdate, Message, Notice, SessionState
 from lightpaint.paint.studio.studio import Studio

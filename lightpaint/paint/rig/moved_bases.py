@@ -42,8 +42,8 @@ def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool)
         return compose_planes(picks, basis.size, in_memory=in_memory)
 
     indirect = None
-    if basis.indirect is not None and all(its.indirect is not None for its in moved.values()):
-        parts = {k: its.indirect for k, its in moved.items() if its.indirect is not None}
+    if basis.indirect is not None and all(x.indirect is not None for x in moved.values()):
+        parts = {k: x.indirect for k, x in moved.items() if x.indirect is not None}
         indirect = IndirectLight(
             compose(basis.indirect.planes, {k: part.planes for k, part in parts.items()}),
             compose(basis.indirect.noise, {k: part.noise for k, part in parts.items()}),
@@ -51,11 +51,11 @@ def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool)
     lights = tuple(
         moved[k].lights[0] if k in moved else light for k, light in enumerate(basis.lights)
     )
-    made = replace(
+    moved_basis = replace(
         basis,
         lights=type(basis.lights)(lights, basis.requests),
-        planes=compose(basis.planes, {k: its.planes for k, its in moved.items()}),
-        noise=compose(basis.noise, {k: its.noise for k, its in moved.items()}),
+        planes=compose(basis.planes, {k: x.planes for k, x in moved.items()}),
+        noise=compose(basis.noise, {k: x.noise for k, x in moved.items()}),
         indirect=indirect,
         former=Estimate(basis.present_look, basis.present_noise),
         guide_table=None,
@@ -63,9 +63,8 @@ def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool)
         origin=replace(basis.origin, is_composed=True),
     )
     # A walk over all planes would come to the same as those of each.
-    for name in ("power", "totals"):
-        rows = getattr(basis, name).copy()
-        for k, its in moved.items():
-            rows[k] = getattr(its, name)[0]
-        vars(made)[name] = rows
-    return made
+    power, totals = basis.power.copy(), basis.totals.copy()
+    for k, one_light in moved.items():
+        power[k], totals[k] = one_light.power[0], one_light.totals[0]
+    moved_basis.set_power_and_totals(power, totals)
+    return moved_basis

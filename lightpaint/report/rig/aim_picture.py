@@ -7,7 +7,8 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import Position
 from lightpaint.images.denoiser import Features
 from lightpaint.report.rig.hung_lights import HungLight
-from lightpaint.report.rig.rig_drawing import CHANGED, FINER, GROUND, arrow, circle
+from lightpaint.report.rig.panels import FINER, GROUND
+from lightpaint.report.rig.rig_drawing import CHANGED, arrow, circle
 from lightpaint.report.rig.view_geometry import ViewGeometry
 from lightpaint.scene.properties.site import Site
 from lightpaint.screen import visible

@@ -6,7 +6,6 @@ that moved have a ring where they were and an arrow to where they are; spots hav
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -15,49 +14,22 @@ from PIL import Image, ImageDraw, ImageFont
 from lightpaint.arrays import RGB, Doubles, Position
 from lightpaint.images.denoiser import Features
 from lightpaint.report.rig.hung_lights import HungLight
+from lightpaint.report.rig.panels import FINER, GROUND, Panel, in_column, in_row, plan_and_elevation
 from lightpaint.report.rig.view_geometry import ViewGeometry
 from lightpaint.screen import visible
 
-#: The ground, texts on it, and what has changed.
-GROUND, TEXT, FAINT, EDGE = (24, 24, 26), (226, 226, 226), (142, 142, 146), (58, 58, 62)
+#: Colours of texts, and of what has changed.
+TEXT, FAINT, EDGE = (226, 226, 226), (142, 142, 146), (58, 58, 62)
 CHANGED = (255, 176, 66)
 
 #: Brightness of the room's points, and their largest side in pixels of the large drawing.
 ROOM, LARGEST = 0.45, 40
-
-#: Drawn this much larger than it is shown, so that lines are smooth.
-FINER = 2
-
-#: The room around what is seen, as a share; lights farther away than this are not drawn.
-MARGIN, FAR = 0.08, 1.5
-
-#: Most height of both drawings, relative to their width.
-TALLEST = 1.3
 
 #: Lengths of beams as a share of the panel, where they meet nothing that is seen.
 BEAM = 0.3
 
 #: Names are drawn of so many lights; of more only those that changed have theirs.
 MOST_NAMES = 24
-
-
-@dataclass(frozen=True)
-class _Panel:
-    """A drawing along one axis. right, up: unit vectors; low, scale: from metres to pixels."""
-
-    title: str
-    right: Doubles
-    up: Doubles
-    low: Doubles
-    scale: float
-    size: tuple[int, int]
-
-    def at(self, points: Doubles | Position) -> Doubles:
-        """Return x and y in pixels, (..., 2)."""
-        places = np.asarray(points, dtype=float)
-        flat = np.stack([places @ self.right, places @ self.up], axis=-1)
-        x, y = np.moveaxis((flat - self.low) * self.scale, -1, 0)
-        return np.stack([x, self.size[1] - y], axis=-1)
 
 
 def rig_drawing(
@@ -83,99 +55,15 @@ def rig_drawing(
     colors = albedo[tuple((geometry.pixels[:, ::-1] - 0.5).astype(int).T)]
     text = FINER * max(11, width // (72 if height is None else 110))
     row = None if height is None else FINER * height - round(2.4 * text)
-    panels = _panels(geometry, lights, np.array(up), FINER * width, row)
+    panels = plan_and_elevation(geometry, lights, np.array(up), FINER * width, row)
     pictures = [_drawn(panel, geometry, colors, lights, text) for panel in panels]
-    sheet = _in_row(pictures, width) if row else _in_column(pictures, width)
+    sheet = in_row(pictures, width) if row else in_column(pictures, width)
     small = sheet.resize((width, sheet.height // FINER), Image.Resampling.LANCZOS)
     return np.asarray(small)
 
 
-def _in_column(pictures: Sequence[Image.Image], width: int) -> Image.Image:
-    """Return pictures one below the other, in the middle of a sheet of that width."""
-    sheet = Image.new("RGB", (FINER * width, sum(x.height for x in pictures)), GROUND)
-    y = 0
-    for picture in pictures:
-        sheet.paste(picture, ((sheet.width - picture.width) // 2, y))
-        y += picture.height
-    return sheet
-
-
-def _in_row(pictures: Sequence[Image.Image], width: int) -> Image.Image:
-    """Return pictures beside each other, on one line at the bottom."""
-    tallest = max(x.height for x in pictures)
-    sheet = Image.new("RGB", (FINER * width, tallest), GROUND)
-    gap = (sheet.width - sum(x.width for x in pictures)) // (len(pictures) + 1)
-    x = gap
-    for picture in pictures:
-        sheet.paste(picture, (x, tallest - picture.height))
-        x += picture.width + gap
-    return sheet
-
-
-def _panels(
-    geometry: ViewGeometry, lights: Sequence[HungLight], up: Doubles, width: int, row: int | None
-) -> list[_Panel]:
-    """Return plan and elevation on one scale, `width` pixels wide or less.
-
-    row: the most height of each beside the other; None for one below the other.
-    """
-    ahead = _ahead(geometry, up)
-    left = np.cross(up, ahead)
-    places = _places_near(geometry, lights)
-    low, high = np.percentile(geometry.points, [0.5, 99.5], axis=0)
-    points = np.concatenate([places, [low, high]])
-    views = [
-        ("plan: the camera looks to the right", left),
-        ("elevation", up),
-    ]
-    flat = np.stack([points @ ahead, points @ left, points @ up], axis=1)
-    least, most = flat.min(axis=0), flat.max(axis=0)
-    room = MARGIN * float((most - least).max())
-    least, extent = least - room, most - least + 2 * room
-    if row is None:
-        scale = min(width / extent[0], TALLEST * width / (extent[1] + extent[2]))
-    else:
-        scale = min(0.96 * width / (2 * extent[0]), row / max(extent[1], extent[2]))
-    return [
-        _Panel(
-            title,
-            ahead,
-            along,
-            least[[0, k]],
-            scale,
-            (int(extent[0] * scale), int(extent[k] * scale)),
-        )
-        for k, (title, along) in enumerate(views, 1)
-    ]
-
-
-def _ahead(geometry: ViewGeometry, up: Doubles) -> Doubles:
-    """Return the axis of the scene across `up` that leads away from the camera."""
-    camera = geometry.camera
-    way = np.ptp(geometry.points, axis=0)
-    if camera is not None:
-        way = np.median(geometry.points, axis=0) - np.array(camera)
-    way = np.where(np.abs(up) > 0.5, 0, way)
-    axis = np.zeros(3)
-    k = int(np.argmax(np.abs(way)))
-    axis[k] = 1.0 if way[k] >= 0 else -1.0
-    return axis
-
-
-def _places_near(geometry: ViewGeometry, lights: Sequence[HungLight]) -> Doubles:
-    """Return the places of lights, old and new, that are near what is seen."""
-    sites = [light.place.site for light in lights]
-    sites += [light.place.moved_from for light in lights if light.place.moved_from is not None]
-    places = [site.position for site in sites if site.position is not None]
-    low, high = np.percentile(geometry.points, [0.5, 99.5], axis=0)
-    reach = FAR * float((high - low).max())
-    listed = np.array(places, dtype=float).reshape(-1, 3)
-    near = ((listed > low - reach) & (listed < high + reach)).all(axis=1)
-    return np.asarray(listed[near])
-
-
 def _drawn(
-    panel: _Panel, geometry: ViewGeometry, colors: Doubles, lights: Sequence[HungLight], text: int
+    panel: Panel, geometry: ViewGeometry, colors: Doubles, lights: Sequence[HungLight], text: int
 ) -> Image.Image:
     """Draw one panel, with its title below it."""
     width, height = panel.size
@@ -206,7 +94,7 @@ def _drawn(
     return whole
 
 
-def _room(panel: _Panel, geometry: ViewGeometry, colors: Doubles) -> npt.NDArray[np.uint8]:
+def _room(panel: Panel, geometry: ViewGeometry, colors: Doubles) -> npt.NDArray[np.uint8]:
     """Draw what the camera sees as points, those that hide the rest left out."""
     towards = np.cross(panel.right, panel.up)
     # Ceilings from above, the near wall from the side.
@@ -231,7 +119,7 @@ def _room(panel: _Panel, geometry: ViewGeometry, colors: Doubles) -> npt.NDArray
 
 
 def _draw_camera(
-    draw: ImageDraw.ImageDraw, panel: _Panel, geometry: ViewGeometry, text: int
+    draw: ImageDraw.ImageDraw, panel: Panel, geometry: ViewGeometry, text: int
 ) -> None:
     assert geometry.camera is not None
     inside = np.array([1.5 * text, 1.5 * text]), np.array(panel.size) - 1.5 * text
@@ -248,7 +136,7 @@ def _draw_camera(
 
 def _draw_beam(
     draw: ImageDraw.ImageDraw,
-    panel: _Panel,
+    panel: Panel,
     geometry: ViewGeometry,
     light: HungLight,
 ) -> None:
@@ -277,7 +165,7 @@ def _draw_beam(
         )
 
 
-def _draw_light(draw: ImageDraw.ImageDraw, panel: _Panel, light: HungLight, text: int) -> None:
+def _draw_light(draw: ImageDraw.ImageDraw, panel: Panel, light: HungLight, text: int) -> None:
     """Draw where a light hangs and, if it moved, where it hung before."""
     assert light.place.position is not None
     centre, radius = panel.at(light.place.position), 0.42 * text
@@ -293,7 +181,7 @@ def _draw_light(draw: ImageDraw.ImageDraw, panel: _Panel, light: HungLight, text
 
 
 def _draw_names(
-    draw: ImageDraw.ImageDraw, panel: _Panel, names: Mapping[str, HungLight], text: int
+    draw: ImageDraw.ImageDraw, panel: Panel, names: Mapping[str, HungLight], text: int
 ) -> None:
     """Draw names beside lights, moved down where one would cover another."""
     font, occupied = ImageFont.load_default(round(0.9 * text)), list[tuple[float, ...]]()

@@ -19,7 +19,7 @@ import pytest
 from renderer import REPOSITORY
 
 import lightpaint as lp
-from lightpaint.cli.commands.session_options import solve_command
+from lightpaint.cli.commands.paint import solve_command
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.object_map import Objects
 from lightpaint.lighting.analysis.noise.noise_correction import correct_noise

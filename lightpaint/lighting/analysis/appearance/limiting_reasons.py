@@ -17,12 +17,16 @@ from lightpaint.lighting.analysis.appearance.constraint_kinds import (
 )
 from lightpaint.lighting.analysis.appearance.display_difference import PaintComparison
 from lightpaint.lighting.analysis.appearance.pixel_sample import LimitGroup, PixelSample
-from lightpaint.lighting.analysis.appearance.released_answer import released_weights
 from lightpaint.lighting.analysis.appearance.unpainted_change import (
     UnpaintedChange,
     unpainted_change,
 )
+from lightpaint.lighting.analysis.noise.noise_correction import correct_noise
+from lightpaint.lighting.constraints.constraints import Constraints
+from lightpaint.lighting.fit import Fit
+from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solution import Solution
+from lightpaint.lighting.solve import solution_of
 
 #: Share of the error from which a reason counts, and from which a headline names it.
 MIN_SHARE, HEADLINE_SHARE = 0.05, 1 / 3
@@ -250,3 +254,26 @@ def round_down(value: float) -> float:
     """Return the nearest number of two digits that is not larger; `value` > 0."""
     unit = 10.0 ** (np.floor(np.log10(value)) - 1)
     return float(f"{np.floor(value / unit * (1 + 1e-12)) * unit:.2g}")
+
+
+def released_weights(
+    solution: Solution, *, fit: Fit | None = None, constraints: Constraints | None = None
+) -> Doubles:
+    """Return the weights, (n, 3), of the same views with another fit or other constraints.
+
+    solution: of one view; if it is a part of one of several views, all of them are solved. Noise is
+    corrected if it was before.
+    """
+    problem = (solution.whole or solution).problem
+    # All constraints, also those of the bases' scenes, are among those of the problem.
+    bases = [basis.with_requests(type(basis.requests)()) for basis in problem.views.bases]
+    released = Problem.of(
+        bases,
+        list(problem.views.targets),
+        constraints=problem.constraints if constraints is None else constraints,
+        fit=fit or problem.fit,
+    )
+    released_solution = solution_of(replace(released, start=problem.start))
+    if problem.corrected is not None and solution.basis.knows_noise:
+        released_solution = correct_noise(released_solution)
+    return released_solution.weights

@@ -1,0 +1,175 @@
+"""The files of a relit scene: its XML, edited copies of includes, and scaled images."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lightpaint.arrays import RGB, Floats
+from lightpaint.errors import OutputError, SceneError
+from lightpaint.relit.emission_xml import Changes, set_emission
+from lightpaint.relit.xml_edit import XmlFile
+from lightpaint.scene.checks.tokens import tag
+from lightpaint.scene.lights.emitters import Emitter
+from lightpaint.scene.scene import Scene
+
+
+def settings_of(scene: Scene, emission: Mapping[str, RGB]) -> Iterator[tuple[Emitter, RGB]]:
+    """Return the setting of each adjusted emitter. emission: by name of light."""
+    for light in scene.lights:
+        if not light.is_fixed:
+            for member in light.members:
+                yield member, light.emission_of(member, emission[light.name])
+
+
+@dataclass
+class _Edits:
+    """The changes in one file: the settings of the emitters in it, by byte offset.
+
+    integrators: the replacements of elements, by byte offset; at None, an addition.
+    moved: children to set of the elements of moved lights, by byte offset: XML by name.
+    added: lines of the elements of new lights.
+    """
+
+    original: Path
+    settings: dict[int, tuple[Emitter, RGB, float | None]] = field(default_factory=dict)
+    integrators: dict[int | None, str] = field(default_factory=dict)
+    moved: dict[int, Mapping[str, str]] = field(default_factory=dict)
+    added: list[str] = field(default_factory=list)
+
+
+def relit_files(
+    scene: Scene, emission: Mapping[str, RGB], path: Path
+) -> dict[Path, bytes | Floats]:
+    """Return the content of the relit XML at `path`, and of its includes and images.
+
+    Raises OutputError if one of them would replace a file of the scene itself.
+    """
+    root = scene.files[0]
+    edits = {root.resolve(): _Edits(root)}
+    settings = dict(settings_of(scene, emission))
+    unchanged = [emitter for emitter in scene.emitters if emitter not in settings]
+    sampled = _sampled_emitters(settings, unchanged)
+    added = {x.name: x for x in scene.added}
+    new_lines: list[str] = []
+    for emitter in scene.emitters:
+        if emitter.name in added:
+            rgb = settings.pop(emitter, emitter.emission)
+            new_lines += added[emitter.name].lines(rgb, is_sampled=emitter in sampled)
+    unchanged = [emitter for emitter in unchanged if emitter.name not in added]
+    edits[root.resolve()].added = new_lines
+    for emitter, rgb in settings.items():
+        file = scene.files[emitter.file]
+        setting = (emitter, rgb, _sampling_weight(emitter, is_sampled=emitter in sampled))
+        edits_of_file = edits.setdefault(file.resolve(), _Edits(file)).settings
+        if emitter.offset in edits_of_file and edits_of_file[emitter.offset][1:] != setting[1:]:
+            raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
+        edits_of_file[emitter.offset] = setting
+    for emitter in unchanged:
+        file = scene.files[emitter.file]
+        edits_of_file = edits.get(file.resolve(), _Edits(file)).settings
+        if emitter.offset in edits_of_file:
+            raise _included_twice(file, edits_of_file[emitter.offset][0], emitter)
+
+    _edit_integrators(scene, edits)
+    for file, offset, children in scene.moved_elements:
+        edits.setdefault(file.resolve(), _Edits(file)).moved[offset] = children
+    written: dict[Path, bytes | Floats] = {}
+    for edit in edits.values():
+        is_root = edit.original == root
+        target = path if is_root else path.parent / _place_of_include(edit.original, root)
+        content, images = _edit(edit, target.parent, scene, path.stem)
+        # Mitsuba looks for images beside the scene, also for those of an included file.
+        written |= {path.parent / name: image for name, image in images.items()}
+        written[target] = content
+    originals = {file.resolve() for file in scene.originals}
+    if in_the_way := [file for file in written if file.resolve() in originals]:
+        raise OutputError(
+            f"{in_the_way[0]} belongs to the scene itself: write the relit scene to another folder"
+        )
+    return written
+
+
+def _edit_integrators(scene: Scene, edits: dict[Path, _Edits]) -> None:
+    """Add edits that replace the scene's own integrator by the one that it was loaded with."""
+    if scene.instead is None:
+        return
+    text = scene.instead.xml
+    for file, offset in scene.replaced_integrators:
+        edits.setdefault(file.resolve(), _Edits(file)).integrators[offset] = text
+        text = ""  # one is enough
+    if text:
+        edits[scene.files[0].resolve()].integrators[None] = text
+
+
+def _included_twice(file: Path, first: Emitter, second: Emitter) -> SceneError:
+    return SceneError(
+        f"{file} is included more than once, and its light would have to be both "
+        f"{first.name!r} and {second.name!r} with different emissions: "
+        "include two copies of it, or tie the two into a group"
+    )
+
+
+def _sampled_emitters(
+    settings: Mapping[Emitter, RGB], unchanged: Sequence[Emitter]
+) -> set[Emitter]:
+    """Return those of `settings` that a render may sample: the lit ones that are not only hit by
+    chance.
+
+    Mitsuba refuses a scene in which no emitter may be sampled: black ones may where there are no
+    others, and at last those that are hit by chance.
+    """
+    can_be_sampled = {emitter for emitter in settings if not emitter.hit_by_chance}
+    lit = {emitter for emitter in can_be_sampled if any(settings[emitter])}
+    if lit or any(emitter.sampling_weight for emitter in unchanged):
+        return lit
+    return can_be_sampled or set(settings)
+
+
+def _sampling_weight(emitter: Emitter, *, is_sampled: bool) -> float | None:
+    """Return the sampling weight to write, or None to leave it as it is."""
+    if not is_sampled:
+        return 0.0
+    return 1.0 if emitter.sampling_weight == 0 else None
+
+
+def _place_of_include(file: Path, root: Path) -> Path:
+    """Return the path of an edited copy, relative to relit.xml, at which Mitsuba finds it first."""
+    try:
+        return file.resolve().relative_to(root.resolve().parent)
+    except ValueError:
+        raise SceneError(
+            f"{file} has to be edited, but it lies outside the folder of {root}, where an edited "
+            "copy would not be found: move it below that folder"
+        ) from None
+
+
+def _edit(edit: _Edits, folder: Path, scene: Scene, stem: str) -> tuple[bytes, dict[str, Floats]]:
+    """Return the edited XML for `folder`, and the images that it refers to, by name.
+
+    stem: the beginning of image names.
+    """
+    xml = XmlFile(edit.original)
+    if xml.root.tag == "scene":
+        # Assets and includes lie where the original lies.
+        origin = os.path.relpath(edit.original.resolve().parent, folder.resolve())
+        lines = [tag("path", value=Path(origin).as_posix())]
+        lines += [text for at, text in edit.integrators.items() if at is None]
+        xml.insert_first(xml.root, lines)
+    if edit.added:
+        xml.insert_last(xml.root, edit.added)
+    for at, text in edit.integrators.items():
+        if at is not None:
+            xml.replace(xml.element_at(at), text)
+    images: dict[str, Floats] = {}
+    for offset in sorted({*edit.settings, *edit.moved}):
+        changes = Changes(xml, xml.element_at(offset))
+        for name, text in edit.moved.get(offset, {}).items():
+            changes.set_element(name, text)
+        if offset in edit.settings:
+            emitter, rgb, weight = edit.settings[offset]
+            if weight is not None:
+                changes.set("float", "sampling_weight", f"{weight:g}")
+            images |= set_emission(changes, scene, emitter, rgb, stem=stem)
+        changes.finish()
+    return xml.edited(), images
