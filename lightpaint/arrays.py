@@ -30,6 +30,9 @@ Position = tuple[float, float, float]
 #: Numbers that the processor's cache has room for, with copies of them.
 _CACHED_NUMBERS = 2**14
 
+#: Bytes that the registers of any processor hold at most: arrays that Dr.Jit makes begin so.
+ALIGNMENT = 64
+
 #: Bits of float32: all but the sign, infinity, and 2⁻¹⁴, the least half float of full precision.
 _MAGNITUDE, _INFINITY, _LEAST_NORMAL = map(np.uint32, (2**31 - 1, 255 << 23, 113 << 23))
 
@@ -55,6 +58,22 @@ def as_rgb(values: Iterable[Any]) -> RGB:
     """Return the three numbers of an array or any other iterable as one colour."""
     r, g, b = (float(v) for v in values)
     return r, g, b
+
+
+def aligned(values: npt.ArrayLike, kind: type[_Kind]) -> npt.NDArray[_Kind]:
+    """Return a copy, (n,), in memory that begins at a multiple of `ALIGNMENT`.
+
+    values: (n,), converted to `kind`. Dr.Jit uses the memory of an array as it lies, and compiles
+    one kernel for arrays that begin at such a place and another for those that do not, for each
+    array that a kernel reads.
+    """
+    its = np.asarray(values)
+    size = np.dtype(kind).itemsize
+    room = np.empty(its.size + ALIGNMENT // size, kind)
+    begin = -room.ctypes.data % ALIGNMENT // size
+    copy = room[begin : begin + its.size]
+    copy[:] = its
+    return copy
 
 
 def copy_as_singles(values: npt.NDArray[Any], into: npt.NDArray[np.float32]) -> None:

@@ -86,7 +86,7 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
         return time.monotonic() - begin_s > limit_s
 
     before = [basis.origin.mean_spp for basis in bases]
-    with kept_loaded() as tracers:
+    with kept_loaded([view.scene for view in job.views if view.scene is not None]) as tracers:
         for _ in range(MAX_ROUNDS):
             state = Certainty.of(without_noise(job, solution_of(problem_of(job, bases))))
             most = max(basis.origin.mean_spp for basis in bases)

@@ -159,6 +159,26 @@ def test_rough_planes_add_up_and_are_nearer_to_light_without_grain(make_basis: A
     assert left < grain / 5  # of 64 pixels each is a mean, and of the total nothing is left
 
 
+def test_clean_blocks_bring_rough_planes_nearer_to_the_light(make_basis: Any):
+    """A shadow that the rough planes of few samples have only half of."""
+    light = np.ones((2, 64, 96, 3), np.float32)
+    light[0, :, :48] = 0.25
+    rng = np.random.default_rng(5)
+    grainy = 3 * light * (rng.random(light.shape[:3]) < 1 / 3)[..., None]
+    basis = make_basis(images=grainy, emission=[[1, 1, 1], [2, 3, 4]])
+    present = np.einsum("nhwc,nc->hwc", light, basis.present_weights).astype(np.float32)
+    small = np.stack([block_mean(plane, 2) for plane in light]).astype(np.float16)
+    blocks = DenoisedPlanes(small, np.ones(2), present)
+    for k in range(2):
+        rough, better = (RoughPlanes(basis, present, x).plane(k) for x in (None, blocks))
+        off, left = (np.sqrt(np.mean((x - light[k]) ** 2)) for x in (rough, better))
+        assert left < off / 2
+        # Away from the shadow's edge, over which a gain is interpolated.
+        for part in (np.s_[:, :20], np.s_[:, 28:]):
+            blocks_of = [block_mean(x, 2)[part] for x in (better, light[k])]
+            np.testing.assert_allclose(*blocks_of, rtol=0.1)
+
+
 def test_what_is_black_is_black_in_rough_planes(make_basis: Any):
     images = np.zeros((2, 20, 30, 3))
     images[0, :10, :10] = 1

@@ -16,7 +16,7 @@ from lightpaint.paint import protocol
 from lightpaint.paint.background_threads import LatestWork
 from lightpaint.paint.store.store import MemoryStore
 from lightpaint.paint.studio import plane_denoiser
-from lightpaint.paint.studio.background_sampling import add_round
+from lightpaint.paint.studio.background_sampling import SAMPLING, add_round
 from lightpaint.paint.studio.studio import Studio
 from lightpaint.paint.subject import Subject
 from lightpaint.pipeline.job.settings import Settings
@@ -51,6 +51,8 @@ def paint(studio: Studio, stroke: int, light: tuple[float, float, float]) -> Non
 
 def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
     studio = Studio([subject], MemoryStore)
+    heard: list[Any] = []
+    studio.on_message = heard.append
     studio.start()
     try:
         wait(lambda: studio.store is not None)
@@ -71,6 +73,14 @@ def test_paint_is_answered_as_surely_as_was_asked_for(subject: Subject):
         # Nothing more is taken then.
         time.sleep(1)
         assert studio.snapshot().bases[0].origin == basis.origin
+
+        # Pages hear of it, and of its end.
+        def shares() -> list[float]:
+            reports = [x for x in heard if isinstance(x, protocol.ProgressReport)]
+            return [x.done / x.total for x in reports if x.what == SAMPLING]
+
+        assert 0 < shares()[0] < 1
+        wait(lambda: shares()[-1] == 1)
     finally:
         studio.close()
         studio.wait()

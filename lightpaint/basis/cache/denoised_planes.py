@@ -25,7 +25,7 @@ from lightpaint.basis.planes import mix
 from lightpaint.errors import LightpaintError
 from lightpaint.files import replacing
 from lightpaint.images.denoiser import denoiser_text, oidn_is_installed
-from lightpaint.images.pixel_blocks import blocks_in
+from lightpaint.images.pixel_blocks import block_mean, blocks_in
 from lightpaint.images.resampling import resampled
 from lightpaint.threads import parallel_map
 
@@ -40,6 +40,9 @@ BRIGHTEST_HALF = 1024.0
 
 #: Pixels on a side over which the share of a light is taken where surfaces are not known.
 ROUGH_BLOCK = 8
+
+#: How many times the light of rough planes in a block that is denoised is shown there at most.
+MAX_BLOCK_GAIN = 4.0
 
 #: Rows of planes that are brought to single precision at a time.
 STRIP_ROWS = 64
@@ -101,16 +104,31 @@ class RoughPlanes:
     are too large for that to be quick, they are of means over squares of pixels, and shadows are
     soft.
 
-    present: (h, w, 3) float32, that picture.
+    present: (h, w, 3) float32, that picture. small: denoised planes of blocks of pixels, as a page
+    of results keeps them; rough planes then have their light in each block.
     """
 
-    def __init__(self, basis: Basis, present: Floats) -> None:
-        self.basis, self.present = basis, present
+    def __init__(self, basis: Basis, present: Floats, small: DenoisedPlanes | None = None) -> None:
+        self.basis, self.present, self._small = basis, present, small
 
     def plane(self, k: int) -> Floats:
         """Return the plane of light k at unit emission, (h, w, 3) float32; 0 where the scene is
         black.
         """
+        rough = self._share_of_present(k)
+        if self._small is None:
+            return rough
+        small = self._small.plane(k)
+        wanted, there = (
+            resampled(x, self.basis.size)
+            for x in (small, block_mean(rough, -(-self.basis.size[0] // len(small))))
+        )
+        # Where a block has hardly any light, its pixels say little of what it lacks.
+        least = np.float32(1e-4) * there.mean()
+        gain = np.clip((wanted + least) / (there + least), 0, MAX_BLOCK_GAIN)
+        return np.asarray(rough * gain, np.float32)
+
+    def _share_of_present(self, k: int) -> Floats:
         parts = self.basis.indirect
         indirect = None if parts is None else parts.planes.plane(k)
         lit, total = self._averaged(self.basis.planes.plane(k), indirect), self._total

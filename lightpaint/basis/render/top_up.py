@@ -7,7 +7,7 @@ samples: either can go on where it stopped, whatever was added of the other.
 """
 
 import gc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -35,29 +35,39 @@ if TYPE_CHECKING:
 
 
 class KeptTracer:
-    """The tracer of the last top-up: its scene stays loaded until another one is asked for."""
+    """The tracers of the last top-ups: their scene stays loaded until another one is asked for.
 
-    def __init__(self) -> None:
-        self._tracer: Tracer | None = None
-        self._seed = 0
+    views: one scene through several sensors, which is loaded once for all of them.
+    """
+
+    def __init__(self, views: Sequence[Scene] = ()) -> None:
+        self._views = tuple(views)
+        self._tracers: dict[int, tuple[Tracer, int]] = {}  # by view, with the seed
 
     def of(self, scene: Scene, basis: Basis) -> "Tracer":
         """Return a tracer that goes on with `basis`, which was rendered of `scene`."""
         from lightpaint.basis.render.tracer.one_pass import Tracer
 
-        tracer, seed = self._tracer, basis.origin.seed
-        is_same = tracer is not None and tracer.scene is scene and self._seed == seed
-        if tracer is None or not is_same or not _is_equal(tracer.guide_table, basis.guide_table):
+        seed, table = basis.origin.seed, basis.guide_table
+        if not any(view is scene for view in self._views):
             self.close()
-            tracer = Tracer(scene, view_seed(seed, scene.sensor), basis.guide_table)
-            self._tracer, self._seed = tracer, seed
+            self._views = (scene,)
+        number = next(k for k, view in enumerate(self._views) if view is scene)
+        tracer, its_seed = self._tracers.get(number, (None, seed))
+        if tracer is None or its_seed != seed or not _is_equal(tracer.guide_table, table):
+            loaded = next((x.loaded for x, _ in self._tracers.values()), None)
+            others = [view for view in self._views if view is not scene]
+            numbers = view_seed(seed, scene.sensor)
+            tracer = Tracer(scene, numbers, table, loaded=loaded, views=others)
+            self._tracers[number] = tracer, seed
         return tracer
 
     def close(self) -> None:
         """Release the scene."""
-        if self._tracer is not None:
-            self._tracer.close()
-            self._tracer = None
+        if self._tracers:
+            for tracer, _ in self._tracers.values():
+                tracer.close()
+            self._tracers = {}
             gc.collect()
 
 
@@ -66,10 +76,13 @@ def _is_equal(a: Floats | None, b: Floats | None) -> bool:
 
 
 @contextmanager
-def kept_loaded() -> Iterator[KeptTracer]:
-    """Hold Mitsuba, and keep the scene of a top-up loaded for the next one within the block."""
+def kept_loaded(views: Sequence[Scene] = ()) -> Iterator[KeptTracer]:
+    """Hold Mitsuba, and keep the scene of a top-up loaded for the next one within the block.
+
+    views: as of `KeptTracer`.
+    """
     with MITSUBA.acquired():
-        tracers = KeptTracer()
+        tracers = KeptTracer(views)
         try:
             yield tracers
         finally:

@@ -202,7 +202,8 @@ def _better_windows(
     then the one light that gains most by a jump.
     """
     gradient = equations.gradient(optimum.weights)
-    power = np.einsum("cii->ic", equations.M)
+    # The noise correction may leave a black picture with less than nothing.
+    power = np.maximum(np.einsum("cii->ic", equations.M), 0)
     # The slope of a light that is round-off, in units of its own picture.
     root = np.sqrt(power.sum(axis=1))
     size = np.abs(equations.b.T / np.sqrt(np.where(power > 0, power, 1))).max(initial=0)

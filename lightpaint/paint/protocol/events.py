@@ -30,7 +30,8 @@ from lightpaint.paint.store.canvas_pixels import Region
 class ProgressReport(Message, kind="progress"):
     """The progress of a long task. Unasked.
 
-    what: `export`, `basis`, or the renderer's name for it.
+    what: `export`, `basis`, `sampling` for samples that are added where the paint needs them, or
+    the renderer's name for it.
     """
 
     what: str

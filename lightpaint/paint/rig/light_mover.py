@@ -184,7 +184,8 @@ class LightMover:
                     f"plane/{k}": partial(as_halves, plane, scale),
                 }
                 if not is_dragged:
-                    makers[f"thumb/{k}"] = partial(plane_thumbnail, plane, view.basis.emitters_seen)
+                    shown = plane if is_moved or kept is None else kept.plane(k)
+                    makers[f"thumb/{k}"] = partial(plane_thumbnail, shown, view.basis.emitters_seen)
                 for plain, maker in makers.items():
                     full = name_in_view(plain, view.view)
                     pictures.offer(full, maker)
@@ -201,10 +202,13 @@ class LightMover:
             picture = as_halves(halves.astype("float32") * own, scale)
             with self._host.changing():
                 if view.basis.planes is basis.planes:
-                    full = name_in_view(f"clean/{k}", view.view)
-                    self._host.pictures.put(full, picture)
-                    number = self._host.pictures.generations[full]
-                    self._host.publish(PictureUpdate(resources={full: number}))
+                    table, resources = self._host.pictures, {}
+                    small = plane_thumbnail(picture.astype("float32"), basis.emitters_seen)
+                    for plain, its in ((f"clean/{k}", picture), (f"thumb/{k}", small)):
+                        full = name_in_view(plain, view.view)
+                        table.put(full, its)
+                        resources[full] = table.generations[full]
+                    self._host.publish(PictureUpdate(resources=resources))
 
 
 def _kept_halves(planes: DenoisedPlanes, k: int) -> Picture:

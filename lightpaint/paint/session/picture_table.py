@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpaint.arrays import Bools, Floats
-from lightpaint.basis.basis import Basis
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.errors import PaintError
 from lightpaint.report.page.figures import resized, thumbnail
@@ -83,11 +82,6 @@ class PictureTable:
 def changes_under_brush(name: str) -> bool:
     """Return whether a picture changes under the brush."""
     return name.partition("@")[0] in ("painting", "importance")
-
-
-def light_thumbnail(basis: Basis, k: int) -> Picture:
-    """Return a thumbnail of light k alone, in display values."""
-    return plane_thumbnail(basis.planes.plane(k), basis.emitters_seen)
 
 
 def plane_thumbnail(plane: Floats, emitters_seen: Bools) -> Picture:

@@ -31,21 +31,22 @@ def offer_view(
     basis: Basis,
     transform: ViewTransform,
     clean: DenoisedPlanes | None,
+    small: DenoisedPlanes | None = None,
 ) -> None:
     """Offer the pictures of a view; rough planes stand in for denoised ones that are not
     made yet.
 
-    basis: of the view, with every light where the scene has it.
+    basis: of the view, with every light where the scene has it. small: planes of blocks of pixels
+    that make rough ones better.
     """
 
     def offer(name: str, make: Any) -> None:
         table.offer(name_in_view(name, view.view), make)
 
-    rough = RoughPlanes(basis, view.present)
+    rough = RoughPlanes(basis, view.present, small)
     is_lit = bool(view.present.any())
     for k in range(len(basis.lights)):
         offer(f"plane/{k}", partial(_plane, basis, k))
-        offer(f"thumb/{k}", partial(picture_table.light_thumbnail, basis, k))
         name = name_in_view(f"clean/{k}", view.view)
         if clean is not None:
             table.put(name, clean.halves[k])
@@ -53,6 +54,8 @@ def offer_view(
             table.offer(name, partial(_rough_plane, rough, k))
         else:
             table.withdraw(name)
+            name = name_in_view(f"plane/{k}", view.view)
+        offer(f"thumb/{k}", partial(_thumbnail, table, name, basis))
     offer("present", lambda: as_halves(view.present))
     offer("look", lambda: picture_table.display_thumbnail(view.present, transform))
     offer("painting", lambda: view.image.copy())
@@ -80,6 +83,11 @@ def _layer(views: Canvases, name: str) -> Picture:
 def _plane(basis: Basis, k: int) -> Picture:
     plane = basis.planes.plane(k)
     return as_halves(plane, scale_of(plane))
+
+
+def _thumbnail(table: PictureTable, name: str, basis: Basis) -> Picture:
+    """Return a thumbnail of the plane of that name, as the page shows it."""
+    return picture_table.plane_thumbnail(table[name].astype(np.float32), basis.emitters_seen)
 
 
 def _rough_plane(planes: RoughPlanes, k: int) -> Picture:

@@ -6,11 +6,15 @@ from typing import Protocol
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.solution import Solution
 from lightpaint.paint.background_threads import LatestWork
-from lightpaint.paint.protocol import Message
+from lightpaint.paint.protocol import Message, ProgressReport
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.subject import Subject
+from lightpaint.progress import Progress, silent
 from lightpaint.scene.properties.film import MAX_SPP
 from lightpaint.scene.runtime.render_lock import MITSUBA
+
+#: Name of this task in reports of progress.
+SAMPLING = "sampling"
 
 
 class SamplingHost(Protocol):
@@ -36,6 +40,9 @@ class SamplingHost(Protocol):
     def publish(self, message: Message) -> None:
         """Send a message to pages."""
 
+    def report_progress(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        """Report how far a task is. Raises StoppedError once the studio is closed."""
+
 
 class BackgroundSampling:
     """A thread's loop that adds samples after each exact answer, until the brush moves."""
@@ -43,6 +50,7 @@ class BackgroundSampling:
     def __init__(self, host: SamplingHost) -> None:
         self._host = host
         self._loop = LatestWork(self._add, host.publish)
+        self._is_reported = False  # whether pages show that samples are added
         self.stop = self._loop.stop
 
     @property
@@ -68,12 +76,27 @@ class BackgroundSampling:
             return not self._host.is_open or self._host.version != snapshot.version
 
         # Samples are of the scene, in which no light is moved.
+        bases = None
         if not (is_outdated() or snapshot.requests.poses):
-            bases = add_round(self._host.subjects, snapshot, solution, is_enough=is_outdated)
-            if bases is not None:
-                self._host.use_bases(bases)
-            elif not is_outdated():
-                self._host.denoise_planes()
+            bases = add_round(
+                self._host.subjects,
+                snapshot,
+                solution,
+                is_enough=is_outdated,
+                progress=self._report,
+            )
+        # After a round the next exact answer says whether another one follows.
+        if self._is_reported and (bases is None or is_outdated()):
+            self._is_reported = False
+            self._host.publish(ProgressReport(what=SAMPLING, done=1, total=1, unit=""))
+        if bases is not None:
+            self._host.use_bases(bases)
+        elif not (is_outdated() or snapshot.requests.poses):
+            self._host.denoise_planes()
+
+    def _report(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        self._is_reported = True
+        self._host.report_progress(label, done, total, unit)
 
 
 def add_round(
@@ -82,15 +105,18 @@ def add_round(
     solution: Solution,
     *,
     is_enough: Callable[[], bool],
+    progress: Progress = silent,
 ) -> list[Basis] | None:
     """Return the bases of all views after a round of samples; None if none is needed or was taken.
 
     snapshot, solution: the paintings, and their exact answer. is_enough: whether to leave the rest
-    of the round; asked between passes.
+    of the round; asked between passes. progress: hears, as `SAMPLING`, which share of the precision
+    that was asked for is reached, in percent.
     """
     # Imported here: saved bases need no renderer.
     from lightpaint.basis.cache.cached_render import top_up_basis
     from lightpaint.basis.render.render_origin import ONE_PASS
+    from lightpaint.basis.render.top_up import kept_loaded
     from lightpaint.pipeline.needed_samples import Certainty, needed_counts
 
     settings, bases = snapshot.settings, list(snapshot.bases)
@@ -102,16 +128,32 @@ def add_round(
     if certainty.error <= settings.error:
         return None
     counts = needed_counts(certainty, painted, settings.error)
-    for k, its in zip(snapshot.painted_views, counts, strict=True):
-        if is_enough():
-            break
-        with MITSUBA.low_priority():
+    rounds = list(zip(snapshot.painted_views, counts, strict=True))
+    # Squared errors fall as samples grow.
+    share = (settings.error / certainty.error) ** 2
+    have = sum(x.origin.mean_spp * x.size[0] * x.size[1] for x in painted)
+    grown = min(share * (1 + 2 * sum(int(x.sum()) for x in counts) / have), 0.99)
+
+    def of_view(number: int) -> Progress:
+        def hear(label: str, done: int, total: int, unit: str = "passes") -> None:
+            taken = (number + done / max(total, 1)) / len(rounds)
+            progress(SAMPLING, round(100 * (share + (grown - share) * taken)), 100, "percent")
+
+        return hear
+
+    scenes = [subjects[k].loaded_scene for k in snapshot.painted_views]
+    with MITSUBA.low_priority(), kept_loaded(scenes) as tracers:
+        for number, (k, its) in enumerate(rounds):
+            if is_enough():
+                break
             bases[k] = top_up_basis(
-                subjects[k].loaded_scene,
+                scenes[number],
                 bases[k],
                 its,
                 use_cache=settings.use_cache,
                 is_enough=is_enough,
+                progress=of_view(number),
+                tracers=tracers,
             )
     taken = zip(bases, snapshot.bases, strict=True)
     return bases if any(a.origin != b.origin for a, b in taken) else None

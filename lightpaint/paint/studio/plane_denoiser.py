@@ -15,9 +15,10 @@ from lightpaint.basis.cache.denoised_planes import (
 )
 from lightpaint.basis.denoised_mixes import denoise_present_look
 from lightpaint.paint.layers.canvas import Canvas
-from lightpaint.paint.session.picture_table import Picture
+from lightpaint.paint.session.picture_table import Picture, plane_thumbnail
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.store.steps import name_in_view
+from lightpaint.report.basis_memo import page_reduction
 
 
 @dataclass(frozen=True)
@@ -52,17 +53,20 @@ class PlaneDenoiser:
     ) -> None:
         self._publish, self._is_needed, self._use_cache = publish, is_needed, use_cache
         self._by_view: dict[int, _ViewPlanes] = {}
+        self._small: dict[int, _ViewPlanes] = {}  # of blocks of pixels, as pages of results have
 
     def load_cached(self, bases: Sequence[Basis]) -> list[Floats]:
         """Load cached planes. Returns the present look of each view, denoised."""
         presents = []
         for k, basis in enumerate(bases):
-            cached = read_denoised_planes(basis) if self._use_cache else None
+            factor = page_reduction(basis, len(basis.lights))
+            cached = read_denoised_planes(basis, factor=factor) if self._use_cache else None
             if cached is None:
                 presents.append(denoise_present_look(basis))
             else:
-                self._by_view[k] = _ViewPlanes(basis, cached, is_cached=True)
                 presents.append(cached.present)
+                kept = self._by_view if cached.is_whole else self._small
+                kept[k] = _ViewPlanes(basis, cached, is_cached=True)
         return presents
 
     def planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
@@ -70,6 +74,14 @@ class PlaneDenoiser:
         return [
             self._by_view[k].scaled_to(basis) if k in self._by_view else None
             for k, basis in enumerate(bases)
+        ]
+
+    def small_planes_for(self, bases: Sequence[Basis]) -> list[DenoisedPlanes | None]:
+        """Return each view's denoised planes of blocks of pixels, which a result has left."""
+        small = [self._small.get(k) for k in range(len(bases))]
+        return [
+            its.planes if its is not None and its.matches(basis) else None
+            for its, basis in zip(small, bases, strict=True)
         ]
 
     def denoise(self, session: Session) -> None:
@@ -94,6 +106,8 @@ class PlaneDenoiser:
             planes.halves[k], planes.scales[k] = denoise_to_halves(basis, k)
             if basis.names[k] not in session.requests.poses:
                 self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
+                thumbnail = plane_thumbnail(planes.plane(k), basis.emitters_seen)
+                self._publish(name_in_view(f"thumb/{k}", view.view), thumbnail)
         self._by_view[view.view] = _ViewPlanes(basis, planes)
 
     def write_cache(self) -> None:

@@ -346,6 +346,7 @@ class Studio:
         """Continue the session with these bases."""
         presents = self._denoiser.load_cached(bases)
         clean_planes = self._denoiser.planes_for(bases)
+        small_planes = self._denoiser.small_planes_for(bases)
         with self._lock:
             if not self.is_open:
                 raise StoppedError
@@ -354,8 +355,9 @@ class Studio:
             else:
                 self._session.improve(bases, presents)
             session = self._session
-            for view, basis, clean in zip(session.views, bases, clean_planes, strict=True):
-                offer_view(self.pictures, view, basis, session.transform, clean)
+            of_views = session.views, bases, clean_planes, small_planes
+            for view, basis, clean, small in zip(*of_views, strict=True):
+                offer_view(self.pictures, view, basis, session.transform, clean, small)
             offer_transforms(self.pictures, offered_transforms(session))
             offer_layers(self.pictures, session.views)
             self._mover.offer_all(session)

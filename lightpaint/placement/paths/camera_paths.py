@@ -1,7 +1,7 @@
 """Paths of a camera, traced once: the points on surfaces where a light may add to the picture."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, aligned
 from lightpaint.scene.scene import Scene
 
 #: Longest paths, in vertices, of integrators without a limit of their own; their light is frozen
@@ -79,12 +79,12 @@ def later_vertices_of(
                 break
             if depth:
                 kept.append(its)
-            numbers = rng.random((3, len(its)), dtype=np.float32)
+            lobe, *direction = _floats(rng.random((3, len(its)), dtype=np.float32))
             bsdf_sample, bsdf_weight = its.interaction.bsdf().sample(
                 mi.BSDFContext(),
                 its.interaction,
-                mi.Float(numbers[0]),
-                mi.Point2f(mi.Float(numbers[1]), mi.Float(numbers[2])),
+                lobe,
+                mi.Point2f(*direction),
             )
             si = its.interaction
             rays, weight = si.spawn_ray(si.to_world(bsdf_sample.wo)), its.throughput * bsdf_weight
@@ -105,11 +105,17 @@ def _camera_rays(
     jitter = rng.random((2, len(pixels)))
     x = (pixels % width + (cell % side + jitter[0]) / side) / width
     y = (pixels // width + (cell // side + jitter[1]) / side) / height
-    position = mi.Point2f(mi.Float(x.astype(np.float32)), mi.Float(y.astype(np.float32)))
-    aperture = rng.random((2, len(pixels)), dtype=np.float32)
-    lens = mi.Point2f(mi.Float(aperture[0]), mi.Float(aperture[1]))
+    position = mi.Point2f(*_floats((x, y)))
+    lens = mi.Point2f(*_floats(rng.random((2, len(pixels)), dtype=np.float32)))
     rays, weight = camera.sample_ray(camera.shutter_open(), 0.5, position, lens)
     return mi.Ray3f(rays), mi.Color3f(weight) / side**2, pixels
+
+
+def _floats(rows: Iterable[Floats]) -> list[Any]:
+    """Return each row, (n,), as an `mi.Float` that kernels read like those of Dr.Jit's own."""
+    import mitsuba as mi
+
+    return [mi.Float(aligned(row, np.float32)) for row in rows]
 
 
 def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices:
@@ -141,7 +147,7 @@ def _joined(parts: Sequence[Vertices]) -> Vertices | None:
     throughput = dr.zeros(mi.Color3f, len(order))
     start = 0
     for part in parts:
-        here = mi.UInt32(place[start : start + len(part)])
+        here = mi.UInt32(aligned(place[start : start + len(part)], np.uint32))
         dr.scatter(si, part.interaction, here)
         dr.scatter(throughput, part.throughput, here)
         dr.eval(si, throughput)

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from lightpaint.arrays import Floats
+from lightpaint.arrays import Floats, aligned
 from lightpaint.errors import SceneError
 from lightpaint.images.denoiser import Features
 from lightpaint.images.surface_filter import SurfaceFilter
@@ -214,7 +214,7 @@ class FrozenPaths:
             return np.zeros((lights, 3, 0), np.float32)
         start = np.arange(count)[:, None] * _SPREAD + self._shift
         with tracing():
-            u, v = (mi.Float(x) for x in (2 * (start % 1) - 1).astype(np.float32).T)
+            u, v = (mi.Float(aligned(x, np.float32)) for x in (2 * (start % 1) - 1).T)
             table = mi.Float(np.ascontiguousarray(rows, np.float32).ravel())
             made = dr.zeros(mi.Float, 3 * count * lights)
             dr.make_opaque(made, table, u, v)

@@ -93,8 +93,7 @@ def thumbnail(
     stops = exposure_of(image, emitters_seen)
     if width > THUMBNAIL_WIDTH:
         image = resized(image, THUMBNAIL_WIDTH / width)
-    # Where many pixels make one, their mean has hardly any noise left to take out.
-    if is_clean and width < CLEAN_REDUCTION * THUMBNAIL_WIDTH:
+    if is_clean:
         image = denoised(image)
     return encode_display(image, stops=stops), stops
 

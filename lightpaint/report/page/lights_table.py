@@ -15,11 +15,18 @@ from lightpaint.colour.color import luminance, rgb_to_hex
 from lightpaint.colour.photometry import Photometry
 from lightpaint.colour.srgb import to_8_bit
 from lightpaint.images.bands import in_turns
+from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.light_setting import ALL_REACHED, LightSetting
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.report.basis_memo import ROWS_SHOWN, SPARE_ROWS, make_once
+from lightpaint.report.basis_memo import (
+    ROWS_SHOWN,
+    SPARE_ROWS,
+    cached_clean_planes,
+    make_once,
+    page_reduction,
+)
 from lightpaint.report.clean_pictures import MAX_CLEAN_THUMBNAILS
 from lightpaint.report.measures import energy_shares
 from lightpaint.report.page.figures import data_uri, thumbnail
@@ -119,11 +126,16 @@ def _rows(
 
 def thumbnails_of(basis: Basis, *, is_clean: bool) -> list[tuple[str, tuple[int, ...], float]]:
     """Return the picture of each light alone: data: URI, size and exposure. is_clean: whether
-    denoised.
+    denoised; then of the planes that the page shows, if these are there.
     """
+    clean, seen = cached_clean_planes(basis) if is_clean else None, basis.emitters_seen
+    if clean is not None and not clean.is_whole:
+        factor = page_reduction(basis, len(basis.lights))
+        seen = block_mean(seen[..., None].astype(np.float32), factor)[..., 0] > 0
 
     def shown(k: int) -> tuple[str, tuple[int, ...], float]:
-        picture, stops = thumbnail(basis.planes.plane(k), basis.emitters_seen, is_clean=is_clean)
+        plane = basis.planes.plane(k) if clean is None else clean.plane(k)
+        picture, stops = thumbnail(plane, seen, is_clean=is_clean and clean is None)
         return data_uri(to_8_bit(picture), largest_png=0), picture.shape, stops
 
     all_lights = range(len(basis.lights))

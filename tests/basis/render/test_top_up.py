@@ -24,6 +24,11 @@ from lightpaint.progress import Interrupted
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 
+SECOND_SENSOR = """<sensor type="perspective" id="second"><transform name="to_world">
+        <lookat origin="0.5, 1, 3" target="0, 0.5, 0" up="0, 1, 0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="24"/>
+        <integer name="height" value="20"/></film></sensor>"""
+
 
 @pytest.fixture(autouse=True)
 def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,12 +92,39 @@ def test_a_scene_that_stays_loaded_changes_no_bit(
         alone[k] = top_up.top_up(scenes[k], alone[k], counts)
     loads: list[Scene] = []
     load = Scene.load
-    monkeypatch.setattr(Scene, "load", lambda self, *a: loads.append(self) or load(self, *a))
+    monkeypatch.setattr(
+        Scene, "load", lambda self, *a, **how: loads.append(self) or load(self, *a, **how)
+    )
     with top_up.kept_loaded() as tracers:
         for k in rounds:
             kept[k] = top_up.top_up(scenes[k], kept[k], counts, tracers=tracers)
     assert [scenes.index(its) for its in loads] == [0, 1, 0]
     for a, b in zip(kept, alone, strict=True):
+        same_basis(a, b)
+
+
+def test_views_of_a_scene_are_loaded_once(counts: Any, tmp_path: Path, monkeypatch: Any):
+    """Each goes on from its own sensor, with the bits that it has alone."""
+    path = write_room(tmp_path, lights=LIGHTS["panel"] + LIGHTS["bulb"], sensors=SECOND_SENSOR)
+    scenes = [load_scene(path, sensor=k) for k in range(2)]
+    kept = [render_basis(scene, spp=4) for scene in scenes]
+    alone = [top_up.top_up(*its, counts) for its in zip(scenes, kept, strict=True)]
+    loads: list[Scene] = []
+    load = Scene.load
+
+    def counting(self: Scene, *a: Any, **how: Any) -> Any:
+        loads.append(self)
+        return load(self, *a, **how)
+
+    monkeypatch.setattr(Scene, "load", counting)
+    with top_up.kept_loaded(scenes) as tracers:
+        for _ in range(2):
+            made = [
+                top_up.top_up(scene, its, counts, tracers=tracers)
+                for scene, its in zip(scenes, kept, strict=True)
+            ]
+    assert loads == scenes[:1]
+    for a, b in zip(made, alone, strict=True):
         same_basis(a, b)
 
 

@@ -12,6 +12,7 @@ from lightpaint.colour.color import cct_and_duv, kelvin_to_rgb, luminance
 from lightpaint.lighting.fit import resolve_for_targets
 from lightpaint.lighting.live.live import LiveSolver
 from lightpaint.lighting.live.live_view import LiveView
+from lightpaint.lighting.normal_equations import NormalEquations
 from lightpaint.lighting.problem import Problem
 from lightpaint.lighting.solve import solution_of
 from lightpaint.lighting.unknowns.reduced_problem import solve_reduced
@@ -84,6 +85,20 @@ def test_the_answer_stays_and_no_neighbours_better_it(make_basis: Any, seed: int
             down, power = (equations.gradient(beside) * own).sum(), equations.M[:, k, k] @ rgb**2
             beside[k] = max(-down / power, 0) * rgb
             assert equations.objective(beside).sum() >= least - round_off
+
+
+def test_a_light_with_less_than_no_picture_is_solved_as_one_without(make_basis: Any) -> None:
+    """The noise correction may leave that of a nearly black one."""
+    basis, target = _target(make_basis, 1, 4)
+    problem = lp.solve(basis, target, colors="white", literal=True).problem
+    M, b, norm2 = (getattr(problem.equations, x).copy() for x in ("M", "b", "target_norm2"))
+    M[:, 0, :] = M[:, :, 0] = b[:, 0] = 0
+    start = np.ones((4, 3))
+    _, expected = next_whites(NormalEquations(M, b, norm2), problem.reduction, start)
+    below = M.copy()
+    below[:, 0, 0] = -1e-15 * M.max()
+    _, found = next_whites(NormalEquations(below, b, norm2), problem.reduction, start)
+    np.testing.assert_allclose(found.weights[1:], expected.weights[1:], rtol=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(3))

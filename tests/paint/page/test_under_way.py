@@ -82,6 +82,19 @@ def test_all_that_goes_on_is_counted_alike(painter: Painter) -> None:
     page.locator(".working").get_by_text("Loading the images of the lights: 25 %").wait_for()
 
 
+def test_samples_that_are_added_are_said_to_be(painter: Painter) -> None:
+    chip = painter.page.locator(".working")
+    progress(painter, "sampling", 4)
+    chip.get_by_text("Adding samples where you painted: 25 %").wait_for()
+    progress(painter, "sampling", 16)
+    assert chip.count() == 0
+    # A basis that is still being rendered comes first.
+    progress(painter, "sampling", 4)
+    progress(painter, "basis", 2)
+    chip.get_by_text("Rendering the lights: 12 %").wait_for()
+    assert chip.count() == 1
+
+
 def test_nothing_to_undo_is_no_mistake(painter: Painter) -> None:
     painter.page.locator(".stage").focus()
     painter.page.keyboard.press("Control+z")

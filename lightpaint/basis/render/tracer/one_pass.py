@@ -15,14 +15,14 @@ Import it once a variant is set and not a scalar one: its arrays do not exist be
 
 # mypy: disable-error-code="no-untyped-call"
 
+from collections.abc import Sequence
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-import numpy.typing as npt
 
-from lightpaint.arrays import Floats, Indices
+from lightpaint.arrays import Floats, Indices, aligned
 from lightpaint.basis.render.integrators import (
     depth_limit,
     has_indirect_planes,
@@ -41,9 +41,6 @@ from lightpaint.scene.scene_render import Stream, pass_seed
 FIRST_EMITTER_SAMPLES = 8
 LATER_EMITTER_SAMPLES = {32: 2, 128: 4, 2**32: 8}
 
-#: Bytes that the registers of any processor hold at most: arrays that Dr.Jit makes begin so.
-ALIGNMENT = 64
-
 #: Streams of numbers; those below are of the halves of all pixels.
 TRAINING_STREAM, FIRST_TOP_UP_STREAM = 2, 3
 
@@ -53,7 +50,8 @@ class Tracer:
 
     Close it before another scene is loaded. seed: of all random numbers. guide_table: of a
     trained guide; without one, the guide is to be trained first. emitter_samples: of the first
-    vertex and of later ones, if other than usual.
+    vertex and of later ones, if other than usual. loaded: what the tracer of another of its views
+    has loaded. views: the scene through other sensors, whose tracers will use what is loaded here.
 
     The samples of a pixel are terms of one sequence for each half, whatever is traced of them at a
     time. So their sum does not depend on that, nor on the number of threads.
@@ -66,9 +64,12 @@ class Tracer:
         guide_table: Floats | None = None,
         *,
         emitter_samples: tuple[int, int] | None = None,
+        loaded: Any = None,
+        views: Sequence[Scene] = (),
     ) -> None:
         self.scene = scene
-        self.loaded = scene.load({light.name: (1.0, 1.0, 1.0) for light in scene.lights})
+        unit = {light.name: (1.0, 1.0, 1.0) for light in scene.lights}
+        self.loaded = scene.load(unit, views=views) if loaded is None else loaded
         self.light_of = lights_by_instance(self.loaded, scene.plane_of)
         self.guide = EmitterGuide(self.loaded, self.light_of, scene.eye(self.loaded), guide_table)
         self.guide_table = guide_table
@@ -154,7 +155,7 @@ class Tracer:
         view = view_of(self.scene, self.loaded)
         place = dr.arange(mi.UInt32, pixels.size)
         # What differs between calls is no constant of the kernel, which is compiled once.
-        pixel, begin, end = (mi.UInt32(aligned(x)) for x in (pixels, first, first + spp))
+        pixel, begin, end = (mi.UInt32(aligned(x, np.uint32)) for x in (pixels, first, first + spp))
         numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, self._streams[stream]))
         first_emitters, later = self._emitter_samples
         rules = rules_of(self.scene)._replace(
@@ -162,19 +163,6 @@ class Tracer:
             later_emitter_samples=dr.opaque(mi.UInt32, later),
         )
         trace_samples(view, numbers, self.guide, planes, rules, pixel, place, begin, end)
-
-
-def aligned(values: Indices) -> npt.NDArray[np.uint32]:
-    """Return a copy as uint32, in memory that begins at a multiple of `ALIGNMENT`.
-
-    Dr.Jit uses the memory of an array as it lies, and compiles one kernel for arrays that begin at
-    such a place and another for those that do not, for each array that a kernel reads.
-    """
-    room = np.empty(values.size + ALIGNMENT // 4, np.uint32)
-    begin = -room.ctypes.data % ALIGNMENT // 4
-    copy = room[begin : begin + values.size]
-    copy[:] = values
-    return copy
 
 
 def later_emitter_samples(emitters: int) -> int:

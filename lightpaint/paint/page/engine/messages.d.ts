@@ -420,7 +420,8 @@ export interface LookList {
 /**
  * The progress of a long task. Unasked.
  *
- * what: `export`, `basis`, or the renderer's name for it.
+ * what: `export`, `basis`, `sampling` for samples that are added where the paint needs them, or
+ * the renderer's name for it.
  */
 export interface ProgressReport {
   kind: 'progress';

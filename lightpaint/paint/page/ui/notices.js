@@ -109,6 +109,8 @@ function worksOf(ui, { session }) {
     works.push({ name: 'Rendering the lights', progress: basis, text: 'You can paint already.' });
   else if (loading && loading.done < loading.total)
     works.push({ name: 'Loading the images of the lights', progress: loading });
+  else if (ui.sampling)
+    works.push({ name: 'Adding samples where you painted', progress: ui.sampling });
   return works;
 }
 

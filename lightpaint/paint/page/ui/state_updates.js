@@ -25,6 +25,7 @@ export const IDLE = {
   ...TASK_ENDED.explain,
   ...TASK_ENDED.preview,
   ...TASK_ENDED.place,
+  sampling: null,
 };
 
 /** @param {Events["state"]} message @returns {Partial<Ui>} */
@@ -228,6 +229,8 @@ export function progressUpdate({ what, done, total, unit }, ui) {
   const made = { what, done, total, unit };
   if (what === 'export') return { writing: timed(made, ui.writing), isWriting: true };
   if (what === 'place') return ui.placing ? { placing: timed(made, ui.placing) } : {};
+  // The brush interrupts it, so how long it will take is not known.
+  if (what === 'sampling') return { sampling: done < total ? made : null };
   if (/verif/i.test(what)) return { verifying: timed(made, ui.verifying) };
   return { basis: total && done >= total ? null : timed(made, ui.basis) };
 }

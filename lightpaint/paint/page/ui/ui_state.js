@@ -62,6 +62,8 @@ import { ofKelvin } from './paint_colour.js';
  *   at?: [number, number]} | null} dragged where a light is that the pointer drags; at: the pixel that
  *   it points at
  * @property {Progress | null} placing how far a search for places of the lights is
+ * @property {Progress | null} sampling how near the lights are to the precision that was asked for,
+ *   while samples are added
  * @property {Record<string, number[]>} ghosts places of lights before a search has moved them, by name
  * @property {Pointing | null} pointing what the next click on a picture does to that light
  * @property {Record<string, any>} settings
@@ -173,6 +175,7 @@ export function initialState() {
     lamp: null,
     dragged: null,
     placing: null,
+    sampling: null,
     ghosts: {},
     pointing: null,
     settings: {},
