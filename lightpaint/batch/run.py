@@ -5,7 +5,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
+from lightpaint.basis.basis import Basis
 from lightpaint.batch.cluster.cluster import Cluster
 from lightpaint.batch.distribution.distributed_render import distributed_renderer
 from lightpaint.batch.distribution.distributed_sums import solve_by_sums
@@ -15,11 +17,12 @@ from lightpaint.batch.folder_lock import lock_folder
 from lightpaint.batch.gallery.gallery import write_gallery
 from lightpaint.batch.gallery.small_planes import write_task_planes
 from lightpaint.batch.manifest.folder_names import THUMBNAILS
+from lightpaint.batch.placed_bases import obtain_placed_bases
 from lightpaint.batch.plan.cost_estimate import look_seconds
 from lightpaint.batch.plan.journal import Journal, JournalLine
 from lightpaint.batch.plan.plan import Plan, PlannedLook, PlanStep, by_bases, waves
 from lightpaint.batch.run_options import BatchOutcome, RunOptions
-from lightpaint.batch.task_bases import has_basis, obtain_bases, save_bases
+from lightpaint.batch.task_bases import has_basis, obtain_bases, save_bases, save_former_looks
 from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import (
     OUT_OF_MEMORY_TEXT,
@@ -153,14 +156,15 @@ class _Run:
         task = steps[0].task
         self._cache.keep_only(task.bases)
         with ExitStack() as stack:
-            files = task.files
+            files, formers = task.files, task.formers
             try:
-                obtained = obtain_bases(task, self._engine, self._cache, self._listen)
+                obtained = self._obtain_bases(task)
                 if not all(step.task.is_by_sums for step in steps):
                     write_task_planes(self._plan.folder, task, obtained, self._cache)
                 if self._engine.is_apart:
                     # Workers read the bases that this process rendered and no longer needs.
                     files = save_bases(obtained, stack) if obtained else files
+                    formers = save_former_looks(obtained, stack)
                     self._cache.keep_only(())
             except (LightpaintError, MemoryError) as error:
                 if is_disk_full(error):
@@ -170,10 +174,17 @@ class _Run:
                     self._fail(self._looks[step.task.look], step, reason)
                 return
             for wave in waves(steps, self._looks):
-                wave_steps = [replace(step, task=replace(step.task, files=files)) for step in wave]
+                saved: dict[str, Any] = {"files": files, "formers": formers}
+                wave_steps = [replace(step, task=replace(step.task, **saved)) for step in wave]
                 self._run_steps(wave_steps)
                 if self._is_stopped():
                     return
+
+    def _obtain_bases(self, task: Task) -> list[Basis]:
+        """Return the bases of a task, its lights where those that share their places want them."""
+        how = self._engine, self._cache, self._listen
+        group = self._plan.group_of(task)
+        return obtain_bases(task, *how) if group is None else obtain_placed_bases(task, group, *how)
 
     def _run_steps(self, steps: Sequence[PlanStep]) -> None:
         """Run steps that do not depend on each other, and retry failed ones as often as allowed."""

@@ -15,9 +15,12 @@ from lightpaint.batch.work.task import Task
 from lightpaint.batch.work.work import job_fields
 from lightpaint.batch.work.work_items import SceneFilm
 from lightpaint.batch.work.worker_cache import WorkerCache
+from lightpaint.images.estimate import write_estimate
 from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import SceneFile
 from lightpaint.pipeline.job_bases import obtain
+from lightpaint.pipeline.placed_lights import moved_basis
+from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.progress import Listener
 from lightpaint.scene.quality_presets import on_film
 
@@ -47,19 +50,48 @@ def obtain_bases(
     if fields["basis"] is not None:
         return []
     settings: Settings = fields["settings"]
-    bases = []
-    for key, scene in zip(task.bases, fields["scenes"], strict=True):
+    return [
+        obtain_scene_basis(key, scene, settings, engine, worker_cache, listen)
+        for key, scene in zip(task.bases, fields["scenes"], strict=True)
+    ]
+
+
+def obtain_scene_basis(
+    key: str,
+    scene: SceneFile,
+    settings: Settings,
+    engine: Engine,
+    worker_cache: WorkerCache,
+    listen: Listener,
+) -> Basis:
+    """Return the basis of a scene from the cache or a render, and keep it by its key."""
+    basis = worker_cache.basis(key)
+    if basis is None:
         film = on_film(scene.content, settings.quality, settings.resolution)
-        basis = worker_cache.basis(key)
-        if basis is None:
-            scene_film = SceneFilm(
-                scene, settings.quality, settings.resolution, _scene_files(scene)
-            )
-            render = PartwiseRender(engine, scene_film)
-            basis = obtain(film, settings, listen, render=render)
-            worker_cache.put(key, basis)
-        bases.append(basis)
-    return bases
+        scene_film = SceneFilm(scene, settings.quality, settings.resolution, _scene_files(scene))
+        basis = obtain(film, settings, listen, render=PartwiseRender(engine, scene_film))
+        worker_cache.put(key, basis)
+    return basis
+
+
+def obtain_moved_basis(
+    scene: SceneFile,
+    before: Basis,
+    record: PlacementRecord,
+    places: str,
+    settings: Settings,
+    engine: Engine,
+    listen: Listener,
+) -> Basis:
+    """Return the basis of a scene with its lights elsewhere; an engine renders what has moved.
+
+    before: the basis without the moves. places: the file of `record`, for workers.
+    """
+    film = on_film(scene.content, settings.quality, settings.resolution)
+    [moved] = record.hung_in([film]).scenes
+    files = (*_scene_files(scene), places)
+    scene_film = SceneFilm(scene, settings.quality, settings.resolution, files, places=places)
+    return moved_basis(moved, before, settings, listen, render=PartwiseRender(engine, scene_film))
 
 
 def save_bases(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
@@ -69,6 +101,20 @@ def save_bases(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
     for file, basis in zip(files, bases, strict=True):
         write_basis(file, basis)
     return tuple(map(str, files))
+
+
+def save_former_looks(bases: Sequence[Basis], stack: ExitStack) -> tuple[str, ...]:
+    """Save the looks before the lights of some bases were moved, which their files lack.
+
+    Returns their paths, "" for bases whose lights are where they were.
+    """
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lightpaint-")))
+    files = []
+    for k, basis in enumerate(bases):
+        files.append("" if basis.former is None else str(folder / f"{k}.former.exr"))
+        if basis.former is not None:
+            write_estimate(Path(files[-1]), basis.former, {})
+    return tuple(files)
 
 
 def _scene_files(scene: SceneFile) -> tuple[str, ...]:

@@ -1,21 +1,27 @@
-"""Places of lights: found with a first solve, before the solve that counts."""
+"""Places of lights: found with a first solve, or before, and hung for the solve that counts."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.cache.cached_render import Render
+from lightpaint.basis.render.basis_render import render_basis
 from lightpaint.images.estimate import Estimate
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.solve import solution_of
 from lightpaint.pipeline.job.job import Job
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.pipeline.job.sources import content
 from lightpaint.pipeline.job_bases import obtain, view_listener
 from lightpaint.pipeline.needed_samples import problem_of, without_noise
 from lightpaint.pipeline.results.results import all_changes, spoken_change
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Placement
+from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
+from lightpaint.screen import some_names
 
 
 def place_lights(
@@ -23,36 +29,76 @@ def place_lights(
 ) -> tuple[Job, list[Basis], Placement | None]:
     """Return a job whose lights are where its paintings want them, its bases, and the placement.
 
-    That is None where nothing may move. bases: of the views of `job`; the list is emptied to save
-    memory. Only the planes of lights that moved or are new are rendered.
+    That is None where nothing may move. bases: of the views of `job`, or of these with the lights
+    where they were found before; the list is emptied to save memory. Only the planes of lights that
+    moved or are new are rendered.
     """
-    if not job.all_rigging:
+    if not job.all_rigging and job.placement is None:
         return job, bases, None
     scenes = [view.scene for view in job.views if view.scene is not None]
-    rigged = rigged_lights(job.all_rigging, scenes[0])
-    placement = place(
-        scenes,
-        bases,
-        without_noise(job, solution_of(problem_of(job, bases))),
-        rigged.freedoms,
-        new=rigged.new,
-        pairs=rigged.pairs,
-        constraints=rigged.constraints,
-        seed=job.settings.seed,
-        progress=lambda label, done, total, unit="": listen(label, done, total, "steps"),
-    )
-    for change in all_changes(placement):
-        listen.say(spoken_change(change))
-    if placement.scene is scenes[0]:
-        listen.say("no light is moved: no change is surely worth a hundredth of what is missed")
+    if job.placement is None:
+        placement = find_places([job], bases, listen)
+        say_changes(placement, listen)
+    else:
+        placement = content(job.placement).hung_in(scenes)
+    if placement.is_empty:
         return job, bases, placement
     added = {light.name for light in placement.additions}
-    asked = tuple(x for x in rigged.constraints.lights if x[0] in added)
+    constraints = rigged_lights(job.all_rigging, scenes[0]).constraints
+    asked = tuple(x for x in constraints.lights if x[0] in added)
     films = [on_film_of(scene, basis) for scene, basis in zip(placement.scenes, bases, strict=True)]
     moved = job.with_moved_lights(films, Constraints(asked))
     before = list(bases)
     bases.clear()
-    return moved, _bases_of(moved, before, listen), placement
+    found = [
+        moved_basis(scene, basis, job.settings, view_listener(job, view, listen))
+        for scene, basis, view in zip(films, before, moved.views, strict=True)
+    ]
+    return moved, found, placement
+
+
+def find_places(jobs: Sequence[Job], bases: Sequence[Basis], listen: Listener) -> Placement:
+    """Return the places that all paintings of `jobs` together want, in the views of `bases`.
+
+    The jobs are of one scene and its rigging; each keeps levels of its own.
+    """
+    solutions, scenes = [], dict[int, Scene]()
+    for job in jobs:
+        views = [view.scene for view in job.views if view.scene is not None]
+        places = range(len(bases)) if len(jobs) == 1 else [_place_of(x, bases) for x in views]
+        scenes |= zip(places, views, strict=True)
+        solution = solution_of(problem_of(job, [bases[k] for k in places]))
+        solutions.append(without_noise(job, solution))
+    films = [scenes[k] for k in range(len(bases))]
+    rigged = rigged_lights(jobs[0].all_rigging, films[0])
+    return place(
+        films,
+        bases,
+        solutions[0] if len(jobs) == 1 else solutions,
+        rigged.freedoms,
+        new=rigged.new,
+        pairs=rigged.pairs,
+        constraints=rigged.constraints,
+        seed=jobs[0].settings.seed,
+        progress=lambda label, done, total, unit="": listen(label, done, total, "steps"),
+    )
+
+
+def say_changes(placement: Placement | PlacementRecord, listen: Listener) -> None:
+    """Tell the user what was moved and added, and for which looks, if several share it."""
+    changes = all_changes(placement)
+    lead = f"{some_names(placement.looks)}: " if placement.looks else ""
+    for change in changes:
+        listen.say(f"{lead}{spoken_change(change)}")
+    if not changes:
+        reason = "no change is surely worth a hundredth of what is missed"
+        listen.say(f"{lead}no light is moved: {reason}")
+
+
+def _place_of(scene: Scene, bases: Sequence[Basis]) -> int:
+    """Return which of several bases is of a scene's sensor and film."""
+    known = [(basis.origin.sensor, basis.size) for basis in bases]
+    return known.index((scene.sensor_names[scene.sensor], scene.size))
 
 
 def on_film_of(scene: Scene, basis: Basis) -> Scene:
@@ -60,17 +106,25 @@ def on_film_of(scene: Scene, basis: Basis) -> Scene:
     return scene.reduced(f"{basis.size[1]}x{basis.size[0]}")
 
 
-def _bases_of(job: Job, before: Sequence[Basis], listen: Listener) -> list[Basis]:
-    """Return the bases of a job whose lights have moved, with as many samples as before."""
-    made = []
-    for view, basis in zip(job.views, before, strict=True):
-        assert view.scene is not None
-        seed = basis.origin.seed
-        settings = replace(job.settings, time_s=None, quality=None, resolution=None, seed=seed)
-        if settings.error is None:
-            settings = replace(settings, spp=max(2, round(basis.origin.mean_spp)))
-        found = obtain(view.scene, settings, view_listener(job, view, listen), before=basis)
-        # What was painted over, and holds what was not painted, is the scene before the move.
-        look = basis.present_look, basis.present_noise
-        made.append(replace(found, former=Estimate(*look)))
-    return made
+def moved_basis(
+    scene: Scene,
+    before: Basis,
+    settings: Settings,
+    listen: Listener,
+    *,
+    render: Render = render_basis,
+) -> Basis:
+    """Return the basis of a scene whose lights have moved, with as many samples as `before`.
+
+    before: of the scene as it was; if it is of `scene` itself, it is returned.
+    """
+    if before.origin.scene_identity == scene.identity:
+        return before
+    settings = replace(
+        settings, time_s=None, quality=None, resolution=None, seed=before.origin.seed
+    )
+    if settings.error is None:
+        settings = replace(settings, spp=max(2, round(before.origin.mean_spp)))
+    found = obtain(scene, settings, listen, before=before, render=render)
+    # What was painted over, and holds what was not painted, is the scene before the move.
+    return replace(found, former=Estimate(before.present_look, before.present_noise))

@@ -25,7 +25,7 @@ from lightpaint.placement.movable import Arrangement, Movable
 from lightpaint.placement.new_lights import MirroredPair, NewLights
 from lightpaint.placement.paths.frozen_paths import PanelSite
 from lightpaint.placement.paths.view_paths import SearchPaths
-from lightpaint.placement.placement import AddedLight, Move, Placement
+from lightpaint.placement.placement import AddedLight, Move, Placement, hung
 from lightpaint.placement.placement_fit import fit_of
 from lightpaint.placement.search.judgement import Found, Growth, PlacementJudge, PoseError
 from lightpaint.placement.search.new_light_search import NewLightSearch
@@ -196,7 +196,7 @@ def _placement(
     scenes: Sequence[Scene], result: _Result, lights: Sequence[NewLight], first: int
 ) -> Placement:
     """Return the placement of what was found. first: the index of the first new light's column."""
-    found, moves, additions, poses = result.found, [], [], {}
+    found, moves, additions = result.found, list[Move](), list[AddedLight]()
     arrangement, order = found.arrangement, _additions(found)
     for k, (movable, site) in enumerate(zip(arrangement.movables, arrangement.sites, strict=True)):
         about: dict[str, Any] = {
@@ -215,17 +215,10 @@ def _placement(
             if movable.mirror is not None:
                 names.append(scenes[0].lights[movable.columns[1]].name)
             for name, its in zip(names, movable.sites(site), strict=True):
-                move = Move(name, scenes[0].light(name).members[0].site, its, **about)
-                moves.append(move)
-                poses[name] = move.pose
+                moves.append(Move(name, scenes[0].light(name).members[0].site, its, **about))
     moves.sort(key=lambda move: -move.gain_share)
     additions.sort(key=lambda light: -light.gain_share)
-    placed = [
-        scene.moved(poses).with_new_emitters([x.emitter for x in additions])
-        if poses or additions
-        else scene
-        for scene in scenes
-    ]
+    placed = hung(scenes, moves, additions)
     return Placement(tuple(placed), tuple(moves), tuple(additions), found.before, found.after)
 
 

@@ -1,6 +1,7 @@
 """Better places of lights: what was moved, what was added, and what it gives."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -173,6 +174,7 @@ class Placement:
         missed_before: The share of ‖Ψ‖² that the solve misses, estimated on paths that no place was
             fitted to.
         missed_after: The same with the moves and additions.
+        looks: Names of the looks that share it; none for one alone.
 
     Examples:
         >>> solution, scene = lp.solve(basis, target), lp.load_scene("room.xml")
@@ -186,8 +188,24 @@ class Placement:
     additions: tuple[AddedLight, ...]
     missed_before: float
     missed_after: float
+    looks: tuple[str, ...] = ()
 
     @property
     def scene(self) -> Scene:
         """The scene of the first view."""
         return self.scenes[0]
+
+    @property
+    def is_empty(self) -> bool:
+        """True if nothing moved, and nothing is new."""
+        return not self.moves and not self.additions
+
+
+def hung(
+    scenes: Sequence[Scene], moves: Sequence[Move], additions: Sequence[AddedLight]
+) -> list[Scene]:
+    """Return `scenes` with these moves and new lights; themselves where there are none."""
+    if not moves and not additions:
+        return list(scenes)
+    poses, new = {move.name: move.pose for move in moves}, [light.emitter for light in additions]
+    return [scene.moved(poses).with_new_emitters(new) for scene in scenes]

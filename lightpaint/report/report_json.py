@@ -284,6 +284,7 @@ def _placement(hung: HungLights) -> dict[str, Any]:
     return {
         "missed_before": hung.missed_before,
         "missed_after": hung.missed_after,
+        "looks": list(hung.looks),
         "changes": [
             {"name": change.name, "text": change.text, **change.numbers} for change in hung.changes
         ],

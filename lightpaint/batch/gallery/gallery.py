@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from lightpaint.batch.gallery.gallery_mixers import mixers_html, script_json, transforms_of
+from lightpaint.batch.gallery.places_section import places_section
 from lightpaint.batch.gallery.small_planes import drop_planes, planes_name
 from lightpaint.batch.gallery.summary import (
     SummaryRow,
@@ -55,7 +56,7 @@ def write_gallery(
     drop_planes(folder, set(bases.values()))
     write_text(folder / SUMMARY, summary_json(rows))
     write_text(folder / "summary.csv", summary_csv(rows))
-    write_text(folder / "index.html", gallery_page(folder, plan.manifest.name, rows, bases))
+    write_text(folder / "index.html", _page(folder, plan, rows, bases))
     write_bytes(folder / "contact.png", png_bytes(contact_sheet(folder, rows)))
     return rows
 
@@ -69,12 +70,22 @@ def bases_of_rows(folder: Path, plan: Plan) -> dict[str, str]:
     }
 
 
+def _page(folder: Path, plan: Plan, rows: Sequence[SummaryRow], bases: Mapping[str, str]) -> str:
+    return gallery_page(folder, plan.manifest.name, rows, bases, places=places_section(plan))
+
+
 def gallery_page(
-    folder: Path, title: str, rows: Sequence[SummaryRow], bases: Mapping[str, str] | None = None
+    folder: Path,
+    title: str,
+    rows: Sequence[SummaryRow],
+    bases: Mapping[str, str] | None = None,
+    *,
+    places: str = "",
 ) -> str:
     """Return the page as HTML text.
 
-    folder: of the small pictures and planes. bases: planes of each row, by its folder.
+    folder: of the small pictures and planes. bases: planes of each row, by its folder. places: the
+    section on lights that hang at the same places in several looks.
     """
     finished = [row for row in rows if row.state == "done"]
     mixers = mixers_html(folder, finished, bases or {})
@@ -97,6 +108,7 @@ def gallery_page(
         looks=script_json(records),
         transforms=script_json(transforms_of(finished) if mixers else {}),
         mixers="\n".join(mixers.values()),
+        places=places,
         style=styles("batch/gallery/gallery.css", "viewer/mixer/mixer.css"),
         script=bundled("batch/gallery/gallery.js"),
         version=escape(__version__),

@@ -62,8 +62,25 @@ def check_combination(mistakes: Mistakes, table: Table) -> None:
         mistakes.add(label, f"want has {idle[0]!r}, and its lighting is given: leave it out")
     elif "lights" in want:
         check_by_sums(mistakes, table)
+    if "share" in look:
+        _check_share(mistakes, table, is_given=is_given)
     if is_given and (idle := [word for word in look.get("variations", ()) if word in SOLVED_WORDS]):
         mistakes.add(label, f"variations has {idle[0]!r}, and its lighting is given")
+
+
+def _check_share(mistakes: Mistakes, table: Table, *, is_given: bool) -> None:
+    """Add what contradicts `share = "places"` to the mistakes."""
+    look = table.values
+    if is_given:
+        mistakes.add(table.where, "share is of places that are searched for: its lighting is given")
+    elif any(key in look for key in BASES):
+        mistakes.add(table.where, "share needs lights of a scene: leave the basis out")
+    elif "lights" in look.get("want", ()):
+        mistakes.add(table.where, "want has 'lights', and places need images: want 'solve' instead")
+    elif look.get("settings", {}).get("move_lights") is False:
+        mistakes.add(
+            table.where, "share is of lights that move, and move_lights is false: leave one out"
+        )
 
 
 def check_by_sums(mistakes: Mistakes, table: Table) -> None:

@@ -45,9 +45,10 @@ class LookEntry:
     """A look with all its inputs and options.
 
     name: of its folder. where: its name in errors. scenes, basis: to light. paintings: one for each
-    view; none if a lighting is given. variation: its word, if it varies another look. lighting: a
-    file with the lighting. of: names of looks whose lightings it combines; share, space: between
-    two of them. want: steps.
+    view; none if a lighting is given. variation: its word, if it varies another look, `varied`.
+    shares_places: whether its lights hang where those of other looks do. places: file of where, if
+    they may move; known once its scene is read. lighting: a file with the lighting. of: names of
+    looks whose lightings it combines; share, space: between two of them. want: steps.
     """
 
     name: str
@@ -62,6 +63,9 @@ class LookEntry:
     final: Final = field(default_factory=Final)
     handover: Handover = field(default_factory=Handover)
     variation: str = ""
+    varied: str = ""
+    shares_places: bool = False
+    places: str = ""
     lighting: str = ""
     of: tuple[str, ...] = ()
     share: float = 0.0
@@ -159,6 +163,7 @@ def _table_looks(
         want=tuple(look.get("want", GIVEN_LIGHTING_STEPS if is_given else SOLVE_STEPS)),
         final=mistakes.final(look.get("render", {}), label),
         handover=mistakes.handover(look.get("export", {}), label, manifest.folder),
+        shares_places="share" in look,
     )
     expanded: list[LookEntry] = []
     try:
@@ -248,7 +253,8 @@ def _painting(manifest: Manifest, look: Mapping[str, Any], file: str) -> Paintin
 
 def _variation_entry(entry: LookEntry, word: str) -> LookEntry:
     """Return a variation of a look: solved with other settings, or derived from its answer."""
-    variation = replace(entry, name=f"{entry.name}-{word.replace(' ', '-')}", variation=word)
+    name = f"{entry.name}-{word.replace(' ', '-')}"
+    variation = replace(entry, name=name, variation=word, varied=entry.name)
     if word not in SHIFTED_WORDS:
         if not entry.is_solved:
             raise LightpaintError(f"variations has {word!r}, and its lighting is given")

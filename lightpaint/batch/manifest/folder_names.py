@@ -18,8 +18,8 @@ FILES = ("index.html", "contact.png", "summary.csv", SUMMARY)
 #: Name of the journal in the folder of a batch; and how the name of a part's journal begins.
 JOURNAL, JOURNAL_PART = "journal.jsonl", "journal-"
 
-#: The folder of small pictures.
-THUMBNAILS = "thumbnails"
+#: The folders of small pictures, and of places of lights.
+THUMBNAILS, PLACES = "thumbnails", "places"
 
 
 def folded(name: str) -> str:
@@ -35,7 +35,7 @@ def is_reserved(name: str) -> bool:
     name = folded(name)
     if name.startswith(JOURNAL_PART) and name.endswith(".jsonl"):
         return True
-    return name.startswith(".") or name in (*FILES, JOURNAL, THUMBNAILS)
+    return name.startswith(".") or name in (*FILES, JOURNAL, THUMBNAILS, PLACES)
 
 
 def name_clashes(names: Iterable[str]) -> list[list[str]]:

@@ -21,6 +21,9 @@ Step = Literal["solve", "predict", "verify", "report", "render", "export", "ligh
 #: Steps of a given lighting.
 LIGHTING_STEPS: tuple[Step, ...] = ("predict", "render", "export")
 
+#: What looks may share.
+Share = Literal["places"]
+
 #: Scale in which a sequence has even steps: stops of brightness, or perceived colour.
 Space = Literal["log", "oklab"]
 
@@ -102,6 +105,7 @@ REQUEST_KEYS: dict[str, Check] = {
     "render": TABLE,
     "export": TABLE,
     "variations": _some_of(VARIATIONS),
+    "share": (lambda v: v in get_args(Share), '"places"'),
 }
 
 #: Keys of which a look has exactly one.

@@ -155,11 +155,13 @@ def _merge(defaults: Table, table: Table) -> Table:
 
 
 def _drop_unused(values: dict[str, Any], look: Mapping[str, Any]) -> None:
-    """Drop default steps and tables that a look of this kind cannot use."""
+    """Drop default steps, tables and shares that a look of this kind cannot use."""
     if "want" in values and "want" not in look and {"lighting", "lightings"} & set(look):
         values["want"] = [step for step in values["want"] if step in LIGHTING_STEPS] or list(
             LIGHTING_STEPS[:1]
         )
+    if "share" not in look and {"lighting", "lightings"} & set(look):
+        values.pop("share", None)
     for step in ("render", "export"):
         if step not in look and step not in values.get("want", ()):
             values.pop(step, None)

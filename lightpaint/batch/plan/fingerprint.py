@@ -13,6 +13,9 @@ from lightpaint.batch.manifest.keys import Final, Handover
 from lightpaint.errors import OutputError
 from lightpaint.version import __version__
 
+#: Settings that no places depend on.
+UNPLACED: dict[str, Any] = {"verify": True, "verify_spp": None, "report": True, "suggest": 0}
+
 
 class Fingerprints:
     """Fingerprints of one manifest's looks.
@@ -24,21 +27,39 @@ class Fingerprints:
         self._sums: dict[Path, str] = {}
         self._answers: dict[str, str] = {}
 
-    def answer(self, entry: LookEntry, reads: Sequence[Path]) -> str:
+    def answer(self, entry: LookEntry, reads: Sequence[Path], places: str = "") -> str:
         """Return the fingerprint of an answer; call this for the looks that it combines first.
 
-        reads: files whose content counts. Raises OutputError if one cannot be read.
+        reads: files whose content counts. places: fingerprint of its lights' places.
+        Raises OutputError if one cannot be read.
         """
-        values = asdict(replace(entry, where="", want=(), final=Final(), handover=Handover()))
         made_of = [
             __version__,
-            _relative(values, self._base),
+            self._request(entry),
             sorted(self._content(file) for file in reads),
             [self._answers[name] for name in entry.of],
             *(["lights"] if entry.is_by_sums else []),
+            *([places] if places else []),
         ]
         self._answers[entry.name] = _sha256(json.dumps(made_of, default=str))
         return self._answers[entry.name]
+
+    def places(self, looks: Sequence[tuple[LookEntry, Sequence[Path]]]) -> str:
+        """Return the fingerprint of the places that looks share. looks: with the files they read.
+
+        Raises OutputError if one cannot be read.
+        """
+        made_of = []
+        for entry, reads in looks:
+            plain = replace(entry, settings=replace(entry.settings, **UNPLACED))
+            made_of.append([self._request(plain), sorted(map(self._content, reads))])
+        return _sha256(json.dumps([__version__, made_of], default=str))
+
+    def _request(self, entry: LookEntry) -> Any:
+        """Return what a look asks for, as plain values; its steps have fingerprints of their
+        own."""
+        plain = replace(entry, where="", want=(), final=Final(), handover=Handover(), places="")
+        return _relative(asdict(plain), self._base)
 
     def render(self, entry: LookEntry) -> str:
         """Return the fingerprint of a final render."""

@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lightpaint.batch.manifest.entries import LookEntry
+from lightpaint.batch.plan.place_groups import PlaceGroup
 from lightpaint.batch.work.task import Kind, Task
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import BatchError
@@ -58,7 +59,7 @@ class Plan:
     """The plan of a manifest. costs: of each basis, by its key. chosen: names of the looks to do.
 
     cache: scenes that the checks have loaded, so that they are not loaded twice. remarks: on the
-    batch as a whole.
+    batch as a whole. groups: looks that share places of lights.
     """
 
     manifest: Path
@@ -68,11 +69,16 @@ class Plan:
     chosen: frozenset[str]
     cache: WorkerCache = field(default_factory=WorkerCache, repr=False, compare=False)
     remarks: tuple[str, ...] = ()
+    groups: tuple[PlaceGroup, ...] = ()
 
     @property
     def chosen_looks(self) -> tuple[PlannedLook, ...]:
         """Looks to do."""
         return tuple(look for look in self.looks if look.entry.name in self.chosen)
+
+    def group_of(self, task: Task) -> PlaceGroup | None:
+        """Return the group that a task's lights are placed for; None if none may move."""
+        return next((x for x in self.groups if task.places and str(x.file) == task.places), None)
 
     @property
     def steps(self) -> list[tuple[str, Kind]]:

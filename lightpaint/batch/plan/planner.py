@@ -1,7 +1,7 @@
 """The planner: checks all looks of a manifest before any sample, and lists the steps to do."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,23 @@ from lightpaint.batch.manifest.variations import vary
 from lightpaint.batch.plan.fingerprint import Fingerprints
 from lightpaint.batch.plan.journal import Journal
 from lightpaint.batch.plan.look_errors import collect_errors
+from lightpaint.batch.plan.place_groups import (
+    PlaceGroup,
+    deciding,
+    file_of_group,
+    group_entries,
+    places_of,
+)
 from lightpaint.batch.plan.plan import Cost, Plan, PlannedLook, PlanStep
 from lightpaint.batch.work.derived_looks import adjusted_light_count, derived_folder
-from lightpaint.batch.work.task import EXPORT, answer_task, bases_of, export_task, render_task
+from lightpaint.batch.work.task import (
+    EXPORT,
+    Task,
+    answer_task,
+    bases_of,
+    export_task,
+    render_task,
+)
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.errors import LOOK_ERRORS, BatchError, LightpaintError
 from lightpaint.files import check_writable
@@ -58,7 +72,7 @@ def plan(
         check_writable(folder)
         check_gallery(folder, force=force)
     planner = _Planner(manifest_, folder, entries.complete, force=force, command=command)
-    looks = tuple(planner.plan_look(entry) for entry in entries.complete)
+    looks = planner.plan_looks(entries.complete)
     for _, entry in entries.incomplete:
         planner.collect_errors(entry)
     if manifest_.mistakes.lines:
@@ -66,7 +80,18 @@ def plan(
     names = frozenset(look.entry.name for look in looks)
     planner.cache.keep_only(())
     cache, remarks = planner.cache, planner.journal.remarks
-    return Plan(manifest_.path, folder, looks, planner.costs, names, cache, remarks)
+    groups = tuple(planner.groups.values())
+    return Plan(manifest_.path, folder, looks, planner.costs, names, cache, remarks, groups)
+
+
+@dataclass(frozen=True)
+class _CheckedLook:
+    """A look with all defaults resolved. reads: its files. failure: why it cannot be done."""
+
+    entry: LookEntry
+    reads: tuple[Path, ...]
+    failure: str
+    remarks: tuple[str, ...]
 
 
 class _Planner:
@@ -82,18 +107,27 @@ class _Planner:
         command: str,
     ) -> None:
         self._mistakes: Mistakes = manifest.mistakes
-        self._force, self._command = force, command
+        self._force, self._command, self._folder = force, command, folder
         self._folders = {entry.name: folder / entry.name for entry in entries}
         self.cache, self.journal = WorkerCache(), Journal(folder)
         self._fingerprints = Fingerprints(manifest.folder)
         self._failed: set[str] = set()
+        self._rigged: list[str] = []
+        self.groups: dict[str, PlaceGroup] = {}
         self.costs: dict[str, Cost] = {}
 
-    def plan_look(self, entry: LookEntry) -> PlannedLook:
-        """Return the plan of one look.
-        Errors in the manifest are added to its mistakes; errors in the look's own files become its
+    def plan_looks(self, entries: Sequence[LookEntry]) -> tuple[PlannedLook, ...]:
+        """Return the plan of each look, with those whose lights hang at shared places.
+
+        Errors in the manifest are added to its mistakes; errors in a look's own files become its
         failure.
         """
+        checked = [self._checked(entry) for entry in entries]
+        places = self._group(checked)
+        return tuple(self._planned(x, places.get(x.entry.name, "")) for x in checked)
+
+    def _checked(self, entry: LookEntry) -> "_CheckedLook":
+        """Return one look with all defaults resolved."""
         failure = ""
         remarks: tuple[str, ...] = ()
         reads: tuple[Path, ...] = ()
@@ -109,8 +143,41 @@ class _Planner:
             failure = f"it is made of {some_names(sorted(failed))}, which failed"
         if failure:
             self._failed.add(entry.name)
-        steps = self._steps(entry, reads if not failure else (), is_possible=not failure)
-        return PlannedLook(entry, self._folders[entry.name], steps, failure, remarks)
+        return _CheckedLook(entry, reads if not failure else (), failure, remarks)
+
+    def _group(self, checked: Sequence["_CheckedLook"]) -> dict[str, str]:
+        """Group looks that share places; return the file of the places of each, by its name."""
+        looks = {x.entry.name: x for x in checked if not x.failure}
+        entries, files = [x.entry for x in looks.values()], dict[str, str]()
+        try:
+            groups = group_entries(entries, self._rigged)
+        except LightpaintError as error:
+            self._mistakes.add("", str(error))
+            return {}
+        for group in groups:
+            file = file_of_group(self._folder, group)
+            its = [(entry, looks[entry.name].reads) for entry in deciding(group)]
+            tasks = [self._answer(entry, reads) for entry, reads in its]
+            made_of = self._fingerprints.places(its)
+            self.groups[str(file)] = PlaceGroup(file, tuple(tasks), made_of)
+            files |= {entry.name: str(file) for entry in group}
+        return places_of(entries, files)
+
+    def _planned(self, look: "_CheckedLook", places: str) -> PlannedLook:
+        """Return the plan of a look. places: file of its lights' places; "" if none may move."""
+        entry, is_possible = look.entry, not look.failure
+        if places:
+            entry = replace(entry, places=places)
+            for key, old in zip(bases_of(entry), bases_of(look.entry), strict=True):
+                if old in self.costs:
+                    self.costs[key] = self.costs[old]
+        steps = self._steps(entry, look.reads, is_possible=is_possible)
+        folder = self._folders[entry.name]
+        return PlannedLook(entry, folder, steps, look.failure, look.remarks)
+
+    def _answer(self, entry: LookEntry, reads: Sequence[Path]) -> Task:
+        how: dict[str, Any] = {"force": self._force, "command": self._command}
+        return answer_task(entry, self._folders, reads=reads, **how)
 
     def collect_errors(self, entry: LookEntry) -> None:
         """Add all errors of a look that cannot be planned, not only the first."""
@@ -121,11 +188,10 @@ class _Planner:
     ) -> tuple[PlanStep, ...]:
         """Return the steps of a look: its answer, and its render and exports if requested."""
         folder = self._folders[entry.name]
-        answer = answer_task(
-            entry, self._folders, reads=reads, force=self._force, command=self._command
-        )
-        tasks = [answer]
-        made_of = [self._fingerprints.answer(entry, reads)]
+        answer = self._answer(entry, reads)
+        tasks, group = [answer], self.groups.get(entry.places)
+        places = "" if group is None else group.made_of
+        made_of = [self._fingerprints.answer(entry, reads, places)]
         if "render" in entry.want:
             tasks.append(render_task(answer, entry, folder))
             made_of.append(self._fingerprints.render(entry))
@@ -164,6 +230,13 @@ class _Planner:
             job = self._job(entry, scenes, basis, settings, constraints)
         if entry.is_by_sums:
             _check_by_sums(job)
+        elif job.all_rigging and entry.basis is None:
+            self._rigged.append(entry.name)
+        elif entry.shares_places:
+            raise BatchError(
+                f"share = 'places', and no light may move in {scenes[0].path}: say in its lights "
+                "file which may, or leave share out"
+            )
         self._note_costs(entry, [view.scene for view in job.views], job.settings)
         if entry.final.resolution is not None and "render" in entry.want:
             on_film(scenes[0].content, None, entry.final.resolution)

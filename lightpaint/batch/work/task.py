@@ -13,7 +13,7 @@ from lightpaint.batch.work.work_items import PathMap
 from lightpaint.errors import BatchError
 from lightpaint.pipeline.job.job_record import encode_job
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, PlacementFile, SceneFile
 from lightpaint.storage.json_records import read_record, strict_json
 
 FORMAT: Literal["lightpaint-task 1"] = "lightpaint-task 1"
@@ -33,8 +33,9 @@ class Task:
     lightings: files that it combines; reads: all other files but bases; share, space: between two
     lightings; mireds: how much warmer. final: options of the final render. handover: exports for
     other programs. bases: keys of its bases; files: where these are saved, "" if they have to be
-    obtained. expected_s: rough estimate of its time. is_by_sums: whether only the lighting is
-    requested.
+    obtained; formers: of the looks before lights were moved. places: file of the places of lights
+    that may move, which a search for all looks that share them writes. expected_s: rough estimate
+    of its time. is_by_sums: whether only the lighting is requested.
     """
 
     look: str
@@ -49,6 +50,8 @@ class Task:
     handover: Handover = field(default_factory=Handover)
     bases: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
+    formers: tuple[str, ...] = ()
+    places: str = ""
     expected_s: float = 0.0
     is_by_sums: bool = False
     format: Literal["lightpaint-task 1"] = FORMAT
@@ -74,12 +77,13 @@ class Task:
         existing: list[str] = []
         if self.kind == "render":
             existing = [str(x) for x in sorted(Path(self.writes).rglob("*")) if x.is_file()]
-        return tuple(dict.fromkeys([*self.reads, *self.lightings, *existing]))
+        places = [self.places] if self.places and self.kind == "answer" else []
+        return tuple(dict.fromkeys([*self.reads, *self.lightings, *places, *existing]))
 
     @property
     def carried(self) -> tuple[str, ...]:
         """Saved bases; see `WorkItem`."""
-        return tuple(file for file in self.files if file)
+        return tuple(file for file in (*self.files, *self.formers) if file)
 
     def with_paths(self, move: PathMap) -> "Task":
         """Return the same task with other paths."""
@@ -90,6 +94,8 @@ class Task:
             lightings=tuple(map(move, self.lightings)),
             reads=tuple(map(move, self.reads)),
             files=tuple(file and move(file) for file in self.files),
+            formers=tuple(file and move(file) for file in self.formers),
+            places=self.places and move(self.places),
         )
 
     def to_json(self) -> str:
@@ -131,6 +137,7 @@ def answer_task(
             replace(entry.settings, force=force, command=command),
             folder=str(folders[entry.name]),
             by_sensor=entry.by_sensor,
+            placement=PlacementFile(entry.places) if entry.places else None,
         ),
         tuple([entry.lighting] if entry.lighting else lightings),
         tuple(map(str, reads)),
@@ -141,6 +148,7 @@ def answer_task(
         entry.handover,
         bases_of(entry),
         ("",) * len(bases_of(entry)),
+        places=entry.places,
         is_by_sums=entry.is_by_sums,
     )
 
@@ -164,7 +172,7 @@ def bases_of(entry: LookEntry) -> tuple[str, ...]:
     """Return the key of each basis that a look is solved with: equal keys mean equal bases."""
     if entry.basis is not None:
         return (key_of_basis(entry.basis),)
-    return tuple(key_of_scene(scene, entry.settings) for scene in entry.scenes)
+    return tuple(key_of_scene(scene, entry.settings, entry.places) for scene in entry.scenes)
 
 
 def key_of_basis(basis: BasisFile | GroupsFile) -> str:
@@ -172,11 +180,19 @@ def key_of_basis(basis: BasisFile | GroupsFile) -> str:
     return json.dumps({"basis": asdict(basis)})
 
 
-def key_of_scene(scene: SceneFile, settings: Settings) -> str:
-    """Return the key of a rendered basis: the scene with its sensor, and the render settings."""
+def key_of_scene(scene: SceneFile, settings: Settings, places: str = "") -> str:
+    """Return the key of a rendered basis: the scene with its sensor, and the render settings.
+
+    places: file of the places of lights that may move; "" for the basis of the scene as it is.
+    """
+    key = {"scene": asdict(scene), **render_settings(settings)}
+    return json.dumps(key | ({"places": places} if places else {}))
+
+
+def render_settings(settings: Settings) -> dict[str, Any]:
+    """Return the settings that a rendered basis depends on, by name."""
     rendered = ("spp", "time_s", "error", "seed", "resolution", "quality", "use_cache", "exact_spp")
-    render_settings = {name: getattr(settings, name) for name in rendered}
-    return json.dumps({"scene": asdict(scene), **render_settings})
+    return {name: getattr(settings, name) for name in rendered}
 
 
 def _map_paths(content: Any, move: PathMap) -> Any:

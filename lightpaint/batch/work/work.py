@@ -14,6 +14,7 @@ from lightpaint.batch.manifest.keys import Space
 from lightpaint.batch.manifest.sequence import interpolate
 from lightpaint.batch.manifest.variations import shift
 from lightpaint.batch.work.derived_looks import derived_folder, dimmer_lights, publish_derived
+from lightpaint.batch.work.shared_places import SharedPlacing, find_shared_places
 from lightpaint.batch.work.sums_answer import answer_by_sums, sums_of_rows
 from lightpaint.batch.work.task import EXPORT, Task
 from lightpaint.batch.work.work_items import (
@@ -85,6 +86,9 @@ def _run(item: WorkItem, cache: WorkerCache, listen: Listener) -> Any:
         return cache.renderer(item).render(item.part)
     if isinstance(item, SumsOfRows):
         return sums_of_rows(item, cache)
+    if isinstance(item, SharedPlacing):
+        cache.release_renderer()
+        return find_shared_places(item, cache, listen)
     if isinstance(item, Passes):
         return cache.frame(item).sum(range(item.first, item.last))
     cache.release_renderer()
@@ -116,8 +120,9 @@ def job_fields(task: Task, cache: WorkerCache) -> dict[str, Any]:
 
 def _answer(task: Task, cache: WorkerCache, listen: Listener) -> None:
     fields = job_fields(task, cache)
-    for key, file in zip(task.bases, task.files, strict=True):
-        cache.load(key, file)
+    formers = task.formers or ("",) * len(task.bases)
+    for key, file, former in zip(task.bases, task.files, formers, strict=True):
+        cache.load(key, file, former)
     if task.lightings:
         _derive_answer(task, fields, cache)
         return

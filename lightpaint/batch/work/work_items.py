@@ -27,7 +27,7 @@ class WorkItem(Protocol):
 
     @property
     def kind(self) -> str:
-        """Kind: `answer` or `render` of a look, `training`, `part`, `rows`, `passes`."""
+        """Kind: `answer` or `render` of a look, `training`, `part`, `rows`, `passes`, `places`."""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -79,7 +79,8 @@ class ItemResult:
 @dataclass(frozen=True)
 class SceneFilm:
     """A scene by its file, on the film that its basis is rendered on. files: all files of the
-    scene. only: names of the lights that are rendered, if not all.
+    scene. only: names of the lights that are rendered, if not all. places: file of the places of
+    lights that moved or are new; "" if none did.
     """
 
     scene: SceneFile
@@ -87,11 +88,15 @@ class SceneFilm:
     resolution: str | None = None
     files: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    places: str = ""
 
     def with_paths(self, move: PathMap) -> "SceneFilm":
         """Return the same with other paths."""
         return replace(
-            self, scene=scene_with_paths(self.scene, move), files=tuple(map(move, self.files))
+            self,
+            scene=scene_with_paths(self.scene, move),
+            files=tuple(map(move, self.files)),
+            places=self.places and move(self.places),
         )
 
     def unread(self) -> "SceneFilm":
@@ -101,7 +106,8 @@ class SceneFilm:
     @property
     def key(self) -> str:
         """Key that equal films share."""
-        return json.dumps([vars_of(self.scene), self.quality, self.resolution, self.only])
+        film = [vars_of(self.scene), self.quality, self.resolution, self.only]
+        return json.dumps([*film, *([self.places] if self.places else [])])
 
 
 @dataclass(frozen=True)

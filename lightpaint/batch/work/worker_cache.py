@@ -1,6 +1,8 @@
 """The memory of a process that works on a batch."""
 
 from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.file.basis_reader import read_basis
@@ -15,7 +17,9 @@ from lightpaint.batch.work.work_items import (
     SceneFilm,
     SumsOfRows,
 )
+from lightpaint.images.estimate import read_estimate
 from lightpaint.pipeline.job.sources import BasisFile, GroupsFile, SceneFile
+from lightpaint.placement.placement_record import read_placement
 from lightpaint.scene.quality_presets import on_film
 from lightpaint.scene.scene import Scene
 from lightpaint.target.target import Target
@@ -48,14 +52,21 @@ class WorkerCache:
         """Store the basis of a key."""
         self._bases[key] = basis
 
-    def load(self, key: str, file: str) -> None:
-        """Load the basis of a key from a file that was written for workers."""
+    def load(self, key: str, file: str, former: str = "") -> None:
+        """Load the basis of a key from a file that was written for workers.
+
+        former: of the look before its lights were moved; "" if they were not.
+        """
         if file and key not in self._bases:
-            self._bases[key] = read_basis(file)
+            basis = read_basis(file)
+            look = read_estimate(Path(former))[0] if former else None
+            self._bases[key] = replace(basis, former=look)
 
     def film(self, film: SceneFilm) -> Scene:
         """Return the scene on a film."""
         scene = on_film(self.scene(film.scene).content, film.quality, film.resolution)
+        if film.places:
+            [scene] = read_placement(Path(film.places)).hung_in([scene]).scenes
         return scene.only(film.only) if film.only else scene
 
     def renderer(self, item: PartOfBasis | SumsOfRows) -> PartRenderer:

@@ -12,6 +12,7 @@ from lightpaint.errors import LOOK_ERRORS
 from lightpaint.pipeline.job.job import Job
 from lightpaint.pipeline.pipeline import run
 from lightpaint.pipeline.results.results import Look
+from lightpaint.placement.placement_record import PlacementRecord, record_of
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.report.page.suggestion_section import spoken_turn
 from lightpaint.screen import some_of
@@ -35,16 +36,24 @@ def solve(
     several: the set of looks, if there are several.
     """
     listen, results, shortfalls, obtained = terminal.TerminalListener(), [], [], None
+    hung: PlacementRecord | None = None
     # The remarks of all jobs come before the first one runs; the listener drops repeats.
     for remark in (remark for job in jobs for remark in job.remarks):
         listen.say(remark)
     for job in jobs:
         listen.note(f"files read; {spoken_settings(job.fit)}")
+        if several is not None and job.folder in several.variation_names and hung is not None:
+            job = job.with_placement(hung)
+        elif hung is not None:
+            # The basis is that of lights which another painting moved.
+            obtained, hung = None, None
         try:
             with listen:
                 looks = run(job, listen, bases=None if obtained is None else list(obtained))
-            # Several paintings of one scene share its basis.
+            # Several paintings of one scene share its basis, and variations the places of lights.
             obtained = [look.basis for look in looks]
+            if (placement := looks[0].placement) is not None and not placement.is_empty:
+                hung = record_of(placement)
             if several is not None:
                 several.finish_look(job, looks[0].lighting, obtained)
         except LOOK_ERRORS as error:

@@ -35,6 +35,7 @@ from lightpaint.pipeline.job.sources import (
     BasisFile,
     GroupsFile,
     Painting,
+    PlacementFile,
     SceneFile,
     check_nothing_unused,
     content,
@@ -42,6 +43,7 @@ from lightpaint.pipeline.job.sources import (
 from lightpaint.pipeline.results.answer_folder import answer_files
 from lightpaint.pipeline.results.result_folder import ResultFolder
 from lightpaint.pipeline.results.results import SOLVE_RESULTS, VIEW_RESULTS, view_names
+from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.placement.rigging.rigged_lights import rigged_lights
 from lightpaint.placement.rigging.rigging import Rigging, rigging_of
 from lightpaint.placement.suggestions.light_search import check_suggestible
@@ -84,6 +86,7 @@ class Job:
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
         rigging: What may move, and lights to add; needs a scene. It overrides that of the scene's
             lights file.
+        placement: Places that were found before, for several looks; nothing is searched for then.
         views: Set on creation: the views, each with what it needs.
         all_constraints: Set on creation: all constraints, those of the lights file first.
         all_rigging: Set on creation: all that may move, that of the lights file first.
@@ -110,6 +113,7 @@ class Job:
     settings: Settings = field(default_factory=Settings)
     by_sensor: bool = False
     rigging: Rigging = field(default_factory=Rigging)
+    placement: PlacementRecord | PlacementFile | None = None
     views: tuple[PaintedView, ...] = field(init=False, repr=False)
     all_constraints: Constraints = field(init=False, repr=False)
     all_rigging: Rigging = field(init=False, repr=False)
@@ -175,6 +179,12 @@ class Job:
         vars(moved)["views"] = tuple(replace(x, scene=scene, basis=None) for x, scene in views)
         return moved
 
+    def with_placement(self, placement: PlacementRecord) -> "Job":
+        """Return this job with lights where they were found for another look."""
+        placed = copy(self)
+        vars(placed)["placement"] = placement
+        return placed
+
     def to_json(self) -> str:
         """Return this job as text, to run it elsewhere; paths stay as they were given.
 
@@ -189,6 +199,7 @@ class Job:
             folder=str(self.folder),
             by_sensor=self.by_sensor,
             rigging=self.rigging,
+            placement=self.placement,
         )
 
     @staticmethod

@@ -9,7 +9,14 @@ from typing import Any
 from lightpaint.errors import LightpaintError
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.pipeline.job.settings import Settings
-from lightpaint.pipeline.job.sources import BasisFile, File, GroupsFile, Painting, SceneFile
+from lightpaint.pipeline.job.sources import (
+    BasisFile,
+    File,
+    GroupsFile,
+    Painting,
+    PlacementFile,
+    SceneFile,
+)
 from lightpaint.placement.rigging.rigging import Rigging
 from lightpaint.storage.json_records import read_record, strict_json
 
@@ -34,6 +41,7 @@ class JobRecord:
     folder: str
     by_sensor: bool
     rigging: Rigging = field(default_factory=Rigging)
+    placement: PlacementFile | None = None
 
 
 def encode_job(
@@ -46,9 +54,11 @@ def encode_job(
     folder: str,
     by_sensor: bool,
     rigging: Rigging | None = None,
+    placement: Any = None,
 ) -> str:
     """Return a job's fields as text. Raises LightpaintError for objects in memory."""
     groups = [("scene", scenes), ("target", targets), ("basis", [basis] if basis else [])]
+    groups.append(("placement", [placement] if placement else []))
     for kind, sources in groups:
         if not all(isinstance(source, File) for source in sources):
             raise LightpaintError(
@@ -64,6 +74,7 @@ def encode_job(
         folder,
         by_sensor,
         rigging or Rigging(),
+        placement,
     )
     # `item` makes NumPy's numbers Python's.
     data = {"format": FORMAT, **asdict(record)}

@@ -17,6 +17,7 @@ from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.pipeline.job.settings import Settings
+from lightpaint.placement.placement_record import PlacementRecord, read_placement
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
 from lightpaint.target.target import Target
@@ -155,8 +156,20 @@ class GroupsFile(ReadOnce):
         return read_light_groups(**vars_of(self))
 
 
+@dataclass(frozen=True)
+class PlacementFile(ReadOnce):
+    """A file of places of lights; read once."""
+
+    path: str
+
+    @cached_property
+    def content(self) -> PlacementRecord:
+        """The places, read on first use."""
+        return read_placement(Path(self.path))
+
+
 #: Kinds of files in a job, which can be sent elsewhere.
-File = SceneFile | Painting | BasisFile | GroupsFile
+File = SceneFile | Painting | BasisFile | GroupsFile | PlacementFile
 
 
 def vars_of(record: Any) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
 from lightpaint.placement.placement import HARDLY_VISIBLE, AddedLight, Move, Placement
+from lightpaint.placement.placement_record import PlacementRecord
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
 from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
@@ -46,6 +47,9 @@ from lightpaint.target.target import Target
 
 #: Header attribute of predicted.exr: the sensor, film and samples of the basis.
 VIEW_KEY = "lightpaint.view"
+
+#: Least errors of a turn, in degrees, and of a way, as a share of it, that are worth a number.
+LEAST_TURN_ERROR, LEAST_SHARE = 0.05, 0.001
 
 #: Files of every solve.
 SOLVE_RESULTS = ("lighting.json", "predicted.exr", "comparison.png", "report.html", "report.json")
@@ -254,15 +258,17 @@ def _report_arguments(look: Look, command: str) -> dict[str, Any]:
     }
 
 
-def hung_of(placement: Placement, lighting: Lighting) -> HungLights:
-    """Return the lights of an answer, and what a placement changed of them."""
+def hung_of(placement: Placement | PlacementRecord, lighting: Lighting | None) -> HungLights:
+    """Return what a placement changed, and the lights of an answer; none without one."""
     changes = [_change_of(change) for change in all_changes(placement)]
     changes.sort(key=lambda change: -change.numbers["gain_share"])
     missed = placement.missed_before, placement.missed_after
-    return HungLights(hung_lights(lighting), tuple(changes), lighting.up, *missed)
+    lights = () if lighting is None else hung_lights(lighting)
+    up = (0.0, 1.0, 0.0) if lighting is None else lighting.up
+    return HungLights(lights, tuple(changes), up, *missed, placement.looks)
 
 
-def all_changes(placement: Placement) -> list[Move | AddedLight]:
+def all_changes(placement: Placement | PlacementRecord) -> list[Move | AddedLight]:
     """Return the moves, then the new lights."""
     return [*placement.moves, *placement.additions]
 
@@ -296,10 +302,11 @@ def spoken_move(move: Move) -> str:
     """Return what a light did, with the errors of that: `turned by 12° ± 1°, slid 0.6 ± 0.05`."""
     done = []
     if move.turn >= 0.5:
-        error = f" ± {move.turn_error:.1g}°" if move.turn_error else ""
+        error = f" ± {move.turn_error:.1g}°" if (move.turn_error or 0) >= LEAST_TURN_ERROR else ""
         done.append(f"turned by {move.turn:.0f}°{error}")
     if move.distance > 0:
-        error = f" ± {move.place_error:.1g}" if move.place_error else ""
+        is_told = (move.place_error or 0) >= LEAST_SHARE * move.distance
+        error = f" ± {move.place_error:.1g}" if is_told else ""
         done.append(f"slid {move.distance:.2g}{error}")
     if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
         done.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")

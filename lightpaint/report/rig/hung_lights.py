@@ -8,6 +8,7 @@ from lightpaint.arrays import RGB, Position
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.report.phrases import spoken_percent
 from lightpaint.scene.properties.site import EmitterPlace
+from lightpaint.screen import some_names
 
 #: Shares that have a word of their own, and the farthest that one may be from it.
 FRACTIONS = {
@@ -49,7 +50,8 @@ class HungLights:
     """All lights with a place, and the changes, those that gained most first.
 
     up: the axis of the scene that is up. missed_before, missed_after: shares of the painting that
-    are missed without the changes, and with them, by the search.
+    are missed without the changes, and with them, by the search. looks: names of those that share
+    the places.
     """
 
     lights: tuple[HungLight, ...]
@@ -57,18 +59,41 @@ class HungLights:
     up: Position
     missed_before: float
     missed_after: float
+    looks: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
-        """The sentence on what the changes bring together."""
+        """The sentence on what the changes bring together, and for which looks."""
+        if self.looks:
+            return f"{self.shared_sentence} Each look has levels of its own."
         if not self.changes:
             return "No light is moved: no move would surely bring a hundredth of what is missed."
-        share = 1 - self.missed_after / max(self.missed_before, 1e-300)
-        subject = "This change brings" if len(self.changes) == 1 else "These changes bring"
         return (
-            f"{subject} {spoken_fraction(share)} of what was missed (in energy, by the search; "
-            "the picture above is solved and rendered anew)."
+            f"{self._subject} {self._share} of what was missed (in energy, by the search; the "
+            "picture above is solved and rendered anew)."
         )
+
+    @property
+    def shared_sentence(self) -> str:
+        """The sentence on what the changes bring all looks that share them."""
+        names = some_names(self.looks, " and ")
+        if not self.changes:
+            return (
+                f"{names} share places. No light is moved: no move would surely bring a hundredth "
+                "of what they miss together."
+            )
+        return (
+            f"{names} share places. {self._subject} {self._share} of what they missed together (in "
+            "energy, by the search)."
+        )
+
+    @property
+    def _subject(self) -> str:
+        return "This change brings" if len(self.changes) == 1 else "These changes bring"
+
+    @property
+    def _share(self) -> str:
+        return spoken_fraction(1 - self.missed_after / max(self.missed_before, 1e-300))
 
 
 def hung_lights(lighting: Lighting) -> tuple[HungLight, ...]:

@@ -1,0 +1,32 @@
+"""The section of the gallery on lights that hang at the same places in several looks."""
+
+import base64
+from html import escape
+
+from lightpaint.batch.plan.place_groups import PlaceGroup
+from lightpaint.batch.plan.plan import Plan
+from lightpaint.pipeline.results.results import hung_of
+from lightpaint.placement.placement_record import PlacementRecord
+
+
+def places_section(plan: Plan) -> str:
+    """Return, for each group of looks, what moved, and plan and elevation of the room.
+
+    Looks that are placed alone have no part in it: their reports say it.
+    """
+    found = [(group, group.found()) for group in plan.groups if len(group.tasks) > 1]
+    parts = "".join(_group_html(group, record) for group, record in found if record is not None)
+    return f'<section class="places"><h2>Where the lights hang</h2>{parts}</section>' * bool(parts)
+
+
+def _group_html(group: PlaceGroup, record: PlacementRecord) -> str:
+    hung = hung_of(record, None)
+    listed = "".join(f"<li>{escape(change.text)}</li>" for change in hung.changes)
+    picture = ""
+    if group.picture.is_file():
+        data = base64.b64encode(group.picture.read_bytes()).decode("ascii")
+        picture = (
+            '<img alt="Plan and elevation of the room with its lights." '
+            f'src="data:image/png;base64,{data}">'
+        )
+    return f"<p>{escape(hung.shared_sentence)}</p><ul>{listed}</ul>{picture}"

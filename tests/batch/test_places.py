@@ -1,0 +1,169 @@
+"""Looks of a batch that share places: one search, one render of what moved, levels for each."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from renderer import write_room
+
+import lightpaint as lp
+from lightpaint.batch.plan.planner import plan
+from lightpaint.batch.run import run_batch
+from lightpaint.batch.run_options import RunOptions
+from lightpaint.errors import BatchError
+from lightpaint.images.formats.exr import write_rgb
+from lightpaint.lighting.answer.lighting_file import read_lighting
+from lightpaint.placement.placement_record import read_placement
+from lightpaint.progress import Listener
+
+LOOKS = """
+[defaults]
+scene = "room.xml"
+share = "places"
+want = ["solve", "predict", "report"]
+[defaults.settings]
+spp = 64
+space = "linear"
+hold = 0
+
+[[look]]
+paintings = ["day.exr", "night.exr"]
+variations = ["warmer"]
+
+[[sequence]]
+name = "dusk"
+through = ["day", "night"]
+frames = 2
+"""
+
+NAMES = ["day", "night", "day-warmer", "night-warmer", "dusk-0", "dusk-1"]
+
+#: Where the spot points in the paintings.
+THERE = lp.Pose(target=(-0.6, 0, -0.3))
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A room whose spot may turn, and two paintings of it, turned: a bright and a dark one."""
+    monkeypatch.setenv("LIGHTPAINT_CACHE", str(tmp_path / "cache"))
+    scene = lp.load_scene(write_room(tmp_path))
+    (tmp_path / "room.lights.toml").write_text("[light.beam]\naim = 60\n", encoding="utf-8")
+    basis = lp.render_basis(scene.moved({"beam": THERE}), spp=128, seed=2)
+    for name, level in (("day", 4), ("night", 0.04)):
+        weights = level * np.array([[1, 0.9, 0.8], [1, 1, 1], [3, 3, 3], [0, 0, 0], [0, 0, 0]])
+        write_rgb(tmp_path / f"{name}.exr", basis.planes.mix(weights))
+    (tmp_path / "looks.toml").write_text(LOOKS, encoding="utf-8")
+    return tmp_path
+
+
+class _Heard(Listener):
+    """What a batch tells: remarks, and labels of what makes progress."""
+
+    def __init__(self) -> None:
+        self.labels: list[str] = []
+        self.said: list[str] = []
+
+    def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        if done == 0:
+            self.labels.append(label)
+
+    def say(self, text: str) -> None:
+        self.said.append(text)
+
+
+def run_all(here: Path, **how: Any) -> tuple[Any, _Heard]:
+    heard = _Heard()
+    return run_batch(plan(here / "looks.toml", here / "out"), RunOptions(**how), heard), heard
+
+
+def directions(here: Path) -> dict[str, np.ndarray]:
+    """Where the spot of each look points."""
+    found = {}
+    for name in NAMES:
+        places = read_lighting(here / "out" / name / "lighting.json").places
+        [beam] = [place for place in places if place.name == "beam"]
+        found[name] = np.array(beam.site.direction)
+    return found
+
+
+def test_looks_hang_their_lights_once_and_dim_them_each(here: Path) -> None:
+    outcome, heard = run_all(here)
+    assert sorted(outcome.done) == sorted(NAMES)
+    assert heard.labels.count("poses") == 1
+    # The basis of all lights, and once the plane of the spot.
+    assert heard.labels.count("basis") == 2
+    found = directions(here)
+    painted = lp.load_scene(here / "room.xml").moved({"beam": THERE}).light("beam").members[0].site
+    assert all(np.array_equal(its, found["day"]) for its in found.values())
+    assert np.dot(found["day"], painted.direction) > np.cos(np.radians(5))
+    day, night = (read_lighting(here / "out" / x / "lighting.json") for x in ("day", "night"))
+    assert night["beam"].emission[0] == pytest.approx(day["beam"].emission[0] / 100, rel=0.05)
+    assert read_placement(here / "out" / "places" / "day.json").looks == ("day", "night")
+    said = [text for text in heard.said if "beam turned by" in text]
+    assert len(said) == 1
+    assert said[0].startswith("day, night: ")
+    # The gallery shows the plan once, and each report says who shares the places.
+    page = (here / "out" / "index.html").read_text(encoding="utf-8")
+    assert page.count("Plan and elevation of the room") == 1
+    assert "day and night share places" in page
+    for name in ("day", "night"):
+        report = json.loads((here / "out" / name / "report.json").read_text(encoding="utf-8"))
+        assert report["placement"]["looks"] == ["day", "night"]
+    # Nothing is left to do; another painting of one look moves the lights of all.
+    write_rgb(here / "night.exr", np.full((20, 24, 3), 0.01, np.float32))
+    again, heard = run_all(here)
+    assert sorted(again.done) == sorted(NAMES)
+    assert heard.labels.count("poses") == 1
+
+
+def test_places_that_were_found_are_not_searched_for_again(here: Path) -> None:
+    """A batch that was stopped after its search goes on from there."""
+    first = plan(here / "looks.toml", here / "out")
+    run_batch(first.select("day"), RunOptions(apart=True))
+    outcome, heard = run_all(here)
+    assert "poses" not in heard.labels
+    assert sorted(outcome.done) == sorted(set(NAMES) - {"day"})
+    # Half a file counts as none.
+    (here / "out" / "places" / "day.json").write_text('{"moves": [', encoding="utf-8")
+    assert plan(here / "looks.toml", here / "out").groups[0].found() is None
+
+
+@pytest.mark.nightly
+def test_workers_place_as_one_process_does(here: Path) -> None:
+    run_all(here)
+    alone = directions(here)
+    (here / "out").rename(here / "alone")
+    run_all(here, workers=2)
+    assert all(np.array_equal(alone[name], its) for name, its in directions(here).items())
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('share = "places"', 'share = "levels"'), r"share is 'levels': expected \"places\""),
+        (("spp = 64", "spp = 64\nmove_lights = false"), "move_lights is false"),
+        (('"predict", "report"]', '"lights"]'), "want has 'lights'"),
+        (('share = "places"', 'share = "places"\nuse_lights_file = false'), "no light may move in"),
+        (("[[look]]", '[[look]]\npainting = "day.exr"\nname = "x"\nsettings.seed = 1\n[[look]]'),
+         "x and day share places, and seed is 1 in one and 0 in the other"),
+        (("[[look]]", '[[look]]\nlighting = "a/lighting.json"\nshare = "places"\n[[look]]'),
+         "its lighting is given"),
+    ],
+)  # fmt: skip
+def test_looks_that_cannot_share_places(here: Path, change: tuple[str, str], words: str) -> None:
+    text = LOOKS.replace(*change, 1)
+    (here / "looks.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(BatchError, match=words):
+        plan(here / "looks.toml", here / "out")
+
+
+def test_a_job_with_places_is_sent_and_read_again(here: Path) -> None:
+    first = plan(here / "looks.toml", here / "out")
+    [task] = [x.steps[0].task for x in first.looks if x.entry.name == "day"]
+    moved = task.with_paths(lambda text: text.replace(str(here), "/elsewhere"))
+    assert moved.places == "/elsewhere/out/places/day.json"
+    assert json.loads(moved.job)["placement"] == {"path": moved.places}
+    assert moved == replace(type(task).from_json(moved.to_json()))
