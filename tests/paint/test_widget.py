@@ -496,6 +496,32 @@ def test_what_cannot_be_set_is_said_while_it_still_renders(
             open_(target=target)
 
 
+def test_messages_about_a_basis_come_while_nobody_holds_the_session(
+    basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cell may wait for the session meanwhile, and whoever gets messages for the cell."""
+    rendered = Rendered(basis, tmp_path, monkeypatch)
+    studio = open_()._studio
+    forward, was_free = studio.on_message, []
+
+    def is_free() -> bool:
+        got = studio._lock.acquire(timeout=1)
+        if got:
+            studio._lock.release()
+        return got
+
+    def receive(message: Any) -> None:
+        with ThreadPoolExecutor(1) as another:
+            was_free.append(another.submit(is_free).result())
+        forward(message)
+
+    studio.on_message = receive
+    rendered.goes_on.set()
+    wait_for(lambda: studio.store is not None and studio.session.basis is rendered.better)
+    assert len(was_free) >= 2
+    assert all(was_free)
+
+
 def test_what_cannot_be_set_later_ends_no_render(
     basis: lp.Basis, open_: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:

@@ -107,7 +107,7 @@ class LightMover:
         if not names:
             return
         self._shown_poses, self._dragged = dict(poses), names if is_dragged else set()
-        self._offer(session, sorted(names), is_dragged=is_dragged)
+        self._host.publish(self._offer(session, sorted(names), is_dragged=is_dragged))
         self._publish_rig()
         if not is_dragged:
             self._warn_of_unlit(session, names & {*poses})
@@ -157,16 +157,19 @@ class LightMover:
             with self._host.changing() as session:
                 if session.requests.poses.get(name) == poses[name]:
                     session.renew_planes([name])
-                    self._offer(session, [name], is_dragged=False)
+                    self._host.publish(self._offer(session, [name], is_dragged=False))
             self._host.planes_rendered()
 
     def offer_all(self, session: Session) -> None:
-        """Offer the pictures of all moved lights, after those of bases without moves were."""
+        """Offer the pictures of all moved lights, after those of bases without moves were.
+
+        It publishes nothing: the state of the session, which follows, has all pictures.
+        """
         self._shown_poses = dict(session.requests.poses)
         self._offer(session, list(session.requests.poses), is_dragged=False)
 
-    def _offer(self, session: Session, names: Sequence[str], *, is_dragged: bool) -> None:
-        """Offer the pictures of lights as they are now."""
+    def _offer(self, session: Session, names: Sequence[str], *, is_dragged: bool) -> PictureUpdate:
+        """Offer the pictures of lights as they are now, and return what tells pages of them."""
         pictures, offered = self._host.pictures, []
         clean = None if is_dragged else self._host.denoised(session.bases)
         for view, unmoved in zip(session.views, session.bases, strict=True):
@@ -191,7 +194,7 @@ class LightMover:
                     pictures.offer(full, maker)
                     offered.append(full)
         resources = {name: pictures.generations[name] for name in offered}
-        self._host.publish(PictureUpdate(resources=resources))
+        return PictureUpdate(resources=resources)
 
     def _denoise(self, name: str) -> None:
         """Replace the picture of a rendered plane by a denoised one."""
