@@ -52,17 +52,19 @@ class FreeLight:
     has_free_beam: bool = False
 
     def __post_init__(self) -> None:
-        its, site = self.freedom, self.site
-        for is_asked, has_it, what in (
-            (its.slides, site.position is not None, "place that could change"),
-            (its.turn > 0, site.direction is not None, "direction that could change"),
-            (its.cone is not None, site.cutoff is not None, "cone"),
+        freedom, site = self.freedom, self.site
+        for is_asked, has_it, property_name in (
+            (freedom.slides, site.position is not None, "place that could change"),
+            (freedom.turn > 0, site.direction is not None, "direction that could change"),
+            (freedom.cone is not None, site.cutoff is not None, "cone"),
         ):
             if is_asked and not has_it:
-                raise SceneError(f"light {self.name!r} has no {what}: leave that freedom out")
+                raise SceneError(
+                    f"light {self.name!r} has no {property_name}: leave that freedom out"
+                )
         if self.places is None and site.position is not None:
-            here = np.array(site.position, dtype=float)
-            object.__setattr__(self, "places", places_of(its, here))
+            position = np.array(site.position, dtype=float)
+            object.__setattr__(self, "places", places_of(freedom, position))
 
     def dimensions(self, site: Site) -> tuple[int, int, int]:
         """Return the numbers of coordinates of place, direction, and cone or size at a pose."""
@@ -113,12 +115,12 @@ class FreeLight:
 
     def some_places(self, count: int, rng: np.random.Generator) -> Floats:
         """Return about `count` permitted places that are far apart, the present one first."""
-        here = np.array(self.site.position, dtype=float)[None]
+        position = np.array(self.site.position, dtype=float)[None]
         if not self.freedom.slides or count < 2:
-            return here
+            return position
         assert self.places is not None
         many = self.places.random(OVERSAMPLING * count, rng)
-        return np.concatenate([here, far_apart(many, count - 1, start=here)])
+        return np.concatenate([position, far_apart(many, count - 1, start=position)])
 
     def directions(self, apart: float) -> Floats:
         """Return permitted directions, about `apart` degrees from each other, the present first."""
@@ -163,7 +165,7 @@ class FreeLight:
         return replace(site, cutoff=cutoff, beam=beam)
 
 
-def places_of(freedom: Freedom, here: Doubles, surfaces: Places | None = None) -> Places:
+def places_of(freedom: Freedom, position: Doubles, surfaces: Places | None = None) -> Places:
     """Return the places of a freedom. here: (3,), the present one. surfaces: of its shapes."""
     parts: list[Places] = [] if surfaces is None else [surfaces]
     if freedom.all_rails:
@@ -173,8 +175,8 @@ def places_of(freedom: Freedom, here: Doubles, surfaces: Places | None = None) -
     if freedom.box is not None:
         return BoxOfPlaces(np.min(freedom.box, axis=0), np.max(freedom.box, axis=0))
     if freedom.within is not None:
-        return BallOfPlaces(here, freedom.within)
-    return OnePlace(here)
+        return BallOfPlaces(position, freedom.within)
+    return OnePlace(position)
 
 
 def _turned(start: Position, direction: Position, degrees: float) -> Position:

@@ -56,10 +56,11 @@ class Freedom:
 
     def __post_init__(self) -> None:
         kinds = ("within", "box", "line", "rails", "surfaces")
-        given = [key for key in kinds if getattr(self, key) is not None]
-        if len(given) > 1 and given != ["rails", "surfaces"]:
+        given_keys = [key for key in kinds if getattr(self, key) is not None]
+        if len(given_keys) > 1 and given_keys != ["rails", "surfaces"]:
             raise SceneError(
-                f"{' and '.join(given)} are given: a light has one of them, or rails and surfaces"
+                f"{' and '.join(given_keys)} are given: a light has one of them, or rails and "
+                "surfaces"
             )
         if self.within is not None:
             object.__setattr__(self, "within", _number("within", self.within, FARTHEST))

@@ -54,17 +54,17 @@ class NewLight:
 
 def new_lights_of(scene: Scene, groups: Sequence[NewLights]) -> list[NewLight]:
     """Return the lights that may be added, with names that no light of the scene has."""
-    taken = {*(x.name for x in scene.emitters), *(x.name for x in scene.lights)}
-    made: list[NewLight] = []
+    used_names = {*(x.name for x in scene.emitters), *(x.name for x in scene.lights)}
+    new_lights: list[NewLight] = []
     for group in groups:
         kind = group.kind if group.like is None else _kind_like(scene, group.like)
         group.check_kind(kind)
         names = [group.name]
-        if group.count > 1 or group.name in taken:
-            names = free_names(group.name, group.count, taken)
-        taken |= {*names}
-        made += [NewLight(name, kind, group) for name in names]
-    return made
+        if group.count > 1 or group.name in used_names:
+            names = free_names(group.name, group.count, used_names)
+        used_names |= {*names}
+        new_lights += [NewLight(name, kind, group) for name in names]
+    return new_lights
 
 
 def movables_of(
@@ -78,7 +78,7 @@ def movables_of(
 ) -> list[Movable]:
     """Return the lights of `scene` that may move. names: of the lights, in the basis's order."""
     followers = followers_of(scene, freedoms, pairs)
-    made = []
+    movables = []
     for name, freedom in freedoms.items():
         if freedom.is_still or name in {x.lights[1] for x in pairs}:
             continue
@@ -89,8 +89,8 @@ def movables_of(
         if follower is not None:
             columns.append(names.index(follower.lights[1]))
         mirror = None if follower is None else follower.plane
-        made.append(Movable(light, tuple(columns), mirror))
-    return made
+        movables.append(Movable(light, tuple(columns), mirror))
+    return movables
 
 
 def new_movables_of(
@@ -100,14 +100,14 @@ def new_movables_of(
 
     Raises SceneError for those that no place of their freedom is free for.
     """
-    made = []
+    movables = []
     templates: dict[int, FreeLight] = {}
     for k, light in enumerate(lights):
         if id(light.group) not in templates:
             templates[id(light.group)] = _template(scene, light, paths, seed)
         free = replace(templates[id(light.group)], name=light.name)
-        made.append(Movable(free, (first + k,), None, light.group))
-    return made
+        movables.append(Movable(free, (first + k,), None, light.group))
+    return movables
 
 
 def free_light(scene: Scene, name: str, freedom: Freedom) -> FreeLight:
@@ -155,7 +155,7 @@ def followers_of(
     scene: Scene, freedoms: Mapping[str, Freedom], pairs: Sequence[MirroredPair]
 ) -> dict[str, MirroredPair]:
     """Return pairs by the names of their first lights. Raises SceneError for impossible ones."""
-    made: dict[str, MirroredPair] = {}
+    followers: dict[str, MirroredPair] = {}
     named: set[str] = set()
     for pair in pairs:
         first, second = pair.lights
@@ -169,8 +169,8 @@ def followers_of(
             raise SceneError(f"{first!r} leads a pair and has no freedom: give it one")
         if freedoms[first].cone is None and (one.cutoff, one.beam) != (other.cutoff, other.beam):
             raise SceneError(f"{first!r} and {second!r} have two cones: free the cone of the first")
-        made[first] = pair
-    return made
+        followers[first] = pair
+    return followers
 
 
 def _kind_like(scene: Scene, name: str) -> NewKind:

@@ -61,7 +61,9 @@ class Arrangement:
 def all_sites(movables: Sequence[Movable], sites: Sequence[Site]) -> list[Site]:
     """Return the places of all lights of movables, in their order."""
     return [
-        site for movable, its in zip(movables, sites, strict=True) for site in movable.sites(its)
+        site
+        for movable, site_of_movable in zip(movables, sites, strict=True)
+        for site in movable.sites(site_of_movable)
     ]
 
 

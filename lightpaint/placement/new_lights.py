@@ -115,15 +115,15 @@ class Mirror:
 
     def place(self, place: Position | Doubles) -> Doubles:
         """Return the mirror image of a place, (3,)."""
-        made = np.array(place, dtype=float)
-        made[self.axis] = 2 * self.at - made[self.axis]
-        return made
+        mirrored = np.array(place, dtype=float)
+        mirrored[self.axis] = 2 * self.at - mirrored[self.axis]
+        return mirrored
 
     def direction(self, direction: Position | Doubles) -> Doubles:
         """Return the mirror image of a direction, (3,)."""
-        made = np.array(direction, dtype=float)
-        made[self.axis] *= -1
-        return made
+        mirrored = np.array(direction, dtype=float)
+        mirrored[self.axis] *= -1
+        return mirrored
 
     def site(self, site: Site) -> Site:
         """Return the mirror image of a light's place and direction, with its cone."""

@@ -56,9 +56,11 @@ class Ranking:
         """
         gains = np.zeros(len(candidates))
         for c in range(self.root.shape[1]):
-            its = candidates[:, :, c % 3] * self.root[:, c]
-            power = np.einsum("kp,kp->k", its, its)
-            gains += self.gain(c, its @ self.residual[:, c], its @ self.others[c].T, power)
+            weighted = candidates[:, :, c % 3] * self.root[:, c]
+            power = np.einsum("kp,kp->k", weighted, weighted)
+            gains += self.gain(
+                c, weighted @ self.residual[:, c], weighted @ self.others[c].T, power
+            )
         return gains
 
     def gain(self, c: int, reached: Floats, cross: Floats, power: Floats) -> Floats:
@@ -80,7 +82,7 @@ class Ranking:
             self,
             root=self.root[pixels],
             residual=self.residual[pixels],
-            others=[its[:, pixels] for its in self.others],
+            others=[other_columns[:, pixels] for other_columns in self.others],
         )
 
 
@@ -143,9 +145,9 @@ class PlacementFit:
         others, inverses, columns = [], [], fitted.columns
         for c in self.channels:
             free = self._free(fitted.weights, c)
-            its = (columns[free, :, c % 3] * self._root[:, c]).astype(np.float32)
-            power = (its @ its.T).astype(np.float64)
-            others.append(its)
+            weighted = (columns[free, :, c % 3] * self._root[:, c]).astype(np.float32)
+            power = (weighted @ weighted.T).astype(np.float64)
+            others.append(weighted)
             inverses.append(np.linalg.pinv(power, rcond=1e-8, hermitian=True).astype(np.float32))
         residual = self._residual(columns, fitted.weights)
         return Ranking(self._root.astype(np.float32), residual.astype(np.float32), others, inverses)
@@ -163,9 +165,9 @@ class PlacementFit:
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
         for c in self.channels:
             root, weights = self._root[:, c], fitted.weights[:, c]
-            each = slopes[:, :, c % 3] * (root * 1.0) * weights[list(owners)][:, None]
-            jacobian = np.zeros((count, each.shape[1]))
-            for number, row in zip(numbers, each, strict=True):
+            weighted_slopes = slopes[:, :, c % 3] * (root * 1.0) * weights[list(owners)][:, None]
+            jacobian = np.zeros((count, weighted_slopes.shape[1]))
+            for number, row in zip(numbers, weighted_slopes, strict=True):
                 jacobian[number] += row
             matrix += jacobian @ jacobian.T
             gradient += jacobian @ residual[:, c]
@@ -200,10 +202,10 @@ class PlacementFit:
 
 def with_columns(columns: Floats, changed: Mapping[int, Floats]) -> Floats:
     """Return columns (n, p, 3), some of them replaced by (p, 3)."""
-    made = columns.copy()
+    replaced = columns.copy()
     for k, column in changed.items():
-        made[k] = column
-    return made
+        replaced[k] = column
+    return replaced
 
 
 def fit_of(
@@ -224,7 +226,7 @@ def fit_of(
         factor = basis.size[0] // size[0]
         planes = np.stack([block_mean(plane, factor) for plane in basis.planes])
         columns.append(planes.reshape(len(planes), -1, 3))
-    there = np.concatenate(columns, axis=1)
-    black = np.zeros((len(new), *there.shape[1:]), np.float32)
+    present = np.concatenate(columns, axis=1)
+    black = np.zeros((len(new), *present.shape[1:]), np.float32)
     goals = [goal_of(solution, views, sizes, new, constraints) for solution, views in looks]
-    return PlacementFit(np.concatenate([there, black]), goals)
+    return PlacementFit(np.concatenate([present, black]), goals)

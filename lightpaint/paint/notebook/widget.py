@@ -188,10 +188,10 @@ class Painter(anywidget.AnyWidget):  # type: ignore[misc]
         """
         snapshot = self._studio.snapshot()
         if self._solved is None or self._solved[0] != snapshot.version:
-            found = snapshot.solution()
-            if found is not None:
-                found = with_findings(found, analyse(found))
-            self._solved = snapshot.version, found
+            solution = snapshot.solution()
+            if solution is not None:
+                solution = with_findings(solution, analyse(solution))
+            self._solved = snapshot.version, solution
         return self._solved[1]
 
     def save(self, path: str | Path, *, view: int = 0) -> None:

@@ -64,8 +64,10 @@ def camera_of(scene: Scene, loaded: Any) -> Camera | None:
 def _crossing(origin: Doubles, direction: Doubles) -> Doubles:
     """Return the point that is nearest to all rays, which begin at a plane before the eye."""
     beside = np.eye(3) - direction[:, :, None] * direction[:, None, :]
-    found: Doubles = np.linalg.solve(beside.sum(axis=0), (beside @ origin[..., None]).sum(axis=0))
-    return found[:, 0]
+    crossing: Doubles = np.linalg.solve(
+        beside.sum(axis=0), (beside @ origin[..., None]).sum(axis=0)
+    )
+    return crossing[:, 0]
 
 
 def _camera(

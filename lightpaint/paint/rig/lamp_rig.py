@@ -134,10 +134,10 @@ class LampRig:
         light = self.scene.light(name)
         if reason := self.why_not(name):
             raise PaintError(f"{name} {reason}: it cannot be moved here")
-        its = light.members[0].site
+        site = light.members[0].site
         if not values:
-            return its
-        return motion_of(name, light.plugin, its, _pose(name, values)).site
+            return site
+        return motion_of(name, light.plugin, site, _pose(name, values)).site
 
     def moved_scene(self, poses: Poses, view: int = 0) -> Scene:
         """Return the scene of a view with lights moved."""
@@ -172,14 +172,14 @@ class LampRig:
                 return rendered
         self.open(bases)
         assert self.views is not None
-        site, made = self.site(name, values), []
+        site, light_bases = self.site(name, values), []
         for view, basis in zip(self.views, bases, strict=True):
             assert view.quick is not None
             light = basis.lights[basis.names.index(name)]
             with in_this_thread():
                 plane = view.quick.plane(site)
-            made.append(one_light_basis(basis, replace(light, identity=""), plane))
-        return made
+            light_bases.append(one_light_basis(basis, replace(light, identity=""), plane))
+        return light_bases
 
     def _is_rendered(self, name: str, values: Mapping[str, Any]) -> bool:
         return _key(name, values) in self._rendered
@@ -205,11 +205,11 @@ class LampRig:
             del label, done, total, unit
             check()
 
-        made = []
+        light_bases = []
         for subject, basis in zip(self._subjects, bases, strict=True):
             scene = subject.loaded_scene.moved({name: _pose(name, values)}).only([name])
             with MITSUBA.low_priority():
-                made.append(
+                light_bases.append(
                     obtain_basis(
                         scene,
                         spp=max(basis.origin.spp, 1),
@@ -219,7 +219,7 @@ class LampRig:
                     )
                 )
         with self._lock:
-            self._rendered[_key(name, values)] = made
+            self._rendered[_key(name, values)] = light_bases
             while len(self._rendered) > MAX_RENDERED:
                 self._rendered.popitem(last=False)
 
@@ -261,10 +261,10 @@ class LampRig:
 
 def _pose(name: str, values: Mapping[str, Any]) -> Pose:
     """Return the pose of a light that a client asks for. Raises PaintError for no pose."""
-    known = {"position", "target", "cutoff", "beam"}
-    if unknown := [key for key in values if key not in known]:
+    keys = {"position", "target", "cutoff", "beam"}
+    if unknown := [key for key in values if key not in keys]:
         raise PaintError(
-            f"{name}: a pose has no {unknown[0]!r}: expected {', '.join(sorted(known))}"
+            f"{name}: a pose has no {unknown[0]!r}: expected {', '.join(sorted(keys))}"
         )
     try:
         return Pose(**values)

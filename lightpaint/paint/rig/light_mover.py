@@ -179,15 +179,15 @@ class LightMover:
                 is_moved = name in session.requests.poses
                 plane = view.basis.planes.plane(k)
                 make: Callable[[], Picture] = partial(as_halves, plane, scale)
-                kept = clean[view.view] if clean is not None else None
-                if not is_moved and kept is not None:
-                    make = partial(_kept_halves, kept, k)
+                clean_planes = clean[view.view] if clean is not None else None
+                if not is_moved and clean_planes is not None:
+                    make = partial(_kept_halves, clean_planes, k)
                 makers: dict[str, Callable[[], Picture]] = {
                     f"clean/{k}": make,
                     f"plane/{k}": partial(as_halves, plane, scale),
                 }
                 if not is_dragged:
-                    shown = plane if is_moved or kept is None else kept.plane(k)
+                    shown = plane if is_moved or clean_planes is None else clean_planes.plane(k)
                     makers[f"thumb/{k}"] = partial(plane_thumbnail, shown, view.basis.emitters_seen)
                 for plain, maker in makers.items():
                     full = name_in_view(plain, view.view)

@@ -73,8 +73,8 @@ class LightPlacer:
         """
         freedoms = {}
         for light in snapshot.bases[0].lights:
-            held = any(key in snapshot.requests.lights.get(light.name, {}) for key in HOLD_KEYS)
-            if held or self._rig.why_not(light.name):
+            is_held = any(key in snapshot.requests.lights.get(light.name, {}) for key in HOLD_KEYS)
+            if is_held or self._rig.why_not(light.name):
                 continue
             site = self._rig.site(light.name, snapshot.requests.poses.get(light.name, {}))
             freedoms[light.name] = self._rig.freedoms.get(light.name) or Freedom(
@@ -112,8 +112,10 @@ class LightPlacer:
                 return
             for message in self._host.handle(MoveLights(poses), {}):
                 self._host.publish(message)
-        said = "; ".join(str(move) for move in placement.moves)
-        self._host.publish(PlacingResult(text=said[0].upper() + said[1:] + ".", names=tuple(poses)))
+        summary = "; ".join(str(move) for move in placement.moves)
+        self._host.publish(
+            PlacingResult(text=summary[0].upper() + summary[1:] + ".", names=tuple(poses))
+        )
 
     def _searched(self, check: Callable[[], None]) -> tuple[SessionSnapshot, Placement]:
         """Return the paintings that the search is for, and what it found."""
@@ -143,9 +145,9 @@ class LightPlacer:
 def pose_values(move: Move, before: Mapping[str, Any]) -> dict[str, Any]:
     """Return the pose of a light after a move, as JSON has it. before: its pose until then."""
     pose: Pose = move.pose
-    made = dict(before)
+    values = dict(before)
     for key in ("position", "target", "cutoff", "beam"):
         value = getattr(pose, key)
         if value is not None:
-            made[key] = [float(f"{x:.6g}") for x in value] if isinstance(value, tuple) else value
-    return made
+            values[key] = [float(f"{x:.6g}") for x in value] if isinstance(value, tuple) else value
+    return values

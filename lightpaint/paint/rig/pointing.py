@@ -73,12 +73,12 @@ def _hung(
         return {"target": _listed(-way)}
     distance = float(np.linalg.norm(np.array(site.position) - lit))
     before = float(np.linalg.norm(start - lit))
-    wanted = max(distance - before, BEYOND_EDGE * distance)
+    distance_needed = max(distance - before, BEYOND_EDGE * distance)
     nudge = 1e-3 * max(distance, before)
     room = BEFORE_WALL * free_length(start + nudge * way, way)
     if room < LEAST_ROOM * distance:
         raise PaintError(f"there is no room for {name} on that line: choose another place")
-    place = start + min(wanted, room) * way
+    place = start + min(distance_needed, room) * way
     pose: Pose = {"position": _listed(place)}
     if site.direction is not None:
         pose["target"] = _listed(lit)

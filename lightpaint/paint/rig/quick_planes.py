@@ -55,10 +55,10 @@ class QuickPlanes:
 
     def plane(self, site: Site) -> npt.NDArray[np.float32]:
         """Return the image of a light at unit intensity, (h, w, 3) linear Rec.709."""
-        made = self._direct.direct_images([site])[0]
+        plane_image = self._direct.direct_images([site])[0]
         indirect = self._indirect.indirect_images([site])[0].reshape(-1, 3)
-        made += self._spread(indirect / self._cell_albedo) * self._albedo
-        return np.asarray(made.reshape(*self.size, 3), np.float32)
+        plane_image += self._spread(indirect / self._cell_albedo) * self._albedo
+        return np.asarray(plane_image.reshape(*self.size, 3), np.float32)
 
 
 def _sampled(features: Features, size: tuple[int, int]) -> Features:
@@ -102,10 +102,10 @@ class _Spreading:
 
     def __call__(self, light: Floats) -> npt.NDArray[np.float32]:
         """Return light of cells, (cells, 3), in pixels, (pixels, 3)."""
-        made = np.zeros((self.cells.shape[1], 3), np.float32)
+        spread = np.zeros((self.cells.shape[1], 3), np.float32)
         for cells, weights in zip(self.cells, self.weights, strict=True):
-            made += np.take(light, cells, axis=0) * weights
-        return made
+            spread += np.take(light, cells, axis=0) * weights
+        return spread
 
 
 def _between(count: int, cells: int) -> tuple[Sequence[npt.NDArray[np.intp]], Sequence[Floats]]:
@@ -113,8 +113,8 @@ def _between(count: int, cells: int) -> tuple[Sequence[npt.NDArray[np.intp]], Se
     at = (np.arange(count) + 0.5) * cells / count - 0.5
     first = np.floor(at).astype(np.intp)
     share = at - first
-    both = [np.clip(first + k, 0, cells - 1) for k in range(2)]
-    return both, [1 - share, share]
+    neighbours = [np.clip(first + k, 0, cells - 1) for k in range(2)]
+    return neighbours, [1 - share, share]
 
 
 def _spacing(position: Floats) -> float:

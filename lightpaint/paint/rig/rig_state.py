@@ -57,8 +57,8 @@ def _rail(rig: LampRig, name: str, site: Site) -> tuple[Place, Place] | None:
     freedom = rig.freedoms.get(name)
     if freedom is None or not freedom.all_rails or site.position is None:
         return None
-    here = np.array(site.position)
-    return min(freedom.all_rails, key=lambda rail: _distance_to(here, rail))
+    position = np.array(site.position)
+    return min(freedom.all_rails, key=lambda rail: _distance_to(position, rail))
 
 
 def _target(rig: LampRig, site: Site) -> Doubles | None:

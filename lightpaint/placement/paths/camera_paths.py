@@ -69,28 +69,28 @@ def later_vertices_of(
     import mitsuba as mi
 
     side = max(1, math.isqrt(paths))
-    kept = []
+    vertices = []
     for _ in range(max(1, round(paths / side**2))):
         rays, weight, pixels = _camera_rays(camera, size, side, rng)
         weight *= side**2 / paths
         for depth in range(longest):
-            its = _compressed(loaded.ray_intersect(rays), weight, pixels)
-            if not len(its):
+            hits = _compressed(loaded.ray_intersect(rays), weight, pixels)
+            if not len(hits):
                 break
             if depth:
-                kept.append(its)
-            lobe, *direction = _floats(rng.random((3, len(its)), dtype=np.float32))
-            bsdf_sample, bsdf_weight = its.interaction.bsdf().sample(
+                vertices.append(hits)
+            lobe, *direction = _floats(rng.random((3, len(hits)), dtype=np.float32))
+            bsdf_sample, bsdf_weight = hits.interaction.bsdf().sample(
                 mi.BSDFContext(),
-                its.interaction,
+                hits.interaction,
                 lobe,
                 mi.Point2f(*direction),
             )
-            si = its.interaction
-            rays, weight = si.spawn_ray(si.to_world(bsdf_sample.wo)), its.throughput * bsdf_weight
-            pixels = its.pixels
+            si = hits.interaction
+            rays, weight = si.spawn_ray(si.to_world(bsdf_sample.wo)), hits.throughput * bsdf_weight
+            pixels = hits.pixels
             dr.eval(rays, weight)
-    return _joined(kept)
+    return _joined(vertices)
 
 
 def _camera_rays(
@@ -123,13 +123,13 @@ def _compressed(si: Any, weight: Any, pixels: npt.NDArray[np.int64]) -> Vertices
     import drjit as dr
     import mitsuba as mi
 
-    kept = dr.compress(si.is_valid() & (dr.max(weight) > 0))
-    if not dr.width(kept):
+    is_lit = dr.compress(si.is_valid() & (dr.max(weight) > 0))
+    if not dr.width(is_lit):
         return Vertices(si, weight, pixels[:0])
-    si = dr.gather(mi.SurfaceInteraction3f, si, kept)
-    weight = dr.gather(mi.Color3f, weight, kept)
+    si = dr.gather(mi.SurfaceInteraction3f, si, is_lit)
+    weight = dr.gather(mi.Color3f, weight, is_lit)
     dr.eval(si, weight)
-    return Vertices(si, weight, pixels[np.array(kept, dtype=np.int64)])
+    return Vertices(si, weight, pixels[np.array(is_lit, dtype=np.int64)])
 
 
 def _joined(parts: Sequence[Vertices]) -> Vertices | None:
@@ -147,9 +147,9 @@ def _joined(parts: Sequence[Vertices]) -> Vertices | None:
     throughput = dr.zeros(mi.Color3f, len(order))
     start = 0
     for part in parts:
-        here = mi.UInt32(aligned(place[start : start + len(part)], np.uint32))
-        dr.scatter(si, part.interaction, here)
-        dr.scatter(throughput, part.throughput, here)
+        part_places = mi.UInt32(aligned(place[start : start + len(part)], np.uint32))
+        dr.scatter(si, part.interaction, part_places)
+        dr.scatter(throughput, part.throughput, part_places)
         dr.eval(si, throughput)
         start += len(part)
     return Vertices(si, throughput, pixels[order])

@@ -131,10 +131,10 @@ class FrozenPaths:
         sites: of points and spots at intensity 1 W/sr, of panels at radiance 1 W/(m² sr) and,
         without a position, of suns at 1 W/m².
         """
-        made = self.direct_images(sites).reshape(-1, *self.size, 3)
+        images = self.direct_images(sites).reshape(-1, *self.size, 3)
         if self.indirect is not None:
-            made += self.indirect_images(sites)
-        return made
+            images += self.indirect_images(sites)
+        return images
 
     def direct_images(self, sites: Sequence[Site]) -> Floats:
         """Return the images of direct light alone, (k, h · w, 3) float32; see `columns`."""
@@ -142,13 +142,13 @@ class FrozenPaths:
 
     def indirect_images(self, sites: Sequence[Site]) -> Floats:
         """Return the images of indirect light alone, (k, h, w, 3) float32; see `columns`."""
-        made = np.zeros((len(sites), *self.size, 3), np.float32)
+        images = np.zeros((len(sites), *self.size, 3), np.float32)
         if self.indirect is None:
-            return made
-        for image, its in zip(made, self._sums(self.indirect, sites), strict=True):
-            raw = its.reshape(image.shape)
+            return images
+        for image, sums in zip(images, self._sums(self.indirect, sites), strict=True):
+            raw = sums.reshape(image.shape)
             image[...] = raw if self._filter is None else self._filter(raw)
-        return made
+        return images
 
     def contributions(self, vertices: Vertices, site: Site) -> Floats:
         """Return what `site` adds at each vertex, (v, 3); of a spot, as if it shone all around."""
@@ -164,7 +164,7 @@ class FrozenPaths:
 
     def _sums(self, vertices: Vertices, sites: Sequence[Site]) -> Floats:
         """Return the images of what lights add at vertices, (k, h · w, 3)."""
-        made = np.empty((len(sites), self.size[0] * self.size[1], 3), np.float32)
+        sums = np.empty((len(sites), self.size[0] * self.size[1], 3), np.float32)
         origins = [_Origin.of(site) for site in sites]
         # Sites of one origin, like the directions of a spot, share its shadow rays.
         by_origin: dict[_Origin, list[int]] = {}
@@ -173,36 +173,36 @@ class FrozenPaths:
         distinct = [*by_origin]
         at_once = max(1, LANES // max(len(vertices), 1))
         for start in range(0, len(distinct), at_once):
-            here = distinct[start : start + at_once]
-            for origin, shone in zip(here, self._shone(vertices, here), strict=True):
+            batch = distinct[start : start + at_once]
+            for origin, shone in zip(batch, self._shone(vertices, batch), strict=True):
                 for k in by_origin[origin]:
-                    made[k] = self._pixel_sums(vertices, shone.towards(sites[k])).T
-        return made
+                    sums[k] = self._pixel_sums(vertices, shone.towards(sites[k])).T
+        return sums
 
     def _pixel_sums(self, vertices: Vertices, light: Floats) -> Floats:
         """Return sums over the vertices of each pixel, (…, h · w). light: (…, v)."""
         pixels, starts = vertices.first_of_pixel
-        made = np.zeros((*light.shape[:-1], self.size[0] * self.size[1]), np.float32)
+        sums = np.zeros((*light.shape[:-1], self.size[0] * self.size[1]), np.float32)
         if len(pixels):
-            made[..., pixels] = np.add.reduceat(light, starts, axis=-1)
-        return made
+            sums[..., pixels] = np.add.reduceat(light, starts, axis=-1)
+        return sums
 
     def _shone(self, vertices: Vertices, origins: Sequence[_Origin]) -> "list[_Shone]":
         """Return what origins add at vertices; what was asked for lately is kept."""
         number = 0 if vertices is self.direct else 1
-        found = {x: self._kept[number, x] for x in origins if (number, x) in self._kept}
-        missing = [x for x in dict.fromkeys(origins) if x not in found]
+        cached = {x: self._kept[number, x] for x in origins if (number, x) in self._kept}
+        missing = [x for x in dict.fromkeys(origins) if x not in cached]
         if missing:
             light = self._launch(vertices, np.stack([x.row for x in missing]))
-            for origin, its in zip(missing, light, strict=True):
-                found[origin] = _Shone(its, vertices, origin)
+            for origin, shone in zip(missing, light, strict=True):
+                cached[origin] = _Shone(shone, vertices, origin)
         most = max(2, KEPT_VALUES // (6 * max(len(vertices), 1)))
-        for origin in [*found][-most:]:
-            self._kept[number, origin] = found[origin]
+        for origin in [*cached][-most:]:
+            self._kept[number, origin] = cached[origin]
             self._kept.move_to_end((number, origin))
         while len(self._kept) > 2 * most:
             self._kept.popitem(last=False)
-        return [found[origin] for origin in origins]
+        return [cached[origin] for origin in origins]
 
     def _launch(self, vertices: Vertices, rows: Floats) -> Floats:
         """Return the light of origins at vertices, (k, 3, v). rows: (k, _ROW)."""
@@ -216,8 +216,8 @@ class FrozenPaths:
         with tracing():
             u, v = (mi.Float(aligned(x, np.float32)) for x in (2 * (start % 1) - 1).T)
             table = mi.Float(np.ascontiguousarray(rows, np.float32).ravel())
-            made = dr.zeros(mi.Float, 3 * count * lights)
-            dr.make_opaque(made, table, u, v)
+            sums = dr.zeros(mi.Float, 3 * count * lights)
+            dr.make_opaque(sums, table, u, v)
             lane, width = dr.arange(mi.UInt32, count), dr.opaque(mi.UInt32, count)
             last = dr.opaque(mi.UInt32, lights)
 
@@ -225,11 +225,11 @@ class FrozenPaths:
                 row = [dr.gather(mi.Float, table, light * _ROW + k) for k in range(_ROW)]
                 added = _added(self._scene, vertices, row, (u, v))
                 for channel in range(3):
-                    dr.scatter(made, added[channel], (light * 3 + channel) * width + lane)
+                    dr.scatter(sums, added[channel], (light * 3 + channel) * width + lane)
                 return (light + 1,)
 
             dr.while_loop((mi.UInt32(0),), lambda light: light < last, add)
-            values: Floats = np.array(made, dtype=np.float32).reshape(lights, 3, count)
+            values: Floats = np.array(sums, dtype=np.float32).reshape(lights, 3, count)
         return values
 
 

@@ -34,14 +34,18 @@ class ViewPaths:
 
     def columns(self, sites: Sequence[Site]) -> Floats:
         """Return the images of lights at unit emission, (k, p, 3), p being all pixels."""
-        made = [part.columns(sites) for part in self.parts]
-        return np.concatenate([x.reshape(len(x), math.prod(x.shape[1:3]), 3) for x in made], axis=1)
+        images = [part.columns(sites) for part in self.parts]
+        return np.concatenate(
+            [x.reshape(len(x), math.prod(x.shape[1:3]), 3) for x in images], axis=1
+        )
 
     def indices(self) -> Indices:
         """Return the index among all pixels of the pixel of each first hit, (v,)."""
         starts = np.cumsum([0, *(part.size[0] * part.size[1] for part in self.parts)])
-        its = [part.direct.pixels + start for part, start in zip(self.parts, starts, strict=False)]
-        return np.concatenate(its)
+        pixels = [
+            part.direct.pixels + start for part, start in zip(self.parts, starts, strict=False)
+        ]
+        return np.concatenate(pixels)
 
     @cached_property
     def points(self) -> Floats:
@@ -107,7 +111,7 @@ class SearchPaths:
 
     def _made(self, k: int) -> ViewPaths:
         first_hits, bounces = SAMPLES[k]
-        made = []
+        view_paths = []
         for j, (view, features) in enumerate(zip(self._views, self._features, strict=True)):
             paths = FrozenPaths(
                 view,
@@ -116,5 +120,5 @@ class SearchPaths:
                 bounces=bounces,
                 seed=pass_seed(self._seed, Stream.FROZEN_PATHS, k + len(SAMPLES) * j),
             )
-            made.append(paths.filtered_along(features))
-        return ViewPaths(made)
+            view_paths.append(paths.filtered_along(features))
+        return ViewPaths(view_paths)

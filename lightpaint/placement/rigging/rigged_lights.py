@@ -48,8 +48,8 @@ def rigged_lights(rigging: Rigging, scene: Scene) -> RiggedLights:
         table, where = rigging.new[next(k for k, x in enumerate(new) if x is light.group)]
         if constraint := constraint_of(table):
             tables[light.name] = (constraint, where)
-    asked = tuple((name, table, where) for name, (table, where) in tables.items())
-    return RiggedLights(freedoms, tuple(new), tuple(pairs), Constraints(asked))
+    requests = tuple((name, table, where) for name, (table, where) in tables.items())
+    return RiggedLights(freedoms, tuple(new), tuple(pairs), Constraints(requests))
 
 
 def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
@@ -102,10 +102,10 @@ def _freedom(
     move = table.get("move", {})
     move = move if isinstance(move, Mapping) else {"within": move}
     places: dict[str, Any] = {}
-    if "along" in move and (here := light.members[0].site.position) is not None:
+    if "along" in move and (position := light.members[0].site.position) is not None:
         way = np.array(move["along"], dtype=float)
         way *= move["within"] / np.linalg.norm(way)
-        places["line"] = (as_position(here - way), as_position(here + way))
+        places["line"] = (as_position(position - way), as_position(position + way))
     elif "within" in move:
         places["within"] = move["within"]
     if "box" in move:
@@ -170,12 +170,12 @@ def _places_on(names: Any, scene: Scene, rigging: Rigging, where: str) -> dict[s
             continue
         clear += [table["clear"]] if table.get("clear") else []
         for shape in names_of(table["shapes"], where):
-            found = [x for x in dict.fromkeys(scene.shape_names) if fnmatchcase(x, shape)]
-            if not found:
+            shapes = [x for x in dict.fromkeys(scene.shape_names) if fnmatchcase(x, shape)]
+            if not shapes:
                 kind = "shape" if name in tables else "rail, surface or shape"
-                there = some_names([*tables, *dict.fromkeys(scene.shape_names)])
-                raise ConstraintError(f"{where}: no {kind} {shape!r}; there are {there}")
-            surfaces += found
+                existing = some_names([*tables, *dict.fromkeys(scene.shape_names)])
+                raise ConstraintError(f"{where}: no {kind} {shape!r}; there are {existing}")
+            surfaces += shapes
     places: dict[str, Any] = {"rails": tuple(rails)} if rails else {}
     if surfaces:
         places["surfaces"] = tuple(dict.fromkeys(surfaces))

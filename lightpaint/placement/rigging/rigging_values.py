@@ -141,11 +141,11 @@ def _check_places(value: Any, where: str) -> None:
     if not isinstance(value, Mapping):
         raise _wrong(where, value, "a distance, like 1.0, or a table, { within = 1.0 }")
     check_keys(value, PLACE_KEYS, where)
-    given = [key for key in PLACE_KEYS if key in value]
-    if given not in (["within"], ["box"], ["on"], ["within", "along"]):
+    given_keys = [key for key in PLACE_KEYS if key in value]
+    if given_keys not in (["within"], ["box"], ["on"], ["within", "along"]):
         raise ConstraintError(
-            f"{where} has {' and '.join(given) or 'nothing'}: expected one of within, box, on, or "
-            "along and within"
+            f"{where} has {' and '.join(given_keys) or 'nothing'}: expected one of within, box, "
+            "on, along and within"
         )
     if "within" in value and not (_is_number(value["within"]) and 0 < value["within"] <= FARTHEST):
         raise _wrong(f"{where}.within", value["within"], "a distance > 0, like 1.0")

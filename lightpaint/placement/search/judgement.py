@@ -67,11 +67,11 @@ class PlacementJudge:
     def __init__(self, fit: PlacementFit, steps: PoseSteps, paths: SearchPaths) -> None:
         self._fit, self._steps, self._paths = fit, steps, paths
 
-    def judged(self, start: Arrangement, found: Arrangement) -> Found:
-        """Return what is worth it of `found`, whose first movables are those of `start`."""
-        movables, there = found.movables, len(start.movables)
+    def judged(self, start: Arrangement, best: Arrangement) -> Found:
+        """Return what is worth it of `best`, whose first movables are those of `start`."""
+        movables, count_before = best.movables, len(start.movables)
         alternatives = [
-            self._changes(start, found, at) for at in (self._paths.refine, self._paths.judge)
+            self._changes(start, best, at) for at in (self._paths.refine, self._paths.judge)
         ]
 
         def missed(changed: Bools) -> Doubles:
@@ -81,15 +81,17 @@ class PlacementJudge:
             """
             columns = []
             for old, new in alternatives:
-                its = self._fit.columns.copy()
+                changed_columns = self._fit.columns.copy()
                 for k, movable in enumerate(movables):
                     for column in movable.columns:
-                        its[column] = new[column] if changed[k] else old.get(column, 0)
-                columns.append(its)
+                        changed_columns[column] = new[column] if changed[k] else old.get(column, 0)
+                columns.append(changed_columns)
             weights = self._fit.fitted(columns[0]).weights
-            return np.stack([self._fit.missed_map(its, weights) for its in columns])
+            return np.stack(
+                [self._fit.missed_map(changed_columns, weights) for changed_columns in columns]
+            )
 
-        moved = [k >= there or x != start.sites[k] for k, x in enumerate(found.sites)]
+        moved = [k >= count_before or x != start.sites[k] for k, x in enumerate(best.sites)]
         changed = np.array(moved, dtype=bool)
         before = missed(np.zeros(len(movables), dtype=bool))
         total, gains = float(before[1].sum()), np.zeros(len(movables))
@@ -108,69 +110,69 @@ class PlacementJudge:
             after = missed(changed)
         norm2 = self._fit.norm2 or 1.0
         return Found(
-            self._kept(start, found, changed),
-            tuple(gains[(np.arange(len(movables)) < there) | changed].tolist()),
+            self._with_changes(start, best, changed),
+            tuple(gains[(np.arange(len(movables)) < count_before) | changed].tolist()),
             total / norm2,
             float(after[1].sum()) / norm2,
         )
 
-    def errors(self, found: Arrangement) -> list[PoseError]:
+    def errors(self, best: Arrangement) -> list[PoseError]:
         """Return how far each pose differs between fits along independent paths."""
-        fits = [found.sites]
+        fits = [best.sites]
         for at in (self._paths.judge, self._paths.spread):
-            start = self._steps.refitted(found, at)
-            its = self._steps.descend(start, at, REFIT_STEPS, first_share=REFIT_SHARE)
-            fits.append(its.sites)
+            start = self._steps.refitted(best, at)
+            refit = self._steps.descend(start, at, REFIT_STEPS, first_share=REFIT_SHARE)
+            fits.append(refit.sites)
         return [
-            _error([sites[k] for sites in fits], found.movables[k].light.freedom.slides)
-            for k in range(len(found.movables))
+            _error([sites[k] for sites in fits], best.movables[k].light.freedom.slides)
+            for k in range(len(best.movables))
         ]
 
-    def growth(self, found: Arrangement, order: Sequence[int]) -> list[Growth]:
+    def growth(self, best: Arrangement, order: Sequence[int]) -> list[Growth]:
         """Return the best lighting with none of the new lights, with the first, and so on.
 
         order: of these movables.
         """
         paths = (self._paths.refine, self._paths.judge)
         columns = [
-            by_column(found.movables, at.columns(all_sites(found.movables, found.sites)))
+            by_column(best.movables, at.columns(all_sites(best.movables, best.sites)))
             for at in paths
         ]
-        made = []
+        stages = []
         for count in range(len(order) + 1):
-            left_out = {c for k in order[count:] for c in found.movables[k].columns}
+            left_out = {c for k in order[count:] for c in best.movables[k].columns}
             fitted, judged = (
-                self._fit.replaced({c: x * (c not in left_out) for c, x in its.items()})
-                for its in columns
+                self._fit.replaced({c: x * (c not in left_out) for c, x in stage_columns.items()})
+                for stage_columns in columns
             )
             weights = self._fit.fitted(fitted).weights
             missed = float(self._fit.missed_map(judged, weights).sum())
             picture = self._fit.picture(fitted, weights)[:, :3].astype(np.float32)
-            made.append(Growth(missed / (self._fit.norm2 or 1.0), picture))
-        return made
+            stages.append(Growth(missed / (self._fit.norm2 or 1.0), picture))
+        return stages
 
     def _changes(
-        self, start: Arrangement, found: Arrangement, at: ViewPaths
+        self, start: Arrangement, best: Arrangement, at: ViewPaths
     ) -> tuple[dict[int, Floats], dict[int, Floats]]:
         """Return columns before and after, by their indices."""
-        made = []
-        for its in (start, found):
-            columns = at.columns(all_sites(its.movables, its.sites))
-            made.append(dict(by_column(its.movables, columns)))
-        return made[0], made[1]
+        changes = []
+        for arrangement in (start, best):
+            columns = at.columns(all_sites(arrangement.movables, arrangement.sites))
+            changes.append(dict(by_column(arrangement.movables, columns)))
+        return changes[0], changes[1]
 
-    def _kept(self, start: Arrangement, found: Arrangement, changed: Bools) -> Arrangement:
-        """Return `found` without what has not changed."""
-        kept, sites = [], []
-        for k, (movable, site) in enumerate(zip(found.movables, found.sites, strict=True)):
+    def _with_changes(self, start: Arrangement, best: Arrangement, changed: Bools) -> Arrangement:
+        """Return `best` without what has not changed."""
+        movables, sites = [], []
+        for k, (movable, site) in enumerate(zip(best.movables, best.sites, strict=True)):
             if changed[k]:
-                kept.append(movable)
+                movables.append(movable)
                 sites.append(site)
             elif k < len(start.movables):
-                kept.append(movable)
+                movables.append(movable)
                 sites.append(start.sites[k])
-        fitted = self._steps.fitted(kept, sites, self._paths.refine)
-        return Arrangement(tuple(kept), tuple(sites), fitted)
+        fitted = self._steps.fitted(movables, sites, self._paths.refine)
+        return Arrangement(tuple(movables), tuple(sites), fitted)
 
 
 def _error(sites: Sequence[Site], slides: bool) -> PoseError:

@@ -55,38 +55,40 @@ class NewLightSearch:
 
     def run(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
         """Return an arrangement with the new lights that are worth it."""
-        found = start
-        while self._free and found.missed > NOTHING * self._fit.norm2:
-            more = self._with_one_more(found)
+        arrangement = start
+        while self._free and arrangement.missed > NOTHING * self._fit.norm2:
+            more = self._with_one_more(arrangement)
             progress()
-            if more is None or not self._is_worth(found, more):
+            if more is None or not self._is_worth(arrangement, more):
                 break
             added = more.movables[-1]
             self._free = [slot for slot in self._free if slot.columns != added.columns]
-            found = self._steps.descend(more, self._paths.compare, STEPS, first_share=0.5)
-            found = self._without_off(found)
-        return self._merged(self._tried_again(found))
+            arrangement = self._steps.descend(more, self._paths.compare, STEPS, first_share=0.5)
+            arrangement = self._without_off(arrangement)
+        return self._merged(self._tried_again(arrangement))
 
-    def _tried_again(self, found: Arrangement) -> Arrangement:
+    def _tried_again(self, arrangement: Arrangement) -> Arrangement:
         """Return the arrangement after each new light was tried elsewhere, beside the others."""
-        for k, movable in enumerate(found.movables):
-            if movable.group is None or found.missed <= NOTHING * self._fit.norm2:
+        for k, movable in enumerate(arrangement.movables):
+            if movable.group is None or arrangement.missed <= NOTHING * self._fit.norm2:
                 continue
-            better = self._search.tried(found, k)
-            if better.missed < (1 - WORTH_AGAIN) * found.missed:
-                found = self._steps.descend(better, self._paths.compare, STEPS, first_share=0.5)
-        return found
+            better = self._search.tried(arrangement, k)
+            if better.missed < (1 - WORTH_AGAIN) * arrangement.missed:
+                arrangement = self._steps.descend(
+                    better, self._paths.compare, STEPS, first_share=0.5
+                )
+        return arrangement
 
-    def _with_one_more(self, found: Arrangement) -> Arrangement | None:
+    def _with_one_more(self, arrangement: Arrangement) -> Arrangement | None:
         """Return the arrangement with the best light added, the others where they are."""
         kinds: list[Movable] = []
         for slot in self._free:
             if all(slot.group is not kind.group for kind in kinds):
                 kinds.append(slot)
         best: Arrangement | None = None
-        for j, its in self._search.candidates(found, kinds).items():
-            for site, fitted in its:
-                more = found.with_movable(kinds[j], site, fitted)
+        for j, candidates in self._search.candidates(arrangement, kinds).items():
+            for site, fitted in candidates:
+                more = arrangement.with_movable(kinds[j], site, fitted)
                 last = len(more.movables) - 1
                 more = self._steps.descend(more, self._paths.compare, SHORT_STEPS, moving=[last])
                 if best is None or more.missed < best.missed:
@@ -98,9 +100,9 @@ class NewLightSearch:
         if after.missed >= before.missed:
             return False
         maps = []
-        for its in (before, after):
-            judged = self._steps.fitted(its.movables, its.sites, self._paths.judge)
-            fitted = its.fitted
+        for candidate in (before, after):
+            judged = self._steps.fitted(candidate.movables, candidate.sites, self._paths.judge)
+            fitted = candidate.fitted
             maps.append(
                 [
                     self._fit.missed_map(columns, fitted.weights)
@@ -119,78 +121,82 @@ class NewLightSearch:
         least = max(least, BY_CHANCE * float(usual.mean()))
         return float(gain[1].sum() - gain[1].max()) >= least
 
-    def _without_off(self, found: Arrangement) -> Arrangement:
+    def _without_off(self, arrangement: Arrangement) -> Arrangement:
         """Return the arrangement without new lights that are off, whose slots are free again."""
-        weights = found.fitted.weights
-        for k in reversed(range(len(found.movables))):
-            movable = found.movables[k]
-            its = weights[list(movable.columns)]
-            if movable.group is not None and its.max() <= OFF * weights.max():
+        weights = arrangement.fitted.weights
+        for k in reversed(range(len(arrangement.movables))):
+            movable = arrangement.movables[k]
+            light_weights = weights[list(movable.columns)]
+            if movable.group is not None and light_weights.max() <= OFF * weights.max():
                 self._free.insert(0, movable)
-                found = found.without(k, self._fit.fitted(self._blackened(found, k)))
-        return found
+                arrangement = arrangement.without(
+                    k, self._fit.fitted(self._blackened(arrangement, k))
+                )
+        return arrangement
 
-    def _blackened(self, found: Arrangement, k: int) -> Floats:
-        columns = found.fitted.columns.copy()
-        columns[list(found.movables[k].columns)] = 0
+    def _blackened(self, arrangement: Arrangement, k: int) -> Floats:
+        columns = arrangement.fitted.columns.copy()
+        columns[list(arrangement.movables[k].columns)] = 0
         return columns
 
-    def _merged(self, found: Arrangement) -> Arrangement:
+    def _merged(self, arrangement: Arrangement) -> Arrangement:
         """Return the arrangement with lights that stand for one light made one."""
-        while (pair := self._nearest_pair(found)) is not None:
-            one, other = pair
-            merged = self._one_for_two(found, one, other)
-            if merged.missed > (1 + MERGED_RISE) * found.missed + NOTHING * self._fit.norm2:
+        while (pair := self._nearest_pair(arrangement)) is not None:
+            first, second = pair
+            merged = self._one_for_two(arrangement, first, second)
+            if merged.missed > (1 + MERGED_RISE) * arrangement.missed + NOTHING * self._fit.norm2:
                 break
-            self._free.insert(0, found.movables[other])
-            found = merged
-        return found
+            self._free.insert(0, arrangement.movables[second])
+            arrangement = merged
+        return arrangement
 
-    def _one_for_two(self, found: Arrangement, one: int, other: int) -> Arrangement:
-        level = found.fitted.weights.mean(axis=1)
-        a, b = (max(float(level[found.movables[k].columns[0]]), 1e-300) for k in (one, other))
-        site = _between(found.sites[one], found.sites[other], b / (a + b))
-        movable = found.movables[one]
-        sites = list(found.sites)
-        sites[one] = movable.light.permitted(site)
-        movables = [m for k, m in enumerate(found.movables) if k != other]
-        del sites[other]
+    def _one_for_two(self, arrangement: Arrangement, first: int, second: int) -> Arrangement:
+        level = arrangement.fitted.weights.mean(axis=1)
+        a, b = (
+            max(float(level[arrangement.movables[k].columns[0]]), 1e-300) for k in (first, second)
+        )
+        site = _between(arrangement.sites[first], arrangement.sites[second], b / (a + b))
+        movable = arrangement.movables[first]
+        sites = list(arrangement.sites)
+        sites[first] = movable.light.permitted(site)
+        movables = [m for k, m in enumerate(arrangement.movables) if k != second]
+        del sites[second]
         fitted = self._steps.fitted(movables, sites, self._paths.compare)
-        made = Arrangement(tuple(movables), tuple(sites), fitted)
-        return self._steps.descend(made, self._paths.compare, STEPS, first_share=0.5)
+        joined = Arrangement(tuple(movables), tuple(sites), fitted)
+        return self._steps.descend(joined, self._paths.compare, STEPS, first_share=0.5)
 
-    def _nearest_pair(self, found: Arrangement) -> tuple[int, int] | None:
+    def _nearest_pair(self, arrangement: Arrangement) -> tuple[int, int] | None:
         """Return the nearest two new lights of one group that may be one, or None."""
         best, nearest = None, MERGED_DISTANCE * self._search.spread
-        for k, movable in enumerate(found.movables):
+        for k, movable in enumerate(arrangement.movables):
             for j in range(k):
-                if movable.group is None or movable.group is not found.movables[j].group:
+                if movable.group is None or movable.group is not arrangement.movables[j].group:
                     continue
-                places = [np.array(found.sites[i].position, dtype=float) for i in (k, j)]
+                places = [np.array(arrangement.sites[i].position, dtype=float) for i in (k, j)]
                 away = float(np.linalg.norm(places[0] - places[1]))
                 if away < nearest:
                     best, nearest = (j, k), away
         return best
 
 
-def _between(one: Site, other: Site, share: float) -> Site:
+def _between(first: Site, second: Site, share: float) -> Site:
     """Return the pose between two. share: of the other."""
 
     def mixed(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:
         x, y, z = ((1 - share) * p + share * q for p, q in zip(a, b, strict=True))
         return x, y, z
 
-    assert one.position is not None
-    assert other.position is not None
-    made = replace(one, position=mixed(one.position, other.position))
-    if one.direction is None or other.direction is None:
-        return made
-    way = np.array(mixed(one.direction, other.direction))
+    assert first.position is not None
+    assert second.position is not None
+    site = replace(first, position=mixed(first.position, second.position))
+    if first.direction is None or second.direction is None:
+        return site
+    way = np.array(mixed(first.direction, second.direction))
     length = float(np.linalg.norm(way))
     if length < 1e-6:
-        return made
+        return site
     x, y, z = (way / length).tolist()
-    return replace(made, direction=(x, y, z))
+    return replace(site, direction=(x, y, z))
 
 
 def standard_error(differences: Doubles) -> float:

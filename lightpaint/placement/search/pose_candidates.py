@@ -34,11 +34,11 @@ class PoseCandidates:
         self._paths = paths
         # Half of the first hits are enough to rank by.
         self._points = np.ascontiguousarray(paths.points[::THINNING])
-        its = ranking.at(paths.indices()[::THINNING])
-        self._ranking, self._root = its, its.root.astype(np.float32)
+        thinned = ranking.at(paths.indices()[::THINNING])
+        self._ranking, self._root = thinned, thinned.root.astype(np.float32)
         # For each channel: residual and columns of others, weighed twice, (1 + others, v).
         self._weighed = [
-            np.concatenate([its.residual[None, :, c], its.others[c]]).astype(np.float32)
+            np.concatenate([thinned.residual[None, :, c], thinned.others[c]]).astype(np.float32)
             * self._root[:, c]
             for c in range(self._root.shape[1])
         ]
@@ -52,22 +52,22 @@ class PoseCandidates:
             yield from self._suns(light)
             return
         for place in places:
-            here = replace(light.site, position=as_position(place))
-            added = self._paths.contributions(Site(here.position))[::THINNING]
+            at_place = replace(light.site, position=as_position(place))
+            added = self._paths.contributions(Site(at_place.position))[::THINNING]
             if light.site.direction is None:
-                yield self._gains(added, None), partial(_aimed, here, None)
+                yield self._gains(added, None), partial(_aimed, at_place, None)
                 continue
             cosine = directions.astype(np.float32) @ away_from(place, self._points).T
-            if isinstance(here, PanelSite):
+            if isinstance(at_place, PanelSite):
                 # Seen from afar a panel is a point whose light falls with the cosine.
-                gains = self._gains(added * here.side**2, np.maximum(cosine, 0))
-                yield gains, partial(_aimed, here, directions)
+                gains = self._gains(added * at_place.side**2, np.maximum(cosine, 0))
+                yield gains, partial(_aimed, at_place, directions)
                 continue
             for cutoff, beam in cones:
                 # Linear in the cosine instead of the angle, which ranks as well.
                 edge, full = (math.cos(math.radians(angle)) for angle in (cutoff, beam))
                 share = (cosine - np.float32(edge)) * np.float32(1 / max(full - edge, 1e-6))
-                opened = replace(here, cutoff=cutoff, beam=beam)
+                opened = replace(at_place, cutoff=cutoff, beam=beam)
                 gains = self._gains(added, np.clip(share, 0, 1, out=share))
                 yield gains, partial(_aimed, opened, directions)
 
@@ -79,7 +79,7 @@ class PoseCandidates:
 
     def _gains(self, added: Floats, shares: Floats | None) -> Doubles:
         """Return gains of what is added at first hits, (v, 3), by shares of it, (k, v)."""
-        inner = [its * added[:, c % 3] for c, its in enumerate(self._weighed)]
+        inner = [block * added[:, c % 3] for c, block in enumerate(self._weighed)]
         power = np.square(np.tile(added, (1, len(inner) // 3)) * self._root)
         if shares is None:
             products, squares = np.concatenate(inner).sum(axis=1)[None], power.sum(axis=0)[None]
@@ -89,9 +89,9 @@ class PoseCandidates:
                 squares = np.square(shares) @ power
         gains, start = np.zeros(len(products)), 0
         for c in range(len(inner)):
-            its = products[:, start : start + len(inner[c])]
+            block = products[:, start : start + len(inner[c])]
             start += len(inner[c])
-            gains += self._ranking.gain(c, its[:, 0], its[:, 1:], squares[:, c])
+            gains += self._ranking.gain(c, block[:, 0], block[:, 1:], squares[:, c])
         return gains
 
 
@@ -101,14 +101,14 @@ def _aimed(site: Site, directions: Floats | None, k: int) -> Site:
 
 
 def best_poses(
-    found: Iterator[tuple[Doubles, Callable[[int], Site]]], count: int
+    batches: Iterator[tuple[Doubles, Callable[[int], Site]]], count: int
 ) -> list[tuple[float, Site]]:
     """Return the `count` poses with the largest gains, the best first."""
     best: list[tuple[float, Callable[[int], Site], int]] = []
-    for gains, make in found:
+    for gains, make in batches:
         order = np.argsort(-gains)[:count]
         best += [(float(gains[k]), make, int(k)) for k in order if gains[k] > 0]
         if len(best) > 4 * count:
-            best = sorted(best, key=lambda its: -its[0])[:count]
-    ordered = sorted(best, key=lambda its: -its[0])[:count]
+            best = sorted(best, key=lambda pose: -pose[0])[:count]
+    ordered = sorted(best, key=lambda pose: -pose[0])[:count]
     return [(gain, make(k)) for gain, make, k in ordered]

@@ -42,10 +42,10 @@ class PoseRules:
         """Return which places, (k,), are free, see the picture and are seen as the light may be."""
         clear = movable.light.freedom.clear
         # What hangs on a surface is as near to it as was asked for.
-        its = self._paths.usable(places, None if clear is None else 0.9 * clear)
+        is_usable = self._paths.usable(places, None if clear is None else 0.9 * clear)
         if movable.group is not None and not movable.group.in_view:
-            its &= ~self._paths.in_view(places)
-        return its
+            is_usable &= ~self._paths.in_view(places)
+        return is_usable
 
     def keep_apart(
         self,
@@ -55,11 +55,11 @@ class PoseRules:
         places: Floats,
     ) -> Bools:
         """Return which places, (k,), are far enough from the other new lights of its group."""
-        kept = np.ones(len(places), dtype=bool)
+        is_apart = np.ones(len(places), dtype=bool)
         if movable.group is None or not movable.group.apart:
-            return kept
+            return is_apart
         for other, site in zip(movables, sites, strict=True):
             if other.group == movable.group and site.position is not None:
                 away = np.linalg.norm(places - np.array(site.position), axis=1)
-                kept &= away >= movable.group.apart
-        return kept
+                is_apart &= away >= movable.group.apart
+        return is_apart

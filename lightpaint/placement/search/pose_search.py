@@ -60,15 +60,15 @@ class PoseSearch:
 
     def by_blocks(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
         """Return an arrangement in which each light was tried all over its freedom."""
-        found = start
+        best = start
         for _ in range(TURNS):
-            before = found.missed
-            for k in range(len(found.movables)):
-                found = self.tried(found, k)
+            before = best.missed
+            for k in range(len(best.movables)):
+                best = self.tried(best, k)
                 progress()
-            if found.missed > (1 - WORTH_A_TURN) * before:
+            if best.missed > (1 - WORTH_A_TURN) * before:
                 break
-        return found
+        return best
 
     def tried(self, start: Arrangement, k: int) -> Arrangement:
         """Return the arrangement with the best pose of movable `k`, the others where they are."""
@@ -80,7 +80,7 @@ class PoseSearch:
             moved = self.steps.descend(
                 start.with_site(k, site, fitted), self.paths.compare, SHORT_STEPS, moving=[k]
             )
-            best = min(best, moved, key=lambda its: its.missed)
+            best = min(best, moved, key=lambda trial: trial.missed)
         return best if best.missed < (1 - KEPT_GAIN) * start.missed else start
 
     def candidates(
@@ -95,26 +95,26 @@ class PoseSearch:
         poses: list[tuple[float, Site, int]] = []
         for j, movable in enumerate(movables):
             places = self._places(others, movable)
-            found = best_poses(direct.gains(movable.light, places), COMPARED)
+            ranked = best_poses(direct.gains(movable.light, places), COMPARED)
             if len(places) > 1:
-                beside = self._places_beside(others, movable, places, found)
+                beside = self._places_beside(others, movable, places, ranked)
                 nearer = best_poses(direct.gains(movable.light, beside), COMPARED // 2)
                 # Some of both: direct light makes much of places that are close to one hit.
-                found = [*found[: COMPARED - len(nearer)], *nearer]
-            poses += [(gain, site, j) for gain, site in found]
-        poses = sorted(poses, key=lambda its: -its[0])[:COMPARED]
+                ranked = [*ranked[: COMPARED - len(nearer)], *nearer]
+            poses += [(gain, site, j) for gain, site in ranked]
+        poses = sorted(poses, key=lambda pose: -pose[0])[:COMPARED]
         trials: list[tuple[float, Site, int, Fitted]] = []
         for _, site, j in poses:
             fitted = self._fitted_with(others, movables[j], site)
             trials.append((fitted.missed, site, j, fitted))
-        kept: list[tuple[float, Site, int, Fitted]] = []
-        for trial in sorted(trials, key=lambda its: its[0]):
-            if all(self._differ(trial[1], other) for _, other, _, _ in kept):
-                kept.append(trial)
-        made: dict[int, list[tuple[Site, Fitted]]] = {}
-        for _, site, j, fitted in kept[:REFINED]:
-            made.setdefault(j, []).append((site, fitted))
-        return made
+        chosen: list[tuple[float, Site, int, Fitted]] = []
+        for trial in sorted(trials, key=lambda trial: trial[0]):
+            if all(self._differ(trial[1], other) for _, other, _, _ in chosen):
+                chosen.append(trial)
+        fits: dict[int, list[tuple[Site, Fitted]]] = {}
+        for _, site, j, fitted in chosen[:REFINED]:
+            fits.setdefault(j, []).append((site, fitted))
+        return fits
 
     def _fitted_with(self, others: Arrangement, movable: Movable, site: Site) -> Fitted:
         columns = self.paths.compare.columns(all_sites([movable], [site]))
@@ -129,22 +129,22 @@ class PoseSearch:
         if movable.group is not None:
             count = PLACES_OF_NEW
         places = light.some_places(count, self._rng)
-        its = self._is_permitted(others, movable, places)
+        is_permitted = self._is_permitted(others, movable, places)
         if movable.group is None:
-            its[0] = True
-        return places[its]
+            is_permitted[0] = True
+        return places[is_permitted]
 
     def _places_beside(
         self,
         others: Arrangement,
         movable: Movable,
         places: Floats,
-        found: Sequence[tuple[float, Site]],
+        ranked: Sequence[tuple[float, Site]],
     ) -> Floats:
         """Return more places around the best of those that were tried, nearer than the next."""
         assert movable.light.places is not None
         best: list[Floats] = []
-        for _, site in found:
+        for _, site in ranked:
             place = np.array(site.position, dtype=float)
             if all(np.abs(place - other).max() > 0 for other in best) and len(best) < BESIDE:
                 best.append(place)
@@ -155,18 +155,21 @@ class PoseSearch:
             off = self._rng.normal(size=(AROUND, 3))
             off *= radius * self._rng.random((AROUND, 1)) / np.linalg.norm(off, axis=1)[:, None]
             around += [movable.light.places.nearest(place + x) for x in off]
-        made = np.array(around, dtype=float).reshape(-1, 3)
-        return made[self._is_permitted(others, movable, made)]
+        candidates = np.array(around, dtype=float).reshape(-1, 3)
+        return candidates[self._is_permitted(others, movable, candidates)]
 
     def _is_permitted(self, others: Arrangement, movable: Movable, places: Floats) -> Bools:
-        its = self.rules.usable(movable, places)
-        return its & self.rules.keep_apart(others.movables, others.sites, movable, places)
+        is_usable = self.rules.usable(movable, places)
+        return is_usable & self.rules.keep_apart(others.movables, others.sites, movable, places)
 
-    def _differ(self, one: Site, other: Site) -> bool:
-        here, there = (one.position or (0.0, 0.0, 0.0)), (other.position or (0.0, 0.0, 0.0))
-        if math.dist(here, there) > NEAREST * self.spread:
+    def _differ(self, first: Site, second: Site) -> bool:
+        first_place, second_place = (
+            (first.position or (0.0, 0.0, 0.0)),
+            (second.position or (0.0, 0.0, 0.0)),
+        )
+        if math.dist(first_place, second_place) > NEAREST * self.spread:
             return True
-        if one.direction is None or other.direction is None:
+        if first.direction is None or second.direction is None:
             return False
-        cosine = float(np.dot(one.direction, other.direction))
+        cosine = float(np.dot(first.direction, second.direction))
         return cosine < math.cos(math.radians(NARROWEST))

@@ -52,8 +52,10 @@ class PoseSteps:
 
     def refitted(self, arrangement: Arrangement, at: ViewPaths) -> Arrangement:
         """Return an arrangement along other paths."""
-        its = arrangement
-        return Arrangement(its.movables, its.sites, self.fitted(its.movables, its.sites, at))
+        refit = arrangement
+        return Arrangement(
+            refit.movables, refit.sites, self.fitted(refit.movables, refit.sites, at)
+        )
 
     def descend(
         self,
@@ -104,7 +106,7 @@ class PoseSteps:
         scales = {
             k: self._scales(arrangement.movables[k].light, arrangement.sites[k]) for k in every
         }
-        numbers = [(k, j) for k, its in scales.items() for j in range(len(its))]
+        numbers = [(k, j) for k, stepped in scales.items() for j in range(len(stepped))]
         if not numbers:
             return arrangement, ridge
         slopes, owners, places = self._slopes(arrangement, at, numbers, scales, step, is_central)
@@ -120,8 +122,8 @@ class PoseSteps:
             if self._permits(arrangement.movables, sites):
                 fitted = self._moved(arrangement, sites, [*scales], at)
                 if fitted.missed < arrangement.missed * (1 - 1e-7):
-                    its = Arrangement(arrangement.movables, tuple(sites), fitted)
-                    return its, max(ridge / RIDGE_SHRINK, LEAST_RIDGE)
+                    stepped = Arrangement(arrangement.movables, tuple(sites), fitted)
+                    return stepped, max(ridge / RIDGE_SHRINK, LEAST_RIDGE)
             ridge *= RIDGE_GROWTH
         return arrangement, ridge
 
@@ -151,16 +153,16 @@ class PoseSteps:
         widths: list[float] = []
         for q, (k, j) in enumerate(numbers):
             movable, site = arrangement.movables[k], arrangement.sites[k]
-            one = np.zeros(len(scales[k]))
-            one[j] = step * scales[k][j]
-            there, width = movable.light.stepped(site, one), step
+            change = np.zeros(len(scales[k]))
+            change[j] = step * scales[k][j]
+            new_site, width = movable.light.stepped(site, change), step
             if is_central:
-                back += movable.sites(movable.light.stepped(site, -one))
+                back += movable.sites(movable.light.stepped(site, -change))
                 width = 2 * step
-            elif there == site:
+            elif new_site == site:
                 # It stands at a bound: look the other way.
-                there, width = movable.light.stepped(site, -one), -step
-            ahead += movable.sites(there)
+                new_site, width = movable.light.stepped(site, -change), -step
+            ahead += movable.sites(new_site)
             owners += movable.columns
             places += [q] * len(movable.columns)
             widths += [width] * len(movable.columns)

@@ -97,9 +97,9 @@ def free_space(scene: Scene, loaded: Any, *, seed: int = 0) -> FreeSpace:
     places = rng.permutation(places)
     places = places[is_clear(loaded, places, CLEARANCE * spread)]
     chosen = rng.permutation(np.flatnonzero(near))[:ASKED]
-    asked, fronts = points[chosen], normals[chosen]
-    is_seen = _seen_share(loaded, places, asked, fronts) >= LEAST_SEEN
-    return FreeSpace(places[is_seen], spread, asked, fronts)
+    origins, fronts = points[chosen], normals[chosen]
+    is_seen = _seen_share(loaded, places, origins, fronts) >= LEAST_SEEN
+    return FreeSpace(places[is_seen], spread, origins, fronts)
 
 
 def far_apart(places: Floats, count: int, *, start: Floats | None = None) -> Floats:

@@ -124,9 +124,9 @@ class Rails:
     def _nearest(self, place: Doubles) -> tuple[int, Doubles]:
         start, way = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
         share = ((place - start) * way).sum(axis=1) / np.square(way).sum(axis=1)
-        there = start + np.clip(share, 0, 1)[:, None] * way
-        k = int(np.argmin(np.square(there - place).sum(axis=1)))
-        return k, there[k]
+        feet = start + np.clip(share, 0, 1)[:, None] * way
+        k = int(np.argmin(np.square(feet - place).sum(axis=1)))
+        return k, feet[k]
 
 
 @dataclass(frozen=True)
@@ -142,10 +142,10 @@ class Triangles:
     def tangents(self, place: Doubles) -> Doubles:
         """Return two directions in the triangle that the place is on, (2, 3)."""
         corners = self.corners[self._nearest(place)[0]]
-        one = corners[1] - corners[0]
-        one /= np.linalg.norm(one)
-        other = np.cross(np.cross(one, corners[2] - corners[0]), one)
-        return np.stack([one, other / np.linalg.norm(other)])
+        along = corners[1] - corners[0]
+        along /= np.linalg.norm(along)
+        other = np.cross(np.cross(along, corners[2] - corners[0]), along)
+        return np.stack([along, other / np.linalg.norm(other)])
 
     def random(self, count: int, rng: np.random.Generator) -> Doubles:
         """Return places, even in area."""
@@ -176,17 +176,17 @@ class Triangles:
         squares = np.maximum(np.square(normal).sum(axis=1, keepdims=True), 1e-300)
         foot = place - ((place - a) * normal).sum(axis=1, keepdims=True) / squares * normal
         is_inside = np.ones(len(a), dtype=bool)
-        found = [foot]
+        feet = [foot]
         for start, end in ((a, b), (b, c), (c, a)):
             edge = end - start
             is_inside &= (np.cross(edge, foot - start) * normal).sum(axis=1) >= 0
             length = np.maximum(np.square(edge).sum(axis=1, keepdims=True), 1e-300)
             share = ((place - start) * edge).sum(axis=1, keepdims=True) / length
-            found.append(start + np.clip(share, 0, 1) * edge)
-        away = np.square(np.stack(found) - place).sum(axis=2)
+            feet.append(start + np.clip(share, 0, 1) * edge)
+        away = np.square(np.stack(feet) - place).sum(axis=2)
         away[0, ~is_inside] = np.inf
         kind, k = np.unravel_index(int(np.argmin(away)), away.shape)
-        return int(k), found[int(kind)][k]
+        return int(k), feet[int(kind)][k]
 
 
 @dataclass(frozen=True)
@@ -205,9 +205,11 @@ class EitherPlaces:
 
     def random(self, count: int, rng: np.random.Generator) -> Doubles:
         """Return as many places of each kind."""
-        each = -(-count // len(self.parts))
-        return np.concatenate([part.random(each, rng) for part in self.parts])
+        per_part = -(-count // len(self.parts))
+        return np.concatenate([part.random(per_part, rng) for part in self.parts])
 
     def _part(self, place: Doubles) -> tuple[Places, Doubles]:
-        found = [(part, part.nearest(place)) for part in self.parts]
-        return min(found, key=lambda its: float(np.linalg.norm(its[1] - place)))
+        nearest = [(part, part.nearest(place)) for part in self.parts]
+        return min(
+            nearest, key=lambda part_and_place: float(np.linalg.norm(part_and_place[1] - place))
+        )

@@ -61,22 +61,22 @@ def _triangles(scene: Scene, loaded: Any, name: str) -> Doubles:
         raise SceneError(
             f"{scene.path} has no shape {name!r} to hang lights on: it has {some_names(names)}"
         )
-    found = []
-    for its, shape in zip(names, loaded.shapes(), strict=True):
-        if its != name:
+    corners = []
+    for shape_name, shape in zip(names, loaded.shapes(), strict=True):
+        if shape_name != name:
             continue
         parameters = mi.traverse(shape)
         if "faces" in parameters:
             points = np.array(parameters["vertex_positions"], dtype=float).reshape(-1, 3)
             faces = np.array(parameters["faces"]).reshape(-1, 3)
-            found.append(points[faces])
+            corners.append(points[faces])
         elif str(shape).startswith("Rectangle"):
             matrix = np.array(parameters["to_world"].matrix, dtype=float).reshape(4, 4)
             square = np.array([[-1, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]])
             points = (square @ matrix.T)[:, :3]
-            found.append(points[[[0, 1, 2], [0, 2, 3]]])
+            corners.append(points[[[0, 1, 2], [0, 2, 3]]])
         else:
             raise SceneError(
                 f"lights can hang on rectangles and meshes, and shape {name!r} is neither"
             )
-    return np.concatenate(found)
+    return np.concatenate(corners)

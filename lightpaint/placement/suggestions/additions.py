@@ -65,7 +65,7 @@ def find_additions(
     folds = [_Fold(candidates, k) for k in range(2)]
     whole = _Solver(candidates, candidates.pictures, candidates.noise)
     chosen: list[int] = []
-    found: list[Addition] = []
+    additions: list[Addition] = []
     left = np.ones(candidates.count, dtype=bool)
     before, picture = _missed(folds, chosen), candidates.picture(whole.weights(chosen))
     while len(chosen) < count and left.any():
@@ -92,13 +92,13 @@ def find_additions(
         chosen.append(best)
         before -= gains[best]
         weights = whole.weights(chosen)
-        kept = [*range(candidates.lights), *(candidates.lights + k for k in chosen)]
+        columns = [*range(candidates.lights), *(candidates.lights + k for k in chosen)]
         without, picture = picture, candidates.picture(weights)
-        found.append(Addition(best, gains[best], weights[kept], without, picture))
+        additions.append(Addition(best, gains[best], weights[columns], without, picture))
         left[best] = False
         if too_near is not None:
             left &= ~too_near[best]
-    return found
+    return additions
 
 
 class _Solver:
@@ -122,8 +122,8 @@ class _Solver:
     def weights(self, chosen: Iterable[int]) -> Doubles:
         """Return the best weights, (n + m, 3), with the candidates `chosen`; the others are 0."""
         x = np.zeros(len(self.reduction.unknowns))
-        for problem, here, values in self._solved(chosen):
-            x[problem.unknowns[here]] = values
+        for problem, indices, values in self._solved(chosen):
+            x[problem.unknowns[indices]] = values
         return self.reduction.weights(x)
 
     def objective(self, chosen: Iterable[int]) -> float:
@@ -133,10 +133,10 @@ class _Solver:
     def estimated_gains(self, chosen: Iterable[int]) -> Doubles:
         """Return the gain of each candidate, (m,), if the same lights stayed at their limits."""
         gains = np.zeros(len(self.reduction.unknowns))
-        for problem, here, x in self._solved(chosen):
-            inside = (x > problem.lower[here]) & (x < problem.upper[here])
-            free = here[inside]
-            gradient = problem.b - problem.M[:, here] @ x
+        for problem, indices, x in self._solved(chosen):
+            inside = (x > problem.lower[indices]) & (x < problem.upper[indices])
+            free = indices[inside]
+            gradient = problem.b - problem.M[:, indices] @ x
             # The part of a column that the free unknowns cannot replace.
             cross = problem.M[free]
             inverse = pseudo_inverse(problem.M[np.ix_(free, free)])
@@ -145,7 +145,7 @@ class _Solver:
             safe = np.where(alone > ALONE * power, alone, np.inf)
             gains[problem.unknowns] = np.square(np.maximum(gradient, 0)) / safe
         places = self.reduction.places[self.first :]
-        return np.array([gains[list(its)].sum() for its in places])
+        return np.array([gains[list(place)].sum() for place in places])
 
     def _solved(self, chosen: Iterable[int]) -> Iterator[tuple[ReducedProblem, Indices, Doubles]]:
         """Yield each problem, the indices of its unknowns that are not off, and their best
@@ -155,10 +155,10 @@ class _Solver:
         unknowns = {i for knob in off for i in self.reduction.places[knob]}
         for problem in self.problems:
             left = [k for k, i in enumerate(problem.unknowns.tolist()) if i not in unknowns]
-            here = np.array(left, dtype=np.intp)
-            p = problem.restricted(here)
+            indices = np.array(left, dtype=np.intp)
+            p = problem.restricted(indices)
             x = minimise(p.M, p.b, lower=p.lower, upper=p.upper, caps=p.caps).x
-            yield problem, here, x
+            yield problem, indices, x
 
 
 class _Fold:

@@ -59,10 +59,10 @@ class Candidates:
         count = int(free.sum())
         pictures, noise = (
             np.stack(
-                [block_mean(one, factor) for one in its]
-                + [one for one, is_free in zip(more, free, strict=True) if is_free]
+                [block_mean(plane, factor) for plane in planes]
+                + [plane for plane, is_free in zip(new_planes, free, strict=True) if is_free]
             )
-            for its, more in ((basis.planes, added.planes), (basis.noise, added.noise))
+            for planes, new_planes in ((basis.planes, added.planes), (basis.noise, added.noise))
         )
         return cls(
             pictures,

@@ -144,8 +144,8 @@ def _places(space: FreeSpace, best: Floats, radius: float, count: int) -> Floats
         return far_apart(space.places, count)
     near = [best]
     for place in best:
-        its = space.places[np.linalg.norm(space.places - place, axis=1) < radius]
-        near.append(far_apart(its, count // len(best), start=np.concatenate(near)))
+        nearby = space.places[np.linalg.norm(space.places - place, axis=1) < radius]
+        near.append(far_apart(nearby, count // len(best), start=np.concatenate(near)))
     return np.concatenate(near)
 
 
@@ -173,13 +173,13 @@ def _suggestions(
 ) -> tuple[Suggestion, ...]:
     seen = scene.while_loaded(lambda loaded: pixels_of(scene, loaded, places))
     names = free_names("suggested", len(additions), [x.name for x in scene.emitters])
-    made = []
+    suggestions = []
     missed = total
     for k, addition in enumerate(additions):
         missed -= addition.gain
         emission = as_rgb(f"{v:.4g}" for v in addition.weights[-1])
         position = as_position(f"{v:.6g}" for v in places[k])
-        made.append(
+        suggestions.append(
             Suggestion(
                 name=names[k],
                 position=position,
@@ -192,7 +192,7 @@ def _suggestions(
                 with_it=addition.with_it,
             )
         )
-    return tuple(made)
+    return tuple(suggestions)
 
 
 def emitter_xml(name: str, position: Position, intensity: RGB) -> str:
