@@ -1,6 +1,6 @@
 """Lights that move to where the painting wants them, and new ones that it asks for."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,6 +61,7 @@ def place(
     constraints: Constraints | None = None,
     seed: int = 0,
     progress: Progress = silent,
+    watch: Callable[[Mapping[str, Site]], None] | None = None,
 ) -> Placement:
     """Find places, directions and cones of lights that bring `solution` closest to its painting.
 
@@ -82,6 +83,7 @@ def place(
             solution hold for the others.
         seed: Of the paths and the places that are tried.
         progress: Hears how far the work has come.
+        watch: Hears the poses on trial, by the names of their lights.
 
     Raises:
         SceneError: For lights that are not there or cannot move so, freedoms without a free place,
@@ -117,6 +119,8 @@ def place(
             constraints,
         )
         poses = PoseSearch(fit, paths, PoseRules(paths), seed=seed)
+        if watch is not None:
+            poses.steps.watch = lambda its: watch(_sites_by_name(its, names))
         found = _searched(poses, movables, slots, progress)
         judge = PlacementJudge(fit, poses.steps, paths)
         errors = judge.errors(found.arrangement)
@@ -160,6 +164,16 @@ class _Result:
             "without": pictures[0],
             "with_it": pictures[1],
         }
+
+
+def _sites_by_name(arrangement: Arrangement, names: Sequence[str]) -> dict[str, Site]:
+    """Return the pose of each light of movables, by name. names: of the lights of the scene."""
+    made = {}
+    for movable, site in zip(arrangement.movables, arrangement.sites, strict=True):
+        made[movable.light.name] = site
+        if movable.mirror is not None:
+            made[names[movable.columns[1]]] = movable.mirror.site(site)
+    return made
 
 
 def _additions(found: Found) -> list[int]:

@@ -2,9 +2,11 @@
 
 import logging
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from live_server import Serving
+from moving import Moving
 
 
 @pytest.fixture
@@ -18,3 +20,11 @@ def serving(caplog: pytest.LogCaptureFixture) -> Iterator[Serving]:
         connection.close()
     records = [*caplog.get_records("call"), *caplog.records]
     assert [record.getMessage() for record in records] == []
+
+
+@pytest.fixture
+def moving(tmp_path: Path) -> Iterator[Moving]:
+    """A studio of the test room."""
+    made = Moving(tmp_path)
+    yield made
+    made.close()

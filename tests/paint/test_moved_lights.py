@@ -1,25 +1,19 @@
 """Lights that a session moves: poses in undo, looks and files, planes that renders have."""
 
 import math
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from renderer import LIGHTS, write_room
+from moving import Moving, exact, opened_rig, pixel_of, placed, stroke
+from renderer import LIGHTS
 
 import lightpaint as lp
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
-from lightpaint.paint.protocol import Message
 from lightpaint.paint.rig.rig_state import rig_state
-from lightpaint.paint.store.store import Store
-from lightpaint.paint.studio.studio import Studio
-from lightpaint.paint.subject import Subject
-from lightpaint.pipeline.job.settings import Settings
-from lightpaint.placement.space.free_space import pixels_of
 from lightpaint.scene.scene_reader import load_scene
 
 #: Where the bulb goes.
@@ -27,66 +21,6 @@ POSITION = [0.4, 1.2, 0.1]
 
 #: Middle of the ball of the test room, which is .3 in radius.
 BALL = (0.3, 0.3, 0.2)
-
-
-class Moving:
-    """A studio of the test room, and all that it says."""
-
-    def __init__(self, folder: Path, lights: str | None = None) -> None:
-        self.folder = folder
-        path = folder / "room.xml"
-        self.scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
-        subject = Subject(
-            "room", folder, scene=self.scene, settings=Settings(spp=16, use_cache=False)
-        )
-        self.messages: list[Message] = []
-        self.studio = Studio([subject], lambda its: Store.open(folder / "session.db", its))
-        self.studio.on_message = self.messages.append
-        self.studio.start()
-        self.wait(lambda: any(m.kind == "state" for m in self.messages))
-
-    def wait(self, is_it: Callable[[], Any], seconds: float = 60) -> Any:
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            if found := is_it():
-                return found
-            time.sleep(0.02)
-        raise AssertionError([m.fields.get("text", m.kind) for m in self.messages])
-
-    def light(self, name: str) -> int:
-        return self.studio.session.basis.names.index(name)
-
-    def send(self, message: Any, **arrays: Any) -> list[Message]:
-        return self.studio.handle(message, arrays)
-
-    def plane(self, name: str) -> Any:
-        return np.array(self.studio.session.basis.planes.plane(self.light(name)))
-
-    def rendered(self) -> "Moving":
-        """Wait until all planes are rendered ones."""
-        session = self.studio.session
-        self.wait(lambda: not self.studio.rig.unrendered(session.requests.poses))
-        return self
-
-    def close(self) -> None:
-        self.studio.close()
-        self.studio.wait()
-
-
-@pytest.fixture
-def moving(tmp_path: Path) -> Iterator[Moving]:
-    made = Moving(tmp_path)
-    yield made
-    made.close()
-
-
-def stroke(moving: Moving, number: int = 0) -> None:
-    region = (2, 9, 2, 9)
-    moving.send(
-        protocol.Paint(number, region, True),
-        image=np.full((7, 7, 3), 0.7, np.float32),
-        importance=np.ones((7, 7), np.float32),
-    )
 
 
 def test_a_moved_light_has_the_plane_of_its_place(moving: Moving) -> None:
@@ -181,11 +115,6 @@ def test_poses_that_no_light_can_have(moving: Moving, light: str, pose: Any, tex
     assert (moving.studio.session.version, moving.studio.session.requests.poses) == (version, {})
 
 
-def opened_rig(moving: Moving) -> Any:
-    moving.send(protocol.ShowRig())
-    return moving.wait(lambda: next((m for m in moving.messages if m.kind == "rig"), None))
-
-
 def test_the_rig_says_where_lights_hang_and_what_cannot_move(moving: Moving) -> None:
     rig = opened_rig(moving)
     places = dict(zip(moving.studio.session.basis.names, rig.lights, strict=True))
@@ -204,17 +133,6 @@ def test_a_light_in_a_wall_is_told_of(moving: Moving) -> None:
     moving.send(protocol.MoveLights({"bulb": {"position": [0, 1, -1.5]}}))
     warned = moving.wait(lambda: [m for m in moving.messages if m.kind == "say"])
     assert warned[0].fields["text"].startswith("bulb lights nothing that is seen from there")
-
-
-def pixel_of(moving: Moving, point: Any) -> tuple[float, float]:
-    """Where the camera of the scene itself sees a point."""
-
-    def seen(loaded: Any) -> Any:
-        return pixels_of(moving.scene, loaded, np.array([point]))[0]
-
-    x, y = moving.scene.while_loaded(seen)
-    height, width = moving.scene.size
-    return x * width, y * height
 
 
 def pointed(moving: Moving, name: str, how: Any, at: Any, **more: Any) -> Any:
@@ -283,25 +201,6 @@ def test_clicks_that_point_no_light(
     assert moving.studio.session.requests.poses == {}
 
 
-def exact(moving: Moving) -> Any:
-    """The exact answer to what was done last, and what is said of it."""
-
-    def is_it(fields: Any) -> bool:
-        return "delta_e" in fields and fields["version"] == moving.studio.session.version
-
-    return moving.wait(
-        lambda: next(
-            (m.fields for m in moving.messages if m.kind == "answer" and is_it(m.fields)), None
-        )
-    )
-
-
-def placed(moving: Moving) -> Any:
-    return moving.wait(
-        lambda: next((m.fields for m in moving.messages if m.kind == "placed"), None), 200
-    )
-
-
 @pytest.fixture
 def dim(tmp_path: Path) -> Iterator[Moving]:
     """The room with a bulb, and a sky that shows what is in it."""
@@ -337,7 +236,7 @@ def test_a_search_for_places_can_be_stopped(moving: Moving) -> None:
     stroke(moving)
     moving.send(protocol.PlaceLights())
     moving.send(protocol.PlaceLights(run=False))
-    assert placed(moving)["text"] == "Stopped. No light was moved."
+    assert placed(moving)["text"] == "Stopped: every light stays where it was."
     assert moving.studio.session.requests.poses == {}
 
 

@@ -55,6 +55,11 @@ class Canvas:
         self.painting = compose(self._shown, self.present, self.full_region)
         self.live = LiveView(basis, self.image, self.importance)
 
+    def replace_lights(self, basis: Basis) -> None:
+        """Continue with a basis of other lights."""
+        self.basis = basis
+        self.live = LiveView(basis, self.image, self.importance)
+
     def replace_planes(self, basis: Basis, lights: Collection[int]) -> None:
         """Continue with a basis in which the planes of some lights, by number, are others.
 

@@ -57,6 +57,11 @@ class Canvases:
         for view, basis, present in zip(self, bases, presents, strict=True):
             view.improve(basis, present)
 
+    def replace_lights(self, bases: Sequence[Basis]) -> None:
+        """Continue with bases of other lights."""
+        for view, basis in zip(self, bases, strict=True):
+            view.replace_lights(basis)
+
     def replace_planes(self, bases: Sequence[Basis], lights: Collection[int]) -> None:
         """Continue with bases in which the planes of some lights, by number, are others."""
         for view, basis in zip(self, bases, strict=True):

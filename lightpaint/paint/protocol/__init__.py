@@ -30,6 +30,7 @@ from lightpaint.paint.protocol.events import (
     SessionState,
     TaskStarted,
     TaskStopped,
+    TrialPlaces,
     VerificationResult,
 )
 from lightpaint.paint.protocol.message_parts import (
@@ -56,6 +57,7 @@ from lightpaint.paint.protocol.message_parts import (
 from lightpaint.paint.protocol.requests import (
     REQUESTS,
     VERSION,
+    AddLight,
     AnyRequest,
     Ask,
     AskAll,
@@ -77,6 +79,7 @@ from lightpaint.paint.protocol.requests import (
     Preview,
     Propose,
     Redo,
+    RemoveLight,
     RenameLook,
     SaveLook,
     Set,
@@ -92,6 +95,7 @@ __all__ = [
     "REQUESTS",
     "VERSION",
     "Acknowledgement",
+    "AddLight",
     "Advice",
     "AnswerUpdate",
     "AnyRequest",
@@ -140,6 +144,7 @@ __all__ = [
     "ProgressReport",
     "Propose",
     "Redo",
+    "RemoveLight",
     "RenameLook",
     "ResolvedFit",
     "Rig",
@@ -156,6 +161,7 @@ __all__ = [
     "TieLights",
     "Tone",
     "TransformInfo",
+    "TrialPlaces",
     "Undo",
     "VerificationResult",
     "Verify",

@@ -246,7 +246,7 @@ class Rig(Message, kind="rig"):
 
     lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
     the axis that is nearest to upwards, 0, 1 or 2. low, high: corners of a box with all that is
-    seen, and all lights.
+    seen, and all lights. surfaces: names of what new lights may hang on: rails, surfaces, shapes.
     """
 
     lights: tuple[LightPlace, ...]
@@ -254,13 +254,25 @@ class Rig(Message, kind="rig"):
     up: int
     low: Place
     high: Place
+    surfaces: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrialPlaces(Message, kind="trial"):
+    """The places that a search tries at present. Unasked.
+
+    positions, directions: by name of light; of new ones, too.
+    """
+
+    positions: Mapping[str, Place]
+    directions: Mapping[str, Place]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlacingResult(Message, kind="placed"):
     """The result of a search for places of lights. Unasked.
 
-    text: what was moved, and what for; or why nothing was. names: of lights that were moved.
+    text: what was moved or added, and what for; or why nothing was. names: of these lights.
     """
 
     text: str
@@ -318,6 +330,7 @@ EVENTS: Mapping[str, type[Any]] = {
         Explanation,
         PreviewResult,
         Rig,
+        TrialPlaces,
         PlacingResult,
         Notice,
         Failure,

@@ -233,7 +233,8 @@ class EditState:
 
     asked: constraints by name of light, keys and values as in a lights file. ties: names on one
     dimmer. settings: set by somebody. resolved: the values in effect. poses: of lights that were
-    moved, by name. layers: what the painting is made of.
+    moved, by name. added: names of lights that the scene does not have. layers: what the painting
+    is made of.
     """
 
     history: HistoryInfo | None = field(default=None, metadata=OPTIONAL)
@@ -241,6 +242,7 @@ class EditState:
     ties: tuple[tuple[str, ...], ...] | None = field(default=None, metadata=OPTIONAL)
     settings: Mapping[str, Any] | None = field(default=None, metadata=OPTIONAL)
     poses: Mapping[str, Mapping[str, Any]] | None = field(default=None, metadata=OPTIONAL)
+    added: tuple[str, ...] | None = field(default=None, metadata=OPTIONAL)
     resolved: ResolvedFit | None = field(default=None, metadata=OPTIONAL)
     layers: LayerList | None = field(default=None, metadata=OPTIONAL)
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, get_args
 from lightpaint.arrays import RGB
 from lightpaint.paint.layers.layer import PAINTING_ID, Layer
 from lightpaint.paint.protocol.base import Message
+from lightpaint.paint.protocol.message_parts import Place
 from lightpaint.paint.store.canvas_pixels import Region
 
 #: Version of this protocol; a page of another version is told to reload.
@@ -145,6 +146,30 @@ class PointLight(Message, kind="point"):
 
 
 @dataclass(frozen=True)
+class AddLight(Message, kind="add_light"):
+    """A new light, which gets a name by itself: one step. Answered by `state`; `rig` follows.
+
+    type: of the light. at: column and row in a picture; the light hangs a little before the surface
+    that is seen there, and points away from it. position: its place, instead; it points down. view:
+    whose picture it is.
+    """
+
+    type: Literal["spot", "point", "panel"]
+    at: tuple[float, float] | None = None
+    position: Place | None = None
+    view: int = 0
+
+
+@dataclass(frozen=True)
+class RemoveLight(Message, kind="remove_light"):
+    """A light that was added and is to go, by name: one step. Answered by `state`; `rig`
+    follows.
+    """
+
+    name: str
+
+
+@dataclass(frozen=True)
 class ShowRig(Message, kind="show_rig"):
     """A request for where all lights hang, and of `rig` after every move from now on. Answered by
     `started`, later by `rig`.
@@ -154,10 +179,17 @@ class ShowRig(Message, kind="show_rig"):
 @dataclass(frozen=True)
 class PlaceLights(Message, kind="place"):
     """A request to find places, directions and cones of lights that come closest to the paintings,
-    or to stop that. Answered by `started`, later by `placed`; what is found is one step.
+    or to stop that. Answered by `started`, then by `trial` and later by `placed`; what is found is
+    one step.
+
+    new: kind of lights to add, instead of moving those that there are; null for none. count: most
+    of them. on: names of rails, surfaces and shapes that they may hang on; none for anywhere free.
     """
 
     run: bool = True
+    new: Literal["spot", "point", "panel"] | None = None
+    count: int = 1
+    on: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -322,6 +354,8 @@ AnyRequest = (
     | AskAll
     | MoveLights
     | PointLight
+    | AddLight
+    | RemoveLight
     | PlaceLights
     | ShowRig
     | TieLights

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -103,7 +103,7 @@ def typescript_type(hint: Any) -> str:
         return PRIMITIVES[hint]
     if outer is Literal:
         return " | ".join(f"'{value}'" for value in inner)
-    if outer is UnionType:
+    if outer in (UnionType, Union):  # of which the latter has a literal
         return " | ".join(map(typescript_type, inner))
     if outer is tuple and inner[-1] is ...:
         item = typescript_type(inner[0])

@@ -4,7 +4,7 @@ import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from threading import RLock
 from typing import Any
 
@@ -12,18 +12,35 @@ import numpy as np
 
 from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import Lights
 from lightpaint.errors import PaintError, SceneError
-from lightpaint.paint.protocol import PointLight
-from lightpaint.paint.rig.cameras import FirstHit, first_hit, free_length, in_this_thread
+from lightpaint.paint.protocol import AddLight, PointLight
+from lightpaint.paint.rig.added_lights import (
+    POSE_KEYS,
+    hung_at,
+    hung_before,
+    light_of_new,
+    new_emitter,
+    site_of_new,
+)
+from lightpaint.paint.rig.cameras import (
+    FirstHit,
+    camera_of,
+    first_hit,
+    free_length,
+    in_this_thread,
+    up_axis,
+)
 from lightpaint.paint.rig.moved_bases import one_light_basis, with_planes_of
 from lightpaint.paint.rig.pointing import aimed, with_highlight, with_shadow
 from lightpaint.paint.rig.quick_planes import QuickPlanes
-from lightpaint.paint.session.moved_lights import Poses
+from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom
 from lightpaint.placement.lights_to_place import why_not_searched
-from lightpaint.placement.rigging.rigged_lights import freedoms_of
-from lightpaint.placement.rigging.rigging import rigging_of
+from lightpaint.placement.rigging.rigged_lights import freedoms_of, surfaces_of
+from lightpaint.placement.rigging.rigging import Rigging, rigging_of
+from lightpaint.scene.lights.new_emitter import NewEmitter
 from lightpaint.scene.properties.pose import Pose, Site, motion_of
 from lightpaint.scene.runtime.render_lock import MITSUBA
 from lightpaint.scene.scene import Scene
@@ -75,8 +92,18 @@ class LampRig:
     def freedoms(self) -> Mapping[str, Freedom]:
         """Freedom of the lights that the lights file lets move, by name."""
         if self._freedoms is None:
-            self._freedoms = freedoms_of(rigging_of(self.scene.requests), self.scene)
+            self._freedoms = freedoms_of(self.rigging, self.scene)
         return self._freedoms
+
+    @cached_property
+    def rigging(self) -> Rigging:
+        """The rigging that the lights file has."""
+        return rigging_of(self.scene.requests)
+
+    @cached_property
+    def surfaces(self) -> tuple[str, ...]:
+        """Names of what new lights may hang on."""
+        return surfaces_of(self.rigging, self.scene)
 
     @property
     def extent(self) -> float:
@@ -117,20 +144,32 @@ class LampRig:
 
     # Poses
 
-    def check(self, poses: Poses) -> None:
-        """Raise LightpaintError for poses that these lights cannot have."""
-        for name, values in poses.items():
+    def check(self, placed: Placed) -> None:
+        """Raise LightpaintError for places that these lights cannot have."""
+        for name, values in placed.items():
             self.site(name, values)
 
-    def why_not(self, name: str) -> str:
-        """Return why a light cannot be moved, in words that follow its name; "" if it can."""
+    def lights(self, lights: Lights, placed: Placed) -> Lights:
+        """Return the lights of the scene, and behind them those that were added."""
+        added = [light_of_new(new_emitter(x, placed[x])) for x in added_names(placed)]
+        return replace(lights, records=(*lights, *added))
+
+    def why_not(self, name: str, values: Mapping[str, Any] | None = None) -> str:
+        """Return why a light cannot be moved, in words that follow its name; "" if it can.
+
+        values: those of an added light.
+        """
         scene = self.scene
         if scene.has_media:
             return "stands in a scene with fog or the like"
-        return why_not_searched(scene.light(name))
+        return "" if values and "kind" in values else why_not_searched(scene.light(name))
 
     def site(self, name: str, values: Mapping[str, Any]) -> Site:
         """Return the place of a light with a pose. Raises LightpaintError for what it cannot do."""
+        if "kind" in values:
+            if self.scene.has_media:
+                raise PaintError(f"{name} stands in fog or the like: it cannot be hung here")
+            return site_of_new(new_emitter(name, values))
         light = self.scene.light(name)
         if reason := self.why_not(name):
             raise PaintError(f"{name} {reason}: it cannot be moved here")
@@ -139,21 +178,23 @@ class LampRig:
             return site
         return motion_of(name, light.plugin, site, _pose(name, values)).site
 
-    def moved_scene(self, poses: Poses, view: int = 0) -> Scene:
-        """Return the scene of a view with lights moved."""
-        scene = self._subjects[view].loaded_scene
-        named = {name: _pose(name, values) for name, values in poses.items()}
-        return scene.moved(named) if named else scene
+    def moved_scene(self, placed: Placed, view: int = 0) -> Scene:
+        """Return the scene of a view with lights moved and added."""
+        scene, added = self._subjects[view].loaded_scene, added_names(placed)
+        named = {name: _pose(name, its) for name, its in placed.items() if name not in added}
+        scene = scene.moved(named) if named else scene
+        emitters = [new_emitter(name, placed[name]) for name in added]
+        return scene.with_new_emitters(emitters) if emitters else scene
 
     # Planes
 
-    def bases(self, bases: Sequence[Basis], poses: Poses) -> list[Basis]:
-        """Return the bases with the planes of moved lights: rendered ones, or else quick ones."""
-        if not poses:
+    def bases(self, bases: Sequence[Basis], placed: Placed) -> list[Basis]:
+        """Return the bases with planes of placed lights: rendered ones, or else quick ones."""
+        if not placed:
             return list(bases)
-        moved = {name: self._planes(bases, name, values) for name, values in poses.items()}
-        is_rendered = all(self._is_rendered(name, values) for name, values in poses.items())
-        names = bases[0].names
+        moved = {name: self._planes(bases, name, values) for name, values in placed.items()}
+        is_rendered = all(self._is_rendered(name, values) for name, values in placed.items())
+        names = (*bases[0].names, *added_names(placed))
         return [
             with_planes_of(
                 basis,
@@ -170,23 +211,32 @@ class LampRig:
             if (rendered := self._rendered.get(key)) is not None:
                 self._rendered.move_to_end(key)
                 return rendered
+        return self.quick_planes(bases, name, values)
+
+    def quick_planes(
+        self, bases: Sequence[Basis], name: str, values: Mapping[str, Any]
+    ) -> list[Basis]:
+        """Return the estimated plane of a light with a pose in each view."""
         self.open(bases)
         assert self.views is not None
         site, light_bases = self.site(name, values), []
         for view, basis in zip(self.views, bases, strict=True):
             assert view.quick is not None
-            light = basis.lights[basis.names.index(name)]
+            if "kind" in values:
+                light = light_of_new(new_emitter(name, values))
+            else:
+                light = replace(basis.lights[basis.names.index(name)], identity="")
             with in_this_thread():
                 plane = view.quick.plane(site)
-            light_bases.append(one_light_basis(basis, replace(light, identity=""), plane))
+            light_bases.append(one_light_basis(basis, light, plane))
         return light_bases
 
     def _is_rendered(self, name: str, values: Mapping[str, Any]) -> bool:
         return _key(name, values) in self._rendered
 
-    def unrendered(self, poses: Poses) -> list[str]:
+    def unrendered(self, placed: Placed) -> list[str]:
         """Return the moved lights whose planes are quick ones so far."""
-        return [name for name, values in poses.items() if not self._is_rendered(name, values)]
+        return [name for name, values in placed.items() if not self._is_rendered(name, values)]
 
     def render(
         self,
@@ -206,8 +256,8 @@ class LampRig:
             check()
 
         light_bases = []
-        for subject, basis in zip(self._subjects, bases, strict=True):
-            scene = subject.loaded_scene.moved({name: _pose(name, values)}).only([name])
+        for k, (subject, basis) in enumerate(zip(self._subjects, bases, strict=True)):
+            scene = self.moved_scene({name: values}, k).only([name])
             with MITSUBA.low_priority():
                 light_bases.append(
                     obtain_basis(
@@ -226,9 +276,34 @@ class LampRig:
     # Places in the picture
 
     def pointed(self, request: PointLight, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the pose of a light after a request to point it, from its present pose."""
+        """Return the change of a light's pose that a request to point it comes to.
+
+        values: its present pose, or of an added light all about it.
+        """
         with in_this_thread():
-            return {**values, **self._pointing(request, name, self.site(name, values))}
+            return self._pointing(request, name, self.site(name, values))
+
+    def hung(self, request: AddLight, name: str) -> NewEmitter:
+        """Return a new light where a request has it. Raises PaintError where none can hang.
+
+        Its emission is yet to be found.
+        """
+        if self.scene.has_media:
+            raise PaintError("no light can be added to a scene with fog or the like")
+        view, extent = self.view(request.view), self.extent
+        if request.position is not None:
+            down = np.zeros(3)
+            down[up_axis([camera_of(view.scene, view.loaded)])] = -1.0
+            try:
+                place = Pose(position=request.position).position  # type: ignore[arg-type]
+            except SceneError as error:
+                raise PaintError(f"{name}: {error}") from None
+            return hung_at(name, request.type, np.array(place), down, extent)
+        if request.at is None:
+            raise PaintError("a new light needs a place: click on a surface, or in the plan")
+        with in_this_thread():
+            hit = self._hit(view, request.at)
+            return hung_before(name, request.type, hit, extent, partial(free_length, view.loaded))
 
     def _pointing(self, request: PointLight, name: str, site: Site) -> dict[str, Any]:
         view = self.view(request.view)
@@ -261,10 +336,9 @@ class LampRig:
 
 def _pose(name: str, values: Mapping[str, Any]) -> Pose:
     """Return the pose of a light that a client asks for. Raises PaintError for no pose."""
-    keys = {"position", "target", "cutoff", "beam"}
-    if unknown := [key for key in values if key not in keys]:
+    if unknown := [key for key in values if key not in POSE_KEYS]:
         raise PaintError(
-            f"{name}: a pose has no {unknown[0]!r}: expected {', '.join(sorted(keys))}"
+            f"{name}: a pose has no {unknown[0]!r}: expected {', '.join(sorted(POSE_KEYS))}"
         )
     try:
         return Pose(**values)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
 from functools import partial
+from statistics import mean
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,11 +13,12 @@ from lightpaint.basis.cache.denoised_planes import (
     DenoisedPlanes,
     as_halves,
     denoise_to_halves,
-    scale_of,
 )
+from lightpaint.colour.color import LUMINANCE
 from lightpaint.errors import LightpaintError
 from lightpaint.paint.background_threads import BackgroundThreads, LatestWork, StoppedError
 from lightpaint.paint.protocol import (
+    AddLight,
     Message,
     MoveLights,
     Notice,
@@ -24,11 +26,13 @@ from lightpaint.paint.protocol import (
     PointLight,
     TaskStarted,
 )
+from lightpaint.paint.rig.added_lights import free_name, values_of, with_level
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.rig_state import rig_state
-from lightpaint.paint.session.moved_lights import Poses
+from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.paint.session.picture_table import Picture, PictureTable, plane_thumbnail
 from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.view_pictures import plane_scale
 from lightpaint.paint.store.steps import name_in_view
 
 
@@ -63,7 +67,7 @@ class LightMover:
 
     def __init__(self, host: MoverHost, rig: LampRig, threads: BackgroundThreads) -> None:
         self.rig, self._host, self._threads = rig, host, threads
-        self._shows_rig, self._shown_poses = False, dict[str, Mapping[str, Any]]()
+        self._shows_rig, self._shown = False, dict[str, Mapping[str, Any]]()
         self._dragged = set[str]()  # lights that are
         self._work = LatestWork(self._render, host.publish)
         self._is_working, self._is_open = False, True
@@ -84,8 +88,14 @@ class LightMover:
         self._publish_rig()
 
     def _publish_rig(self) -> None:
-        if self._shows_rig and self.rig.is_open:
-            self._host.publish(rig_state(self.rig, self._host.session.requests.poses))
+        for message in self.rig_messages():
+            self._host.publish(message)
+
+    def rig_messages(self) -> list[Message]:
+        """Return where lights are, for pages that have asked for it."""
+        if not (self._shows_rig and self.rig.is_open):
+            return []
+        return [rig_state(self.rig, self._host.session.requests.placed)]
 
     def move_of(self, request: PointLight) -> MoveLights:
         """Return the move that a request to point a light comes to. Raises LightpaintError."""
@@ -94,24 +104,50 @@ class LightMover:
         name = (
             session.basis.names[request.light] if request.light < len(session.basis.names) else ""
         )
-        pose = self.rig.pointed(request, name, session.requests.poses.get(name, {}))
+        pose = self.rig.pointed(request, name, session.requests.placed.get(name, {}))
         return MoveLights({name: pose}, request.done)
 
-    def follow(self) -> None:
-        """Show the planes of lights that were moved since, and render them once they rest."""
+    def hang(self, request: AddLight) -> tuple[str, dict[str, Any]]:
+        """Return name and values of the light that a request adds. Raises PaintError."""
         session = self._host.session
-        poses = session.requests.poses
-        shown, is_dragged = self._shown_poses, session.is_open
-        names = {name for name in {*poses, *shown} if poses.get(name) != shown.get(name)}
+        self.rig.open(session.bases)
+        taken = {*session.basis.names, *(x.name for x in self.rig.scene.emitters)}
+        name = free_name(request.type, taken)
+        emitter = self.rig.hung(request, name)
+        planes = self.rig.quick_planes(session.bases, name, values_of(emitter))
+        alone = mean(float((plane.totals @ LUMINANCE)[0]) for plane in planes)
+        present = mean(
+            float((x.totals * x.present_weights).sum(axis=0) @ LUMINANCE) for x in session.bases
+        )
+        return name, values_of(with_level(emitter, alone, present))
+
+    def follow(self) -> bool:
+        """Show the planes of lights that were moved since, and render them once they rest.
+
+        Returns whether lights have come or gone, of which pages have to be told at length.
+        """
+        session = self._host.session
+        placed, shown = session.requests.placed, self._shown
+        is_dragged = session.is_open
+        names = {name for name in {*placed, *shown} if placed.get(name) != shown.get(name)}
         names |= set() if is_dragged else self._dragged
         if not names:
-            return
-        self._shown_poses, self._dragged = dict(poses), names if is_dragged else set()
-        self._host.publish(self._offer(session, sorted(names), is_dragged=is_dragged))
-        self._publish_rig()
+            return False
+        self._shown, self._dragged = dict(placed), names if is_dragged else set()
+        is_other = added_names(placed) != added_names(shown)
+        if is_other:  # The numbers of those behind them are others. Pictures of lights that are
+            # gone stay, for pages that are fetching them.
+            names |= {*added_names(placed)}
+        offered = self._offer(
+            session, sorted(names & {*session.basis.names}), is_dragged=is_dragged
+        )
+        if not is_other:  # of which the whole state tells
+            self._host.publish(offered)
+            self._publish_rig()
         if not is_dragged:
-            self._warn_of_unlit(session, names & {*poses})
+            self._warn_of_unlit(session, names & {*placed})
             self.render_behind()
+        return is_other
 
     def _warn_of_unlit(self, session: Session, names: Collection[str]) -> None:
         """Say which of these lights light nothing that is seen, as in a wall or behind one."""
@@ -123,25 +159,25 @@ class LightMover:
 
     def render_behind(self) -> None:
         """Render the planes that are quick ones so far, in the background."""
-        poses = self._host.session.requests.poses
-        if not poses:
+        placed = self._host.session.requests.placed
+        if not placed:
             return
         if not self._is_working:
             self._is_working = True
             self._threads.start_low_priority(self._work.run, "planes")
-        self._work.give(poses)
+        self._work.give(placed)
 
-    def _render(self, poses: Poses) -> None:
-        """Render the quick planes of these poses, as long as they are those of the session."""
+    def _render(self, placed: Placed) -> None:
+        """Render the quick planes of these lights, as long as they are those of the session."""
         host = self._host
 
         def check() -> None:
-            if not self._is_open or host.session.requests.poses != poses:
+            if not self._is_open or host.session.requests.placed != placed:
                 raise StoppedError
 
         try:
-            self.finish(poses, check)
-            for name in poses:
+            self.finish(placed, check)
+            for name in placed:
                 check()
                 self._denoise(name)
         except StoppedError:
@@ -149,13 +185,13 @@ class LightMover:
         except LightpaintError as error:  # the next move is rendered again
             host.publish(Notice(text=str(error), tone="warn"))
 
-    def finish(self, poses: Poses, check: Callable[[], None]) -> None:
-        """Render the quick planes of these poses. check: raises to stop."""
-        for name in self.rig.unrendered(poses):
+    def finish(self, placed: Placed, check: Callable[[], None]) -> None:
+        """Render the quick planes of these lights. check: raises to stop."""
+        for name in self.rig.unrendered(placed):
             check()
-            self.rig.render(self._host.session.bases, name, poses[name], check)
+            self.rig.render(self._host.session.bases, name, placed[name], check)
             with self._host.changing() as session:
-                if session.requests.poses.get(name) == poses[name]:
+                if session.requests.placed.get(name) == placed[name]:
                     session.renew_planes([name])
                     self._host.publish(self._offer(session, [name], is_dragged=False))
             self._host.planes_rendered()
@@ -165,8 +201,8 @@ class LightMover:
 
         It publishes nothing: the state of the session, which follows, has all pictures.
         """
-        self._shown_poses = dict(session.requests.poses)
-        self._offer(session, list(session.requests.poses), is_dragged=False)
+        self._shown = dict(session.requests.placed)
+        self._offer(session, list(session.requests.placed), is_dragged=False)
 
     def _offer(self, session: Session, names: Sequence[str], *, is_dragged: bool) -> PictureUpdate:
         """Offer the pictures of lights as they are now, and return what tells pages of them."""
@@ -174,9 +210,9 @@ class LightMover:
         clean = None if is_dragged else self._host.denoised(session.bases)
         for view, unmoved in zip(session.views, session.bases, strict=True):
             for name in names:
-                k = unmoved.names.index(name)
-                scale = scale_of(unmoved.planes.plane(k))
-                is_moved = name in session.requests.poses
+                k = view.basis.names.index(name)
+                scale = plane_scale(unmoved, k)
+                is_moved = name in session.requests.placed
                 plane = view.basis.planes.plane(k)
                 make: Callable[[], Picture] = partial(as_halves, plane, scale)
                 clean_planes = clean[view.view] if clean is not None else None
@@ -199,8 +235,11 @@ class LightMover:
     def _denoise(self, name: str) -> None:
         """Replace the picture of a rendered plane by a denoised one."""
         for view, unmoved in zip(self._host.session.views, self._host.session.bases, strict=True):
-            basis, k = view.basis, unmoved.names.index(name)
-            scale = scale_of(unmoved.planes.plane(k))
+            basis = view.basis
+            if name not in basis.names:
+                return
+            k = basis.names.index(name)
+            scale = plane_scale(unmoved, k)
             halves, own = denoise_to_halves(basis, k)
             picture = as_halves(halves.astype("float32") * own, scale)
             with self._host.changing():

@@ -1,28 +1,44 @@
-"""A search for better places of the lights, in the background: one step of undo if it finds any."""
+"""A search for better places of the lights, or for new ones: in the background, and one step."""
 
+import time
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any, Protocol
 
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
-from lightpaint.paint.protocol import Message, MoveLights, PlaceLights, PlacingResult, TaskStarted
+from lightpaint.paint.protocol import (
+    Message,
+    PlaceLights,
+    PlacingResult,
+    TaskStarted,
+    TrialPlaces,
+)
+from lightpaint.paint.rig.added_lights import free_name, values_of
 from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.moved_subjects import of_moved_scenes
-from lightpaint.paint.session.session import Session
+from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.session_requests import HOLD_KEYS
 from lightpaint.paint.subject import Subject
 from lightpaint.placement.freedom import Freedom
+from lightpaint.placement.new_lights import NewLights
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Move, Placement
+from lightpaint.placement.rigging.rigged_lights import freedom_on
 from lightpaint.progress import cancellable
-from lightpaint.scene.properties.pose import Pose
+from lightpaint.scene.properties.pose import Pose, Site
+from lightpaint.scene.runtime.render_lock import MITSUBA
 
 #: Freedom of lights for which the lights file asks for none: how far they slide, relative to the
 #: size of the room, and by how many degrees they turn.
 SLIDE, TURN = 0.15, 60.0
+
+#: The most lights that one search adds.
+MAX_NEW = 4
+
+#: Seconds between the places that pages are shown while a search goes on.
+WATCH_S = 0.15
 
 
 class PlacerHost(Protocol):
@@ -33,11 +49,11 @@ class PlacerHost(Protocol):
     def snapshot(self) -> SessionSnapshot:
         """Return the present paintings and requests."""
 
-    def changing(self) -> AbstractContextManager[Session]:
-        """Return a block in which nobody else changes the session."""
+    def hang_lights(self, label: str, placed: Placed, *, before: Placed) -> bool:
+        """Move lights and add others, by name: one step, which pages are told of.
 
-    def handle(self, message: MoveLights, arrays: Mapping[str, Any]) -> list[Message]:
-        """Return the immediate answers to a request."""
+        before: where they were; returns False, and does nothing, if that is so no more.
+        """
 
     def publish(self, message: Message | None) -> None:
         """Send a message to pages."""
@@ -47,21 +63,26 @@ class PlacerHost(Protocol):
 
 
 class LightPlacer:
-    """Lets the painting place the lights of a session."""
+    """Lets the painting place the lights of a session, and add others."""
 
     def __init__(self, host: PlacerHost, rig: LampRig, threads: BackgroundThreads) -> None:
         self._host, self._rig, self._threads = host, rig, threads
         self._request: PlaceLights | None = None
 
     def handle(self, request: PlaceLights) -> list[Message]:
-        """Start the search, or stop it. Raises PaintError where there is nothing to search for."""
+        """Start the search, or stop it. Raises LightpaintError if there is nothing to search for.
+
+        A later search replaces an earlier one.
+        """
         if not request.run:
             self._request = None
             return [TaskStarted(what="stop")]
         snapshot = self._host.snapshot()
         if not snapshot.painted_views:
             raise PaintError("nothing is painted yet: paint first, then let lights move")
-        if not self._freedoms(snapshot):
+        if request.new is not None:
+            self._new_lights(request, snapshot)
+        elif not self._freedoms(snapshot):
             raise PaintError("no light is free to move: unlock a point, a spot or a sun")
         self._request = request
         self._threads.start_low_priority(lambda: self._run(request), "place")
@@ -71,53 +92,70 @@ class LightPlacer:
         """Return the freedom of each light that may move: as the lights file has it, or near its
         place.
         """
-        freedoms = {}
+        freedoms, placed = {}, snapshot.requests.placed
         for light in snapshot.bases[0].lights:
             is_held = any(key in snapshot.requests.lights.get(light.name, {}) for key in HOLD_KEYS)
-            if is_held or self._rig.why_not(light.name):
+            values = placed.get(light.name, {})
+            if is_held or light.plugin == "area" or self._rig.why_not(light.name, values):
                 continue
-            site = self._rig.site(light.name, snapshot.requests.poses.get(light.name, {}))
+            site = self._rig.site(light.name, values)
             freedoms[light.name] = self._rig.freedoms.get(light.name) or Freedom(
                 within=None if site.position is None else SLIDE * self._rig.extent,
                 aim=site.direction is not None and TURN,
             )
         return freedoms
 
+    def _new_lights(self, request: PlaceLights, snapshot: SessionSnapshot) -> NewLights:
+        """Return the lights that a request may add. Raises LightpaintError for impossible ones."""
+        assert request.new is not None
+        scene, kind = self._rig.scene, request.new
+        freedom = freedom_on(request.on, scene, self._rig.rigging) if request.on else Freedom()
+        if not 1 <= request.count <= MAX_NEW:
+            raise PaintError(f"count is {request.count}: expected 1 to {MAX_NEW} new lights")
+        taken = {*snapshot.bases[0].names, *(x.name for x in scene.emitters)}
+        # A name that is free stays as it is where one light is added; others are numbered.
+        name = free_name(kind, taken) if request.count == 1 else kind
+        return NewLights(kind, count=request.count, freedom=freedom, name=name)
+
     def _run(self, request: PlaceLights) -> None:
         def check() -> None:
             if self._request is not request:
                 raise StoppedError
+            MITSUBA.let_others()  # who drags a light meanwhile is answered at once
 
         try:
-            with cancellable(check):
-                snapshot, placement = self._searched(check)
+            with cancellable(check), MITSUBA.low_priority():
+                snapshot, placement = self._searched(request, check)
+                check()
         except StoppedError:
-            self._host.publish(PlacingResult(text="Stopped. No light was moved.", names=()))
+            if self._request is None:  # else a page waits for the next one
+                self._publish("Stopped: every light stays where it was.")
             return
         except LightpaintError as error:
-            self._host.publish(PlacingResult(text=f"No light was moved: {error}", names=()))
+            self._publish(f"No light was {_done(request)}: {error}")
             return
-        if not placement.moves:
-            text = "No light was moved: no move is surely worth a hundredth of what is missing."
-            self._host.publish(PlacingResult(text=text, names=()))
-            return
-        poses = {
+        placed = {
             move.name: pose_values(move, snapshot.requests.poses.get(move.name, {}))
             for move in placement.moves
         }
-        with self._host.changing() as session:
-            if session.requests.poses != snapshot.requests.poses:
-                text = "No light was moved: somebody moved lights meanwhile."
-                self._host.publish(PlacingResult(text=text, names=()))
-                return
-            for message in self._host.handle(MoveLights(poses), {}):
-                self._host.publish(message)
-        summary = "; ".join(str(move) for move in placement.moves)
-        self._host.publish(
-            PlacingResult(text=summary[0].upper() + summary[1:] + ".", names=tuple(poses))
-        )
+        placed |= {light.name: values_of(light.emitter) for light in placement.additions}
+        if not placed:
+            reason = "none is surely worth a hundredth of what is missing"
+            self._publish(f"No light was {_done(request)}: {reason}.")
+            return
+        label = f"{'move' if request.new is None else 'add'} {', '.join(placed)}"
+        if not self._host.hang_lights(label, placed, before=snapshot.requests.placed):
+            self._publish(f"No light was {_done(request)}: somebody moved lights meanwhile.")
+            return
+        summary = "; ".join(map(str, (*placement.moves, *placement.additions)))
+        self._publish(summary[0].upper() + summary[1:] + ".", tuple(placed))
 
-    def _searched(self, check: Callable[[], None]) -> tuple[SessionSnapshot, Placement]:
+    def _publish(self, text: str, names: tuple[str, ...] = ()) -> None:
+        self._host.publish(PlacingResult(text=text, names=names))
+
+    def _searched(
+        self, request: PlaceLights, check: Callable[[], None]
+    ) -> tuple[SessionSnapshot, Placement]:
         """Return the paintings that the search is for, and what it found."""
 
         def report(label: str, done: int, total: int, unit: str = "passes") -> None:
@@ -125,9 +163,21 @@ class LightPlacer:
             check()
             self._host.report_progress("place", done, total, "steps")
 
+        last_s = 0.0
+
+        def watch(sites: Mapping[str, Site]) -> None:
+            nonlocal last_s
+            check()
+            if (now_s := time.monotonic()) > last_s + WATCH_S:
+                last_s = now_s
+                self._host.publish(_trial(sites))
+
         snapshot = self._host.snapshot()
         self._rig.open(snapshot.bases)
-        freedoms = self._freedoms(snapshot)
+        if request.new is None:
+            freedoms, new = self._freedoms(snapshot), []
+        else:
+            freedoms, new = {}, [self._new_lights(request, snapshot)]
         subjects, moved = of_moved_scenes(self._host.subjects, snapshot, self._rig)
         views = moved.painted_views
         moved = replace(
@@ -139,7 +189,22 @@ class LightPlacer:
         assert solution is not None
         check()
         scenes = [subjects[k].loaded_scene for k in views]
-        return snapshot, place(scenes, moved.bases, solution, freedoms, progress=report)
+        placement = place(
+            scenes, moved.bases, solution, freedoms, new=new, progress=report, watch=watch
+        )
+        return snapshot, placement
+
+
+def _trial(sites: Mapping[str, Site]) -> TrialPlaces:
+    """Return the places on trial, as pages mark them."""
+    return TrialPlaces(
+        positions={name: x.position for name, x in sites.items() if x.position is not None},
+        directions={name: x.direction for name, x in sites.items() if x.direction is not None},
+    )
+
+
+def _done(request: PlaceLights) -> str:
+    return "moved" if request.new is None else "added"
 
 
 def pose_values(move: Move, before: Mapping[str, Any]) -> dict[str, Any]:

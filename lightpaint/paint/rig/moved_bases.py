@@ -30,14 +30,16 @@ def one_light_basis(basis: Basis, light: BasisLight, plane: Floats) -> Basis:
 def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool) -> Basis:
     """Return `basis` with the lights, planes and noise of bases of one light each, by number.
 
-    Unpainted parts are still held near the look of `basis`. in_memory: whether planes are copied,
-    which saves time when all of them are read many times.
+    Numbers beyond its lights are those of lights that it does not have. Unpainted parts are still
+    held near the look of `basis`. in_memory: whether planes are copied, which saves time when all
+    of them are read many times.
     """
-    in_memory = in_memory and not is_large(len(basis.lights), basis.size)
+    count = max(len(basis.lights), 1 + max(moved))
+    in_memory = in_memory and not is_large(count, basis.size)
 
     def compose(planes: Planes, others: Mapping[int, Planes]) -> Planes:
         picks: list[PlaneReference] = [
-            (others[k], 0) if k in others else (planes, k) for k in range(planes.count)
+            (others[k], 0) if k in others else (planes, k) for k in range(count)
         ]
         return compose_planes(picks, basis.size, in_memory=in_memory)
 
@@ -48,22 +50,24 @@ def with_planes_of(basis: Basis, moved: Mapping[int, Basis], *, in_memory: bool)
             compose(basis.indirect.planes, {k: part.planes for k, part in parts.items()}),
             compose(basis.indirect.noise, {k: part.noise for k, part in parts.items()}),
         )
-    lights = tuple(
-        moved[k].lights[0] if k in moved else light for k, light in enumerate(basis.lights)
-    )
+    lights = tuple(moved[k].lights[0] if k in moved else basis.lights[k] for k in range(count))
     moved_basis = replace(
         basis,
         lights=type(basis.lights)(lights, basis.requests),
         planes=compose(basis.planes, {k: x.planes for k, x in moved.items()}),
         noise=compose(basis.noise, {k: x.noise for k, x in moved.items()}),
         indirect=indirect,
+        emitters_seen=np.any(
+            [basis.emitters_seen, *(x.emitters_seen for x in moved.values())], axis=0
+        ),
         former=Estimate(basis.present_look, basis.present_noise),
         guide_table=None,
         sums=None,
         origin=replace(basis.origin, is_composed=True),
     )
     # A walk over all planes would come to the same as those of each.
-    power, totals = basis.power.copy(), basis.totals.copy()
+    power, totals = np.zeros((2, count, 3))
+    power[: len(basis.lights)], totals[: len(basis.lights)] = basis.power, basis.totals
     for k, one_light in moved.items():
         power[k], totals[k] = one_light.power[0], one_light.totals[0]
     moved_basis.set_power_and_totals(power, totals)

@@ -12,10 +12,10 @@ def of_moved_scenes(
     subjects: Sequence[Subject], snapshot: SessionSnapshot, rig: LampRig
 ) -> tuple[tuple[Subject, ...], SessionSnapshot]:
     """Return subjects and snapshot of scenes whose lights hang where the session has them."""
-    poses = snapshot.requests.poses
-    if not poses:
+    placed = snapshot.requests.placed
+    if not placed:
         return tuple(subjects), snapshot
-    scenes = [rig.moved_scene(poses, k) for k in range(len(subjects))]
+    scenes = [rig.moved_scene(placed, k) for k in range(len(subjects))]
     moved = tuple(replace(x, scene=scene) for x, scene in zip(subjects, scenes, strict=True))
     bases = tuple(
         replace(basis, origin=replace(basis.origin, scene_identity=scene.identity))

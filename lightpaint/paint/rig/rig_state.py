@@ -9,18 +9,17 @@ from lightpaint.arrays import Doubles
 from lightpaint.paint.protocol import LightPlace, Place, Rig
 from lightpaint.paint.rig.cameras import camera_of, free_length, in_this_thread, up_axis
 from lightpaint.paint.rig.lamp_rig import LampRig
-from lightpaint.paint.session.moved_lights import Poses
+from lightpaint.paint.session.moved_lights import Placed, added_names
 from lightpaint.scene.properties.pose import Site
 
 
-def rig_state(rig: LampRig, poses: Poses) -> Rig:
+def rig_state(rig: LampRig, placed: Placed) -> Rig:
     """Return where all lights are, for pages. The rig is open."""
     views = rig.views
     assert views is not None
     with in_this_thread():
-        places = tuple(
-            _place(rig, light.name, poses.get(light.name, {})) for light in rig.scene.lights
-        )
+        names = (*(light.name for light in rig.scene.lights), *added_names(placed))
+        places = tuple(_place(rig, name, placed.get(name, {})) for name in names)
         cameras = [camera_of(view.scene, view.loaded) for view in views]
     hung = [np.array(place.position) for place in places if place.position is not None]
     low, high = rig.bounds or (np.zeros(3), np.ones(3))
@@ -31,15 +30,17 @@ def rig_state(rig: LampRig, poses: Poses) -> Rig:
         up=up_axis(cameras),
         low=tuple(map(float, low)),
         high=tuple(map(float, high)),
+        surfaces=rig.surfaces,
     )
 
 
 def _place(rig: LampRig, name: str, values: Mapping[str, Any]) -> LightPlace:
-    reason = rig.why_not(name)
-    light = rig.scene.light(name)
-    site = rig.site(name, values) if not reason else light.members[0].site
-    if reason and len(light.members) > 1:
-        site = Site()
+    reason = rig.why_not(name, values)
+    if not reason:
+        site = rig.site(name, values)
+    else:
+        members = rig.scene.light(name).members
+        site = members[0].site if len(members) == 1 else Site()
     target = values.get("target") or _target(rig, site)
     return LightPlace(
         position=site.position,

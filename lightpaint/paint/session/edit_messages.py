@@ -25,6 +25,7 @@ def edit_state(history: History, live_answer: LiveAnswer, views: Canvases) -> di
         "ties": requests.ties,
         "settings": dict(requests.values),
         "poses": dict(requests.poses),
+        "added": tuple(requests.added),
         "resolved": ResolvedFit(fit.space, fit.hold, fit.colors),
         "layers": LayerList(
             tuple(layer_info(layer, views) for layer in views.layers), views.next_layer

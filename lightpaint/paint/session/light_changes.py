@@ -39,6 +39,14 @@ def move_lights(
     return requests.with_poses(poses)
 
 
+def remove_light(requests: SessionRequests, lights: Lights, name: str) -> SessionRequests:
+    """Return the requests without a light that was added."""
+    _check_names([name], lights)
+    if name not in requests.added:
+        raise PaintError(f"{name} is a light of the scene: turn it off instead")
+    return requests.without_added(name)
+
+
 def tie_lights(
     requests: SessionRequests, lights: Lights, ties: Sequence[Sequence[str]]
 ) -> SessionRequests:

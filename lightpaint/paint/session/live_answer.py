@@ -1,8 +1,12 @@
 """The requests of a session, and the answer that follows them and the paint under the hand."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
+import numpy as np
+
+from lightpaint.arrays import Doubles
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import Lights
 from lightpaint.colour.display.view_transform import ViewTransform
 from lightpaint.lighting.constraints.constraints import Constraints
 from lightpaint.lighting.constraints.constraints_file import constraints_of
@@ -18,6 +22,7 @@ class LiveAnswer:
     """Requests, and the weights that come closest under them. Updated in place.
 
     settings, constraints: those before the session began. transform: the one to paint through.
+    lights_of: returns the lights that there are with some requests.
 
     Attributes:
         requests: In effect now, including those of a slider that still moves.
@@ -33,16 +38,20 @@ class LiveAnswer:
         settings: Settings,
         constraints: Constraints,
         transform: ViewTransform,
+        lights_of: Callable[[SessionRequests], Lights],
     ) -> None:
-        self.requests = requests
+        self.requests, self._lights_of = requests, lights_of
         self.before_slider: SessionRequests | None = None
-        self.weights = views[0].basis.present_weights
+        self._basis = views[0].basis
+        self.weights = self._basis.present_weights
         self._settings, self._base_constraints, self._transform = settings, constraints, transform
         self.set_views(views)
 
     def set_views(self, views: Sequence[LiveView]) -> None:
-        """Continue with these views."""
-        self._basis = views[0].basis
+        """Continue with these views; lights that are new begin as they are present."""
+        before, self._basis = self._basis, views[0].basis
+        if before.names != self._basis.names:
+            self.weights = weights_by_name(self.weights, before.names, self._basis.lights)
         self._live = LiveSolver(views, fit=self.fit, constraints=self._constraints(self.requests))
         self._live.prepare()
 
@@ -82,7 +91,7 @@ class LiveAnswer:
 
     def check(self, requests: SessionRequests) -> None:
         """Raise LightpaintError for what cannot be asked, before anything is changed."""
-        reduce_lights(self._constraints(requests), self._basis.lights, self._fit(requests))
+        reduce_lights(self._constraints(requests), self._lights_of(requests), self._fit(requests))
 
     def set_requests(self, requests: SessionRequests) -> None:
         """Set the requests; a moving slider has come to rest."""
@@ -91,7 +100,9 @@ class LiveAnswer:
 
     def _apply(self, requests: SessionRequests) -> None:
         self.requests = requests
-        self._live.constrain(self.fit, self._constraints(requests))
+        # Where lights come or go, their views follow, and with them a solver of its own.
+        if self._lights_of(requests).names == self._basis.names:
+            self._live.constrain(self.fit, self._constraints(requests))
 
     def move_slider(self, requests: SessionRequests) -> None:
         """Set requests while a slider moves. Raises LightpaintError, and changes nothing then."""
@@ -122,3 +133,16 @@ class LiveAnswer:
     def _constraints(self, requests: SessionRequests) -> Constraints:
         constraints = constraints_of(self._basis.requests).and_then(self._base_constraints)
         return constraints.and_then(requests.constraints())
+
+
+def weights_by_name(weights: Doubles, names: Sequence[str], lights: Lights) -> Doubles:
+    """Return weights (n, 3) of `lights` from those of lights with these names.
+
+    Lights that are not among them begin as they are present.
+    """
+    made = np.array(lights.present_weights)
+    there = dict(zip(names, weights, strict=True))
+    for k, light in enumerate(lights):
+        if light.name in there:
+            made[k] = there[light.name]
+    return made

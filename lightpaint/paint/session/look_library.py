@@ -3,13 +3,14 @@
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lightpaint.arrays import as_rgb
+from lightpaint.arrays import Doubles, as_rgb
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.layers.layer_stack import LayerStack
 from lightpaint.paint.layers.layered_paintings import LayeredPaintings
@@ -65,7 +66,7 @@ class LookLibrary:
                 id=look.id,
                 name=look.fields["name"],
                 stamp=look.fields.get("stamp"),
-                weights=tuple(map(as_rgb, np.asarray(look.arrays["weights"]))),
+                weights=tuple(map(as_rgb, self._weights(look))),
                 thumbnail=f"look/{look.id}",
                 is_proposal=bool(look.fields.get("is_proposal", False)),
             )
@@ -105,8 +106,26 @@ class LookLibrary:
         weights = np.asarray(look.arrays["weights"], np.float64)
         stored = look.fields.get("layers")
         layers = None if stored is None else LayeredPaintings.from_fields(stored, look.arrays)
-        label = f"look {look.fields['name']}"
-        return self._session.load(paintings, requests, label, weights, layers=layers)
+        label, names = f"look {look.fields['name']}", self._names(look)
+        return self._session.load(paintings, requests, label, weights, names=names, layers=layers)
+
+    def _names(self, look: StoredLook) -> tuple[str, ...]:
+        """Return the names of the lights that a look has weights of."""
+        return (*self._session.bases[0].names, *look.fields["wishes"].get("added", {}))
+
+    def _weights(self, look: StoredLook) -> Doubles:
+        """Return the weights of a look, (n, 3), of the lights that there are now.
+
+        Lights that it does not have are off.
+        """
+        requests = SessionRequests.of(look.fields["wishes"])
+        return self._in_order(np.asarray(look.arrays["weights"]), requests)
+
+    def _in_order(self, weights: Doubles, requests: SessionRequests) -> Doubles:
+        """Return weights of the lights that there are now from those with some requests."""
+        names = (*self._session.bases[0].names, *requests.added)
+        there = dict(zip(names, weights, strict=True))
+        return np.array([there.get(name, (0.0, 0.0, 0.0)) for name in self._session.basis.names])
 
     def _paintings(self, look: StoredLook) -> list[Pixels]:
         """Return the paintings of all views; a view that was added later is unpainted."""
@@ -145,24 +164,32 @@ class LookLibrary:
             raise PaintError(f"part is {part:g}: expected 0 for the first look to 1 for the second")
         looks = [self._find(k) for k in (message.first, message.second)]
         shares = 1 - part, part
+        requests = [SessionRequests.of(x.fields["wishes"]) for x in looks]
+        if requests[0].placed != requests[1].placed:
+            first, second = (x.fields["name"] for x in looks)
+            raise PaintError(
+                f"{first} and {second} hang lights in different places: no lighting lies between "
+                "them; go on from one of the two"
+            )
         weights = sum(
             s * np.asarray(x.arrays["weights"]) for s, x in zip(shares, looks, strict=True)
         )
+        locks = self._lock_all(np.asarray(weights), self._names(looks[0]), requests[0])
         both = zip(*(self._paintings(look) for look in looks), strict=True)
         paintings = [_mix_pixels(pair, shares) for pair in both]
-        return self._make_look(
-            name, paintings, self._lock_all(np.asarray(weights)), np.asarray(weights)
-        )
+        return self._make_look(name, paintings, locks, np.asarray(weights))
 
-    def _lock_all(self, weights: npt.NDArray[Any]) -> SessionRequests:
-        """Return requests that lock every light at a lighting, (n, 3)."""
-        lights = self._session.basis.lights
+    def _lock_all(
+        self, weights: npt.NDArray[Any], names: Sequence[str], requests: SessionRequests
+    ) -> SessionRequests:
+        """Return requests that lock lights at a lighting, (n, 3), where `requests` hang them."""
+        lights = {light.name: light for light in self._session.bases[0].lights}
         locks = {
-            light.name: {"lock": float(w[0]) if light.is_scalar else w.tolist()}
-            for light, w in zip(lights, weights, strict=True)
-            if not light.is_fixed
+            name: {"lock": float(w[0]) if name in lights and lights[name].is_scalar else w.tolist()}
+            for name, w in zip(names, weights, strict=True)
+            if name not in lights or not lights[name].is_fixed
         }
-        return SessionRequests(locks, poses=self._session.requests.poses)
+        return replace(SessionRequests(locks), poses=requests.poses, added=requests.added)
 
     def _proposed_look(self, message: Propose) -> StoredLook:
         """Return the painting as it is with a proposed lighting."""
@@ -190,7 +217,9 @@ class LookLibrary:
             )
         paintings = [view.pixels(view.full_region) for view in session.views]
         look_ = self._with_layers(
-            self._make_look(name, paintings, self._lock_all(weights), weights)
+            self._make_look(
+                name, paintings, self._lock_all(weights, names, session.requests), weights
+            ),
         )
         number = same[0].id if same else look_.id
         return StoredLook(number, {**look_.fields, "is_proposal": True}, look_.arrays)
@@ -208,7 +237,9 @@ class LookLibrary:
             arrays_of_view: dict[str, npt.NDArray[Any]] = {
                 "image": np.asarray(image, np.float32),
                 "importance": np.asarray(importance, np.float32),
-                "thumbnail": display_thumbnail(view.basis.mix(weights), self._session.transform),
+                "thumbnail": display_thumbnail(
+                    view.basis.mix(self._in_order(weights, requests)), self._session.transform
+                ),
             }
             if marks is not None:
                 arrays_of_view[MARKS_ARRAY] = marks.view(np.uint8)
@@ -230,9 +261,8 @@ class LookLibrary:
         try:
             return look.arrays[name_in_view("thumbnail", k)]
         except (LightpaintError, LookupError):
-            weights = np.asarray(look.arrays["weights"])
             return display_thumbnail(
-                self._session.views[k].basis.mix(weights), self._session.transform
+                self._session.views[k].basis.mix(self._weights(look)), self._session.transform
             )
 
     def _next_id(self) -> int:

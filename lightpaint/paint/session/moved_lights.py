@@ -1,74 +1,113 @@
-"""Lights that a session moves: whoever has the renderer makes their planes, at any place."""
+"""Lights that a session moves or adds: whoever has the renderer makes their planes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
+import numpy as np
+
 from lightpaint.basis.basis import Basis
+from lightpaint.basis.lights import Lights
 from lightpaint.errors import PaintError
 from lightpaint.paint.layers.canvases import Canvases
 from lightpaint.paint.session.live_answer import LiveAnswer
 
-#: Poses of moved lights by name, as `SessionRequests.poses`.
-Poses = Mapping[str, Mapping[str, Any]]
+#: Moved and added lights by name, as `SessionRequests.placed`.
+Placed = Mapping[str, Mapping[str, Any]]
+
+
+def added_names(placed: Placed) -> list[str]:
+    """Return the names of the lights that the scene does not have, in their order."""
+    return [name for name, values in placed.items() if "kind" in values]
 
 
 class PlaneSource(Protocol):
-    """The planes of moved lights."""
+    """The planes of moved and added lights."""
 
-    def check(self, poses: Poses) -> None:
-        """Raise LightpaintError for poses that these lights cannot have."""
+    def check(self, placed: Placed) -> None:
+        """Raise LightpaintError for places that these lights cannot have."""
 
-    def bases(self, bases: Sequence[Basis], poses: Poses) -> list[Basis]:
-        """Return the bases of all views with the planes of moved lights, rendered or estimated."""
+    def lights(self, lights: Lights, placed: Placed) -> Lights:
+        """Return the lights of the scene, and behind them those that were added."""
+
+    def bases(self, bases: Sequence[Basis], placed: Placed) -> list[Basis]:
+        """Return the bases of all views with the planes of these lights, rendered or estimated."""
 
 
 class NoPlaneSource:
     """The source of sessions without a scene, whose lights have no places."""
 
-    def check(self, poses: Poses) -> None:
-        """Raise PaintError for any pose."""
-        if poses:
+    def check(self, placed: Placed) -> None:
+        """Raise PaintError for any place."""
+        if placed:
             raise PaintError("there is no scene to render: its lights cannot be moved")
 
-    def bases(self, bases: Sequence[Basis], poses: Poses) -> list[Basis]:
-        """Return the bases as they are. Raises PaintError for any pose."""
-        self.check(poses)
+    def lights(self, lights: Lights, placed: Placed) -> Lights:
+        """Return the lights as they are. Raises PaintError for any place."""
+        self.check(placed)
+        return lights
+
+    def bases(self, bases: Sequence[Basis], placed: Placed) -> list[Basis]:
+        """Return the bases as they are. Raises PaintError for any place."""
+        self.check(placed)
         return list(bases)
 
 
 class MovedLights:
-    """The poses that the planes of a session's views are of. Updated in place.
+    """The places that the planes of a session's views are of. Updated in place.
 
     source: makes the planes. bases: of all views, with every light where the scene has it.
     """
 
     def __init__(self, source: PlaneSource, bases: Sequence[Basis]) -> None:
         self._source, self.bases = source, tuple(bases)
-        self._poses: Poses = {}
+        self._placed: Placed = {}
 
-    def check(self, poses: Poses) -> None:
-        """Raise LightpaintError for poses that these lights cannot have."""
-        self._source.check(poses)
+    def check(self, placed: Placed) -> None:
+        """Raise LightpaintError for places that these lights cannot have."""
+        self._source.check(placed)
 
-    def follow(self, poses: Poses, views: Canvases, live_answer: LiveAnswer) -> None:
-        """Give `views` the planes of `poses`, if they have others."""
-        names = {*poses, *self._poses}
-        changed = [name for name in names if poses.get(name) != self._poses.get(name)]
-        self.renew(changed, poses, views, live_answer)
+    def lights(self, placed: Placed) -> Lights:
+        """Return all lights with these places."""
+        lights = self.bases[0].lights
+        return self._source.lights(lights, placed) if added_names(placed) else lights
+
+    def begin(self, placed: Placed, views: Canvases) -> None:
+        """Give `views` the planes of `placed`, before there is an answer."""
+        if placed:
+            views.replace_lights(self._source.bases(self.bases, placed))
+        self._placed = dict(placed)
+
+    def follow(self, placed: Placed, views: Canvases, live_answer: LiveAnswer) -> None:
+        """Give `views` the planes of `placed`, if they have others."""
+        if added_names(placed) != added_names(self._placed):
+            views.replace_lights(self._source.bases(self.bases, placed))
+            live_answer.set_views(views.live)
+            self._placed = dict(placed)
+            return
+        names = {*placed, *self._placed}
+        changed = [name for name in names if placed.get(name) != self._placed.get(name)]
+        self.renew(changed, placed, views, live_answer)
 
     def renew(
-        self, names: Sequence[str], poses: Poses, views: Canvases, live_answer: LiveAnswer
+        self, names: Sequence[str], placed: Placed, views: Canvases, live_answer: LiveAnswer
     ) -> None:
-        """Give `views` the planes of `poses`, of which those of these lights are others."""
+        """Give `views` the planes of `placed`, of which those of these lights are others."""
         if not names:
             return
-        bases = self._source.bases(self.bases, poses)
-        numbers = [bases[0].names.index(name) for name in names]
-        views.replace_planes(bases, numbers)
+        bases = self._source.bases(self.bases, placed)
+        self._placed = dict(placed)
+        seen = [
+            (x.emitters_seen, view.basis.emitters_seen)
+            for x, view in zip(bases, views, strict=True)
+        ]
+        if not all(np.array_equal(*its) for its in seen):  # a panel has come into the picture
+            views.replace_lights(bases)
+            live_answer.set_views(views.live)
+            return
+        views.replace_planes(bases, [bases[0].names.index(name) for name in names])
         live_answer.follow_planes()
-        self._poses = dict(poses)
 
-    def improve(self, bases: Sequence[Basis], poses: Poses) -> list[Basis]:
-        """Continue with bases of more samples; return them with the planes of moved lights."""
-        self.bases, self._poses = tuple(bases), dict(poses)
-        return self._source.bases(bases, poses) if poses else list(bases)
+    def improve(self, bases: Sequence[Basis], placed: Placed) -> list[Basis]:
+        """Continue with bases of more samples; return them with the planes of placed lights."""
+        self.bases, self._placed = tuple(bases), dict(placed)
+        return self._source.bases(bases, placed) if placed else list(bases)

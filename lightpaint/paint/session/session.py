@@ -34,10 +34,11 @@ from lightpaint.paint.session.light_changes import (
     constrain_light,
     constrain_lights,
     move_lights,
+    remove_light,
     tie_lights,
 )
-from lightpaint.paint.session.live_answer import LiveAnswer
-from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, PlaneSource
+from lightpaint.paint.session.live_answer import LiveAnswer, weights_by_name
+from lightpaint.paint.session.moved_lights import MovedLights, NoPlaneSource, Placed, PlaneSource
 from lightpaint.paint.session.snapshot import SessionSnapshot
 from lightpaint.paint.store.canvas_pixels import Pixels, Region
 from lightpaint.paint.store.session_requests import TITLES, SessionRequests
@@ -89,15 +90,17 @@ class Session:
                 raise
             store.recover()
             self.views, requests = restore(bases, presents, store)
+        self._moved_lights = MovedLights(plane_source or NoPlaneSource(), bases)
+        self._moved_lights.begin(requests.placed, self.views)
         self.live_answer = LiveAnswer(
             self.views.live,
             requests,
             settings=settings,
             constraints=constraints or Constraints(),
             transform=transform,
+            lights_of=lambda its: self._moved_lights.lights(its.placed),
         )
         self._history = History(store, self.views, self.live_answer)
-        self._moved_lights = MovedLights(plane_source or NoPlaneSource(), bases)
         self._update_answer()
 
     # State
@@ -204,6 +207,9 @@ class Session:
                 return [self._constrain_light(message)]
             case protocol.MoveLights():
                 return [self._move_lights(message)]
+            case protocol.RemoveLight():
+                requests = remove_light(self.requests, self.basis.lights, message.name)
+                return [self._append_requests(f"remove {message.name}", requests)]
             case protocol.AskAll():
                 requests = constrain_lights(self.requests, self.basis.lights, message.asked)
                 return [self._append_requests(", ".join(message.asked), requests)]
@@ -261,14 +267,14 @@ class Session:
 
         An open stroke stays open.
         """
-        moved = self._moved_lights.improve(bases, self.requests.poses)
+        moved = self._moved_lights.improve(bases, self.requests.placed)
         self.views.improve(moved, presents)
         self.live_answer.set_views(self.views.live)
         self._update_answer()
 
     def renew_planes(self, names: Sequence[str]) -> None:
         """Take the planes of moved lights anew, which have been rendered meanwhile."""
-        self._moved_lights.renew(names, self.requests.poses, self.views, self.live_answer)
+        self._moved_lights.renew(names, self.requests.placed, self.views, self.live_answer)
         self._update_answer()
 
     def client_left(self, *, with_stroke: bool) -> None:
@@ -294,17 +300,19 @@ class Session:
         label: str,
         weights: Doubles | None = None,
         *,
+        names: Sequence[str] | None = None,
         layers: LayeredPaintings | None = None,
     ) -> list[Message]:
         """Replace the paintings, by view, and the requests: one step.
 
-        weights: (n, 3), the answer that was kept with them. It shows until the exact one is found;
-        without it the solve starts at the answer to the previous painting. layers: those that come
-        to these paintings; without them each painting becomes a layer's pixels as it is.
+        weights: (n, 3), the answer that was kept with them, of lights with these names. It shows
+        until the exact one is found; without it the solve starts at the answer to the previous
+        painting. layers: those that come to these paintings; without them each painting becomes a
+        layer's pixels as it is.
         """
         self._reset_slider()
+        self._moved_lights.check(requests.placed)
         self.live_answer.check(requests)
-        self._moved_lights.check(requests.poses)
         if self.views.is_open:
             self._drop_stroke()
         if layers is not None:
@@ -316,7 +324,8 @@ class Session:
         changes = self._history.replace_all(stack, patches, requests, label)
         self._update_answer()
         if weights is not None:
-            self.live_answer.weights = weights.copy()
+            lights = self.basis.lights
+            self.live_answer.weights = weights_by_name(weights, names or lights.names, lights)
         return self._patch_messages(*changes)
 
     # Paint
@@ -391,13 +400,25 @@ class Session:
 
     def _move_lights(self, message: protocol.MoveLights) -> Message:
         requests = move_lights(self.requests, self.basis.lights, message.poses)
-        self._moved_lights.check(requests.poses)
+        self._moved_lights.check(requests.placed)
         if message.done:
             return self._append_requests(f"move {', '.join(message.poses)}", requests)
         # While a light is dragged nothing is kept.
         self.live_answer.move_slider(requests)
         self._update_answer()
         return self.answer_update(poses=dict(requests.poses))
+
+    def hang_lights(self, label: str, placed: Placed) -> list[Message]:
+        """Move lights and add others, by name: one step. Raises LightpaintError if refused.
+
+        placed: poses of lights that are there; of others all about them, as in `added`.
+        """
+        self._reset_slider()
+        there = {name: its for name, its in placed.items() if name in self.basis.names}
+        requests = move_lights(self.requests, self.basis.lights, there)
+        requests = requests.with_added({k: its for k, its in placed.items() if k not in there})
+        self._moved_lights.check(requests.placed)
+        return [self._append_requests(label, requests)]
 
     def _append_requests(self, label: str, requests: SessionRequests) -> Message:
         """Set requests from now on: a step."""
@@ -409,7 +430,7 @@ class Session:
 
     def _update_answer(self) -> None:
         self.version += 1
-        self._moved_lights.follow(self.requests.poses, self.views, self.live_answer)
+        self._moved_lights.follow(self.requests.placed, self.views, self.live_answer)
         self.live_answer.solve()
 
     def _patch_messages(self, *regions: tuple[int, Region]) -> list[Message]:

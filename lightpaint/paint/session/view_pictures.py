@@ -97,12 +97,18 @@ def _rough_plane(planes: RoughPlanes, k: int) -> Picture:
 def view_info(view: Canvas, basis: Basis) -> ViewInfo:
     """Return the description of a view for clients.
 
-    basis: of the view, with every light where the scene has it: moves change no scale.
+    basis: of the view, with every light where the scene has it: moves change no scale. Planes of
+    lights that were added are sent as they are.
     """
     objects, (height, width) = basis.objects, view.size
     return ViewInfo(
         name=view.name,
         size=(height, width),
         objects=() if objects is None else tuple(objects.names),
-        scales=tuple(scale_of(plane) for plane in basis.planes),
+        scales=tuple(plane_scale(basis, k) for k in range(len(view.basis.lights))),
     )
+
+
+def plane_scale(basis: Basis, k: int) -> float:
+    """Return what the plane of light k is divided by to be sent. basis: as of `view_info`."""
+    return scale_of(basis.planes.plane(k)) if k < len(basis.lights) else 1.0

@@ -34,30 +34,47 @@ class SessionRequests:
     lights: by name of light, keys and values as of a lights file. ties: names that share a dimmer.
     values: of FIT_KEYS and ALL_LIGHTS_KEYS, those that differ from the painting's defaults.
     poses: of lights that were moved, by name: position, target, cutoff and beam, as in a `Pose`.
+    added: lights that the scene does not have, by name, behind all others: kind, pose, size and
+    emission, as in a `NewEmitter`.
     """
 
     lights: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     ties: tuple[tuple[str, ...], ...] = ()
     values: Mapping[str, Any] = field(default_factory=dict)
     poses: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    added: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "SessionRequests":
         """Return the requests that `as_json` wrote."""
         ties = tuple(tuple(names) for names in data.get("ties", ()))
         poses = {name: dict(pose) for name, pose in data.get("poses", {}).items()}
-        return cls(dict(data.get("lights", {})), ties, dict(data.get("values", {})), poses)
+        added = {name: dict(light) for name, light in data.get("added", {}).items()}
+        return cls(dict(data.get("lights", {})), ties, dict(data.get("values", {})), poses, added)
 
     def as_json(self) -> dict[str, Any]:
         """Return plain values."""
         lights = {name: dict(constraints) for name, constraints in self.lights.items()}
         moved = {name: dict(pose) for name, pose in self.poses.items()}
+        added = {name: dict(light) for name, light in self.added.items()}
         return {
             "lights": lights,
             "ties": [list(x) for x in self.ties],
             "values": dict(self.values),
             **({"poses": moved} if moved else {}),
+            **({"added": added} if added else {}),
         }
+
+    @property
+    def placed(self) -> dict[str, Mapping[str, Any]]:
+        """Lights that are elsewhere than in the scene, or not in it, by name.
+
+        A pose of those that were moved; of added ones, which come last, `kind` and the like beside
+        it.
+        """
+        moved = {name: pose for name, pose in self.poses.items() if name not in self.added}
+        added = {name: {**light, **self.poses.get(name, {})} for name, light in self.added.items()}
+        return moved | added
 
     def with_light(self, name: str, asked: Mapping[str, Any]) -> "SessionRequests":
         """Return these requests with all those on one light replaced.
@@ -74,6 +91,25 @@ class SessionRequests:
         for name, change in poses.items():
             merged[name] = {**merged.get(name, {}), **change} if change else {}
         return replace(self, poses={name: pose for name, pose in merged.items() if pose})
+
+    def with_added(self, added: Mapping[str, Mapping[str, Any]]) -> "SessionRequests":
+        """Return these requests with more lights."""
+        return replace(self, added={**self.added, **added})
+
+    def without_added(self, name: str) -> "SessionRequests":
+        """Return these requests without an added light, and without all that concerns it."""
+
+        def others(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+            return {key: value for key, value in entries.items() if key != name}
+
+        left = (tuple(x for x in names if x != name) for names in self.ties)
+        return replace(
+            self,
+            lights=others(self.lights),
+            ties=tuple(names for names in left if len(names) > 1),
+            poses=others(self.poses),
+            added=others(self.added),
+        )
 
     def with_ties(self, ties: Sequence[Sequence[str]]) -> "SessionRequests":
         """Return these requests with these dimmers; the first held light of each holds it."""

@@ -136,7 +136,7 @@ class BackgroundJobs:
 
     def solve_command(self, sensors: Sequence[str], requests: SessionRequests) -> str:
         """Return the command that solves exported paintings to the same answer; "" if none."""
-        if requests.poses:
+        if requests.placed:
             return ""  # which has no words for them
         subject = self._host.subjects[0]
         paths = {sensor: str(painting_path(subject.folder, sensor)) for sensor in sensors}
@@ -164,7 +164,7 @@ class BackgroundJobs:
         """
         self._host.finish_planes(check)
         snapshot, lighting = self._host.snapshot_and_lighting()
-        is_moved = bool(snapshot.requests.poses)
+        is_moved = bool(snapshot.requests.placed)
         subjects, snapshot = of_moved_scenes(self._host.subjects, snapshot, self._host.rig)
         solution = snapshot.solution()
         if solution is not None:

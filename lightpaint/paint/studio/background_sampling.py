@@ -77,7 +77,7 @@ class BackgroundSampling:
 
         # Samples are of the scene, in which no light is moved.
         bases = None
-        if not (is_outdated() or snapshot.requests.poses):
+        if not (is_outdated() or snapshot.requests.placed):
             bases = add_round(
                 self._host.subjects,
                 snapshot,
@@ -91,7 +91,7 @@ class BackgroundSampling:
             self._host.publish(ProgressReport(what=SAMPLING, done=1, total=1, unit=""))
         if bases is not None:
             self._host.use_bases(bases)
-        elif not (is_outdated() or snapshot.requests.poses):
+        elif not (is_outdated() or snapshot.requests.placed):
             self._host.denoise_planes()
 
     def _report(self, label: str, done: int, total: int, unit: str = "passes") -> None:

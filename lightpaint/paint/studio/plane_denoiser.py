@@ -104,7 +104,7 @@ class PlaneDenoiser:
             if not self._is_needed() or session.bases[view.view] is not basis:
                 return
             planes.halves[k], planes.scales[k] = denoise_to_halves(basis, k)
-            if basis.names[k] not in session.requests.poses:
+            if basis.names[k] not in session.requests.placed:
                 self._publish(name_in_view(f"clean/{k}", view.view), planes.halves[k])
                 thumbnail = plane_thumbnail(planes.plane(k), basis.emitters_seen)
                 self._publish(name_in_view(f"thumb/{k}", view.view), thumbnail)

@@ -39,6 +39,7 @@ from lightpaint.paint.rig.lamp_rig import LampRig
 from lightpaint.paint.rig.light_mover import LightMover
 from lightpaint.paint.rig.light_placer import LightPlacer
 from lightpaint.paint.session.look_library import LookLibrary
+from lightpaint.paint.session.moved_lights import Placed
 from lightpaint.paint.session.picture_table import Picture, PictureTable
 from lightpaint.paint.session.session import Session
 from lightpaint.paint.session.session_state import offered_transforms, state_fields
@@ -206,13 +207,37 @@ class Studio:
                     return self._placer.handle(message)
                 case protocol.PointLight():
                     messages = session.handle(self._mover.move_of(message), arrays)
+                case protocol.AddLight():
+                    name, values = self._mover.hang(message)
+                    messages = session.hang_lights(f"add {name}", {name: values})
                 case protocol.LoadLook():
                     messages = looks.load(message)
                 case _:
                     messages = session.handle(message, arrays)
-            self._mover.follow()
+            messages = self._followed(messages)
         self._exact_answers.notify()
         return messages
+
+    def _followed(self, messages: list[Message]) -> list[Message]:
+        """Return the answers to a request, after lights have followed it: the whole state where
+        some have come or gone.
+        """
+        return [self.state(), *self._mover.rig_messages()] if self._mover.follow() else messages
+
+    def hang_lights(self, label: str, placed: Placed, *, before: Placed) -> bool:
+        """Move lights and add others, by name: one step, which pages are told of.
+
+        before: where they were; returns False, and does nothing, if that is so no more.
+        """
+        with self._publish_lock:
+            with self._lock:
+                if self.session.requests.placed != before:
+                    return False
+                messages = self._followed(self.session.hang_lights(label, placed))
+            for message in messages:
+                self.publish(message)
+        self._exact_answers.notify()
+        return True
 
     def snapshot(self) -> SessionSnapshot:
         """Return the present paintings and requests. Raises PaintError before there is a basis."""
@@ -237,8 +262,7 @@ class Studio:
         Raises LightpaintError for requests that are refused; nothing is changed then.
         """
         with self._lock:
-            messages = self.session.load(paintings, requests, label)
-            self._mover.follow()
+            messages = self._followed(self.session.load(paintings, requests, label))
         self._exact_answers.notify()
         return messages
 
@@ -283,7 +307,7 @@ class Studio:
 
     def finish_planes(self, check: Callable[[], None]) -> None:
         """Render the planes of moved lights that are quick ones so far. check: raises to stop."""
-        self._mover.finish(self.session.requests.poses, check)
+        self._mover.finish(self.session.requests.placed, check)
 
     @property
     def rig(self) -> LampRig:

@@ -156,6 +156,20 @@ def _pair(
     return pair
 
 
+def surfaces_of(rigging: Rigging, scene: Scene) -> tuple[str, ...]:
+    """Return the names of what lights may hang on: rails and surfaces, then shapes with an id."""
+    named = (name for name in scene.shape_names if not name.startswith("_"))
+    return tuple(dict.fromkeys([*(name for name, _, _ in rigging.on), *named]))
+
+
+def freedom_on(names: Sequence[str], scene: Scene, rigging: Rigging) -> Freedom:
+    """Return the freedom to hang on rails, surfaces and shapes of these names.
+
+    Raises ConstraintError for names that nothing has.
+    """
+    return Freedom(**_places_on(list(names), scene, rigging, "on"))
+
+
 def _places_on(names: Any, scene: Scene, rigging: Rigging, where: str) -> dict[str, Any]:
     """Return rails and surfaces of these names as fields of a freedom.
 

@@ -29,6 +29,9 @@ HARDLY = 1e-4
 class PoseSteps:
     """Steps of arrangements.
 
+    Attributes:
+        watch: Hears of each arrangement that was tried.
+
     Args:
         fit: The goal, and the columns of lights that stay.
         spread: Median distance of visible points from their middle.
@@ -42,6 +45,7 @@ class PoseSteps:
         permits: Callable[[Sequence[Movable], Sequence[Site]], bool],
     ) -> None:
         self._fit, self._permits = fit, permits
+        self.watch: Callable[[Arrangement], None] = lambda _: None
         self.first_step = FIRST_STEP * spread
         self._unit = spread / 3
 
@@ -78,6 +82,7 @@ class PoseSteps:
             arrangement, ridge = self.step(
                 arrangement, at, step, ridge, moving=moving, is_central=is_central
             )
+            self.watch(arrangement)
             progress()
             share = 1 - arrangement.missed / max(before, 1e-300)
             if share < HARDLY and step <= last:

@@ -141,3 +141,29 @@ def test_a_spot_is_pointed_by_clicks_and_by_numbers(room: Room, axe: str) -> Non
     assert room.page.locator(".is-pointing").count() == 0
     row.get_by_role("button", name="Put back").click()
     until(lambda: room.poses == {})
+
+
+def test_a_light_is_added_by_a_click_dragged_and_removed(room: Room) -> None:
+    page, session = room.page, room.studio.session
+    page.get_by_role("button", name="Add a light").click()
+    page.mouse.click(*room.seen((-0.4, 0, 0.3)))
+    place = until(lambda: session.requests.added.get("spot_1"))["position"]
+    until(lambda: room.mark("spot_1") == pytest.approx(room.seen(place), abs=1))
+    assert not session.is_painted
+    room.drag(room.mark("spot_1"), 40, 0)
+    until(lambda: session.store.position == 2)
+    moved = room.poses["spot_1"]["position"]
+    assert moved[0] > place[0]
+    row = page.get_by_role("group", name="spot_1", exact=True)
+    row.get_by_role("button", name="Remove").click()
+    page.wait_for_selector('[data-lamp="spot_1"]', state="detached")
+    page.keyboard.press("Control+z")
+    page.wait_for_selector('[data-lamp="spot_1"]')
+    until(lambda: room.mark("spot_1") == pytest.approx(room.seen(moved), abs=1))
+    # In the plan it hangs below the ceiling, where it was clicked.
+    page.get_by_label("New light").select_option("point")
+    page.get_by_role("button", name="Add a light").click()
+    box = page.locator(".room-plan > svg").bounding_box()
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    until(lambda: "point_1" in session.requests.added)
+    page.wait_for_selector('[data-lamp="point_1"]')

@@ -251,7 +251,8 @@ export interface Findings {
  *
  * asked: constraints by name of light, keys and values as in a lights file. ties: names on one
  * dimmer. settings: set by somebody. resolved: the values in effect. poses: of lights that were
- * moved, by name. layers: what the painting is made of.
+ * moved, by name. added: names of lights that the scene does not have. layers: what the painting
+ * is made of.
  */
 export interface EditState {
   history?: HistoryInfo;
@@ -259,6 +260,7 @@ export interface EditState {
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
+  added?: string[];
   resolved?: ResolvedFit;
   layers?: LayerList;
 }
@@ -282,6 +284,7 @@ export interface SessionState {
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
+  added?: string[];
   resolved?: ResolvedFit;
   layers?: LayerList;
   version: number;
@@ -349,6 +352,7 @@ export interface AnswerUpdate {
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
+  added?: string[];
   resolved?: ResolvedFit;
   layers?: LayerList;
   version: number;
@@ -373,6 +377,7 @@ export interface CanvasPatch {
   ties?: string[][];
   settings?: Record<string, any>;
   poses?: Record<string, Record<string, any>>;
+  added?: string[];
   resolved?: ResolvedFit;
   layers?: LayerList;
   region: Region;
@@ -518,7 +523,7 @@ export interface PreviewResult {
  *
  * lights: in the order of the state. cameras: of each view; null for one that is no pinhole. up:
  * the axis that is nearest to upwards, 0, 1 or 2. low, high: corners of a box with all that is
- * seen, and all lights.
+ * seen, and all lights. surfaces: names of what new lights may hang on: rails, surfaces, shapes.
  */
 export interface Rig {
   kind: 'rig';
@@ -528,13 +533,27 @@ export interface Rig {
   up: number;
   low: number[];
   high: number[];
+  surfaces: string[];
+  arrays: {  };
+}
+
+/**
+ * The places that a search tries at present. Unasked.
+ *
+ * positions, directions: by name of light; of new ones, too.
+ */
+export interface TrialPlaces {
+  kind: 'trial';
+  reply?: number;
+  positions: Record<string, number[]>;
+  directions: Record<string, number[]>;
   arrays: {  };
 }
 
 /**
  * The result of a search for places of lights. Unasked.
  *
- * text: what was moved, and what for; or why nothing was. names: of lights that were moved.
+ * text: what was moved or added, and what for; or why nothing was. names: of these lights.
  */
 export interface PlacingResult {
   kind: 'placed';
@@ -702,11 +721,40 @@ export interface PointLight {
 }
 
 /**
+ * A new light, which gets a name by itself: one step. Answered by `state`; `rig` follows.
+ *
+ * type: of the light. at: column and row in a picture; the light hangs a little before the surface
+ * that is seen there, and points away from it. position: its place, instead; it points down. view:
+ * whose picture it is.
+ */
+export interface AddLight {
+  type: 'spot' | 'point' | 'panel';
+  at?: [number, number] | null;
+  position?: number[] | null;
+  view?: number;
+}
+
+/**
+ * A light that was added and is to go, by name: one step. Answered by `state`; `rig`
+ * follows.
+ */
+export interface RemoveLight {
+  name: string;
+}
+
+/**
  * A request to find places, directions and cones of lights that come closest to the paintings,
- * or to stop that. Answered by `started`, later by `placed`; what is found is one step.
+ * or to stop that. Answered by `started`, then by `trial` and later by `placed`; what is found is
+ * one step.
+ *
+ * new: kind of lights to add, instead of moving those that there are; null for none. count: most
+ * of them. on: names of rails, surfaces and shapes that they may hang on; none for anywhere free.
  */
 export interface PlaceLights {
   run?: boolean;
+  new?: 'spot' | 'point' | 'panel' | null;
+  count?: number;
+  on?: string[];
 }
 
 /**
@@ -875,6 +923,7 @@ export interface Events {
   explained: Explanation;
   previewed: PreviewResult;
   rig: Rig;
+  trial: TrialPlaces;
   placed: PlacingResult;
   say: Notice;
   failed: Failure;
@@ -894,6 +943,8 @@ export interface Requests {
   ask_all: AskAll;
   move: MoveLights;
   point: PointLight;
+  add_light: AddLight;
+  remove_light: RemoveLight;
   place: PlaceLights;
   show_rig: ShowRig;
   tie: TieLights;

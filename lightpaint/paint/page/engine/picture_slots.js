@@ -35,9 +35,9 @@ export function wantedPictures(count, shown, view, resources) {
   return wanted;
 }
 
-/** Return the number of lights and the size of each view, as text to compare. @param {Message} state */
-export function sizes({ lights, size, views = [{ size }] }) {
-  return String([lights.length, ...views.map((/** @type {any} */ view) => view.size)]);
+/** Return the size of each view, as text to compare. @param {Message} state */
+export function sizes({ size, views = [{ size }] }) {
+  return String(views.map((/** @type {any} */ view) => view.size));
 }
 
 /** Return whether the present look is among the pictures shown. @param {Show | null} show */

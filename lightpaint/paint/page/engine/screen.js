@@ -58,6 +58,12 @@ export class Screen {
     this.fit();
   }
 
+  /** The same pictures of so many lights. @param {number} count */
+  setCount(count) {
+    this.count = count;
+    this.view?.setCount(count);
+  }
+
   /** The GPU has gone; without it, if it does not come back. @param {PictureView} view */
   lost(view) {
     // One that is closed gives its context up, and is told so when the next one is there already.

@@ -98,7 +98,10 @@ export class SessionMirror {
     this.latestState = message;
     this.state = state;
     this.view = view;
-    if (isSame) return;
+    if (isSame) {
+      if (before?.lights.length !== state.lights.length) this.setLights(state.lights.length);
+      return;
+    }
     const [height, width] = /** @type {[number, number]} */ (state.size);
     this.screen.begin([height, width], state.lights.length, this.screen.view?.name);
     this.canvas = new PaintCanvas([height, width], new Uint16Array(3 * height * width));
@@ -117,6 +120,15 @@ export class SessionMirror {
     this.setLut(this.lut);
   }
 
+  /** Lights have come or gone: the painting stays, and their pictures come anew.
+   * @param {number} count */
+  setLights(count) {
+    const { loader, screen } = this;
+    for (let k = count; k < screen.count; k++) loader.want([[`plane ${k}`, null]]);
+    screen.setCount(count);
+    this.refill();
+  }
+
   /** What an answer or a patch says of weights, unless it is of before what was said already.
    * @param {Message} message */
   answered(message) {
@@ -127,7 +139,9 @@ export class SessionMirror {
 
   /** Weights that come with a message. @param {Message} message */
   mix(message) {
-    if (message.poses) this.isMoved = Object.keys(message.poses).length > 0;
+    const { poses, added } = message;
+    if (poses && added) this.isMoved = Object.keys(poses).length + added.length > 0;
+    else if (poses) this.isMoved ||= Object.keys(poses).length > 0;
     const weights = message.arrays?.weights?.data;
     if (!weights) return;
     this.weights = Float64Array.from(weights);
@@ -207,6 +221,7 @@ export class SessionMirror {
     const { data } = picture;
     if (slot.startsWith('plane ')) {
       const light = Number(slot.slice(6));
+      if (light >= state.lights.length) return;
       view.setPlane(light, /** @type {Uint16Array} */ (data), state.lights[light].scale ?? 1);
     } else if (slot === 'lut') this.setLut(lutOf(name.slice(4), picture, state.lut));
     else if (slot === 'present') this.setPresent(/** @type {Uint16Array} */ (data));

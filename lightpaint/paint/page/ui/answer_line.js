@@ -69,7 +69,7 @@ export function AnswerLine({ ui, app }) {
  * @param {{ui: Ui}} props */
 export function PointerStatus({ ui }) {
   if (ui.pointing) {
-    const text = pointingHint(ui.pointing, ui.lights[ui.pointing.light].label);
+    const text = pointingHint(ui.pointing, ui.lights);
     return html`<p class="here" id="lp-status" role="status"><strong>${text}</strong></p>`;
   }
   if (!ui.pointed) {

@@ -20,8 +20,13 @@ const WAYS = /** @type {const} */ ({
   },
 });
 
-/** What is to be clicked next. @param {import("./ui_state.js").Pointing} pointing @param {string} name */
-export function pointingHint({ how, edge }, name) {
+/** What is to be clicked next. @param {import("./ui_state.js").Pointing} pointing
+ * @param {Ui["lights"]} lights */
+export function pointingHint(pointing, lights) {
+  if (pointing.how === 'hang')
+    return `Click the surface that the new ${pointing.type} hangs on, or its place in the plan. Esc cancels.`;
+  const { how, edge } = pointing;
+  const name = lights[pointing.light]?.label ?? '';
   if (how === 'aim') return `Click what ${name} is to point at. Esc cancels.`;
   if (how === 'highlight') return `Click where the highlight of ${name} is to be seen. Esc cancels.`;
   return edge
@@ -34,8 +39,9 @@ export function pointingHint({ how, edge }, name) {
 export function pointLamp(app, point) {
   const { pointing, view } = app.store.value;
   if (!pointing || !point) return;
-  const { light, how, edge } = pointing;
   const at = /** @type {[number, number]} */ ([point.x, point.y]);
+  if (pointing.how === 'hang') return void app.session.addLight({ type: pointing.type, at, view });
+  const { light, how, edge } = pointing;
   if (how === 'shadow' && !edge) return app.store.set({ pointing: { light, how, edge: at } });
   app.store.set({ pointing: null });
   app.session.lampMoves.ask(light, { kind: 'point', how, at, ...(edge ? { edge } : {}), view });
@@ -45,11 +51,12 @@ export function pointLamp(app, point) {
 export function LampFields({ k, ui, app }) {
   const { session, store } = app;
   if (!ui.state?.can_render) return null;
-  if (!ui.rig)
+  if (!ui.rig?.lights[k])
     return html`<div class="lamp-fields"><${Button} label="Place and aim" class="wide"
       tip="Mark the lights in the pictures, and move them" act=${() => session.toggleLamps()} /></div>`;
   const place = placeOf(ui, k);
   const { name, label } = ui.lights[k];
+  const isAdded = ui.added.includes(name);
   if (place.why_not)
     return html`<p class="faint lamp-fields">${label} ${place.why_not}: it stays where it is.</p>`;
   const vector = (
@@ -66,7 +73,7 @@ export function LampFields({ k, ui, app }) {
           session.moveLamp(k, { [key]: value.map((was, i) => (i === c ? x : was)) })} />`,
       )}</div>`;
   const point = (/** @type {"aim" | "highlight" | "shadow"} */ how) => {
-    const isOn = ui.pointing?.how === how && ui.pointing.light === k;
+    const isOn = ui.pointing?.how === how && 'light' in ui.pointing && ui.pointing.light === k;
     return html`<${Button} key=${how} label=${WAYS[how].label} tip=${WAYS[how].tip} on=${isOn}
       act=${() =>
         store.set({ lamps: true, lamp: k, pointing: isOn ? null : { light: k, how } })} />`;
@@ -89,6 +96,7 @@ export function LampFields({ k, ui, app }) {
     <div class="lamp-ways" role="group" aria-label=${`Point ${label} by a click`}>
       ${place.position && place.direction && point('aim')}
       ${point('highlight')}${point('shadow')}
-      ${name in ui.poses && html`<${Button} label="Put back" tip="Back to where the scene has it" act=${() => session.putBack(k)} />`}
+      ${name in ui.poses && html`<${Button} label="Put back" tip=${`Back to where ${isAdded ? 'you hung it' : 'the scene has it'}`} act=${() => session.putBack(k)} />`}
+      ${isAdded && html`<${Button} label="Remove" icon="trash" tip=${`Remove ${label}. Undo brings it back.`} act=${() => session.removeLight(name)} />`}
     </div></div>`;
 }

@@ -1,7 +1,16 @@
 /** Lights, marked where they hang in the pictures, with handles on the one that was chosen. */
 
 import { html, useRef } from '../vendor/preact.js';
-import { inPlane, onRail, seenAt, seenTowards, upAndDown, within } from './lamp_geometry.js';
+import {
+  inPlane,
+  minus,
+  onRail,
+  plus,
+  seenAt,
+  seenTowards,
+  upAndDown,
+  within,
+} from './lamp_geometry.js';
 import { toHex } from './paint_colour.js';
 import { atFull, luminance } from './paint_colour.js';
 
@@ -14,6 +23,9 @@ import { atFull, luminance } from './paint_colour.js';
 
 /** CSS pixels between a mark at the edge and the edge. */
 const MARGIN = 14;
+
+/** Length of the arrow of a place on trial, as a part of the room. */
+const ARROW = 0.06;
 
 /** @param {{ui: Ui, app: App, panes: Pane[]}} props */
 export function LampMarks({ ui, app, panes }) {
@@ -62,8 +74,9 @@ function PaneMarks({ ui, app, pane, camera, isTwin }) {
   });
   const places = /** @type {LightPlace[]} */ (ui.rig?.lights ?? []);
   return html`
+    <${Trials} ui=${ui} camera=${camera} box=${box} onPage=${onPage} />
     <${Ghosts} ui=${ui} camera=${camera} box=${box} onPage=${onPage} />
-    ${ui.lamp !== null && html`<${Beam} place=${placeOf(ui, ui.lamp)} camera=${camera} box=${box} onPage=${onPage} />`}
+    ${ui.lamp !== null && places[ui.lamp] && html`<${Beam} place=${placeOf(ui, ui.lamp)} camera=${camera} box=${box} onPage=${onPage} />`}
     ${places.map((_, k) => {
       const place = placeOf(ui, k);
       const seen = markAt(camera, place);
@@ -71,7 +84,7 @@ function PaneMarks({ ui, app, pane, camera, isTwin }) {
       return html`<${Mark} key=${k} ui=${ui} app=${app} light=${k} place=${place} pane=${pane}
         camera=${camera} at=${within(onPage(seen), inner)} isTwin=${isTwin} />`;
     })}
-    ${ui.lamp !== null && html`<${AimHandle} ui=${ui} app=${app} light=${ui.lamp} pane=${pane} camera=${camera} inner=${inner}
+    ${ui.lamp !== null && places[ui.lamp] && html`<${AimHandle} ui=${ui} app=${app} light=${ui.lamp} pane=${pane} camera=${camera} inner=${inner}
       onPage=${onPage} isTwin=${isTwin} />`}`;
 }
 
@@ -163,13 +176,39 @@ function AimHandle({ ui, app, light, pane, camera, inner, onPage, isTwin }) {
     onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
 }
 
+/** Places that a search tries at present. @param {{ui: Ui, camera: Camera, box: Box,
+ *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
+function Trials({ ui, camera, box, onPage }) {
+  if (!ui.trial) return null;
+  const { left, top, right, bottom } = box;
+  const style = { left: `${left}px`, top: `${top}px` };
+  const { positions, directions } = ui.trial;
+  const marks = Object.entries(positions).flatMap(([name, position]) => {
+    const at = onPage(seenAt(camera, position));
+    const way = directions[name];
+    const to = way && onPage(seenAt(camera, plus(position, way, ARROW * sizeOf(ui))));
+    return at.isAhead ? [{ name, at, to: to?.isAhead ? to : null }] : [];
+  });
+  return html`<svg class="lamp-beam is-trial" style=${style} width=${right - left}
+    height=${bottom - top} aria-hidden="true">${marks.map(
+      ({ name, at, to }) => html`<g key=${name}>
+        ${to && html`<line x1=${at.x - left} y1=${at.y - top} x2=${to.x - left} y2=${to.y - top} />`}
+        <circle cx=${at.x - left} cy=${at.y - top} r="8" /></g>`,
+    )}</svg>`;
+}
+
+/** The diagonal of the room. @param {Ui} ui */
+function sizeOf({ rig }) {
+  return rig ? Math.hypot(...minus(rig.high, rig.low)) : 1;
+}
+
 /** Where lights hung before a search moved them. @param {{ui: Ui, camera: Camera, box: Box,
  *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
 function Ghosts({ ui, camera, box, onPage }) {
   const { left, top, right, bottom } = box;
   const style = { left: `${left}px`, top: `${top}px` };
   const moves = ui.lights.flatMap(({ name }, k) => {
-    const [before, now] = [ui.ghosts[name], placeOf(ui, k).position];
+    const [before, now] = [ui.ghosts[name], placeOf(ui, k)?.position];
     if (!before || !now || !(name in ui.poses)) return [];
     const [from, to] = [before, now].map((point) => onPage(seenAt(camera, point)));
     return from.isAhead && to.isAhead ? [{ name, from, to }] : [];

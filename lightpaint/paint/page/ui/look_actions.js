@@ -31,7 +31,7 @@ export async function loadLook({ session, store }, look) {
   store.set({ comingTo: name });
   const reply = await session.send('load_look', { look });
   if (store.value.comingTo === name) store.set({ comingTo: null });
-  if (reply?.kind === 'patch') mark(store, look);
+  if (reply?.kind === 'patch' || reply?.kind === 'state') mark(store, look);
 }
 
 /**

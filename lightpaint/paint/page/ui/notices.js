@@ -66,17 +66,18 @@ function ReconnectButton({ ui, app }) {
  */
 export function RunningTasks({ ui, app }) {
   if (!ui.ready) return null;
-  return html`${worksOf(ui, app).map(({ name, progress, text, stop }) => {
+  return html`${worksOf(ui, app).map(({ name, progress, text, stop, stopText, stopTip }) => {
     const far = progressText(progress);
     const whole = [name, far].filter(Boolean).join(': ');
     return html`<div class="working" key=${name}><${ProgressBar} progress=${progress} label=${name} />
       <span>${ui.pointed ? far || name : text ? `${whole}. ${text}` : whole}</span>
-      ${stop && html`<${Button} icon="close" tip=${`Stop: ${name.toLowerCase()}`} act=${stop} />`}</div>`;
+      ${stop && html`<${Button} icon=${stopText ? undefined : 'close'} label=${stopText}
+        tip=${stopTip ?? `Stop: ${name.toLowerCase()}`} act=${stop} />`}</div>`;
   })}`;
 }
 
 /** @typedef {{name: string, progress: {done: number, total: number, left_s?: number},
- *   text?: string, stop?: () => void}} Task */
+ *   text?: string, stop?: () => void, stopText?: string, stopTip?: string}} Task */
 
 /** Those that are seen nowhere else; of what comes by itself one only. @param {Ui} ui
  * @param {App} app @returns {Task[]} */
@@ -100,8 +101,10 @@ function worksOf(ui, { session }) {
     });
   if (ui.placing)
     works.push({
-      name: 'Placing the lights',
+      name: 'Searching for places',
       progress: ui.placing,
+      stopText: 'Stop, move nothing',
+      stopTip: 'Stop the search: every light stays where it is',
       stop: () => void session.placeLights(false),
     });
   if (ui.explaining && !isOpen) works.push({ name: 'Finding reasons', progress: endless });

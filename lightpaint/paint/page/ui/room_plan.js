@@ -1,6 +1,7 @@
 /** A small plan of the room from above, as the camera looks into it, with the lights to be dragged. */
 
 import { html, useRef } from '../vendor/preact.js';
+import { AddLight } from './add_light.js';
 import { MoveButton } from './advice.js';
 import { dot, minus, plus, unit } from './lamp_geometry.js';
 import { placeOf } from './lamp_marks.js';
@@ -12,6 +13,9 @@ import { atFull, luminance, toHex } from './paint_colour.js';
 
 /** Height of the plan, and room around it, in CSS pixels; its width follows from the panel. */
 const [WIDTH, HEIGHT, MARGIN] = [270, 130, 10];
+
+/** Height at which a light hangs that is added in the plan, as a part of the room's. */
+const HUNG = 0.85;
 
 /** Length of the arrow of a light's direction, in CSS pixels. */
 const ARROW = 16;
@@ -95,15 +99,35 @@ export function RoomPlan({ ui, app }) {
     app.store.set({ dragged: done ? null : { light, place: { position } } });
     app.session.moveLamp(light, { position }, done);
   };
+  const isHanging = ui.pointing?.how === 'hang';
+  const hang = (/** @type {PointerEvent} */ event) => {
+    if (ui.pointing?.how !== 'hang' || !frame.current) return;
+    const box = frame.current.getBoundingClientRect();
+    const zoom = WIDTH / box.width;
+    const height = rig.low[rig.up] + HUNG * (rig.high[rig.up] - rig.low[rig.up]);
+    const place = plan.back(
+      (event.clientX - box.left) * zoom,
+      (event.clientY - box.top) * zoom,
+      height,
+    );
+    void app.session.addLight({ type: ui.pointing.type, position: place, view: ui.view });
+  };
   const up = (/** @type {PointerEvent} */ event) => {
     if (app.store.value.dragged) moved(event, true);
     held.current = null;
   };
   return html`<div class="room-plan">
     <svg ref=${frame} viewBox=${`0 0 ${WIDTH} ${HEIGHT}`} role="group"
-      aria-label="Plan of the room from above" onPointerMove=${(/** @type {any} */ e) => moved(e, false)}
+      aria-label="Plan of the room from above" class=${isHanging ? 'is-pointing' : ''}
+      onPointerDown=${hang} onPointerMove=${(/** @type {any} */ e) => moved(e, false)}
       onPointerUp=${up} onPointerCancel=${up}>
       <polygon class="room" points=${outline} />
+      ${Object.entries(ui.trial?.positions ?? {}).map(([name, position]) => {
+        const [x, y] = plan.of(position);
+        const [dx, dy] = plan.way(ui.trial?.directions[name] ?? [0, 0, 0]);
+        return html`<g key=${`trial ${name}`} class="is-trial"><line x1=${x} y1=${y} x2=${x + ARROW * dx}
+          y2=${y + ARROW * dy} /><circle cx=${x} cy=${y} r="6" /></g>`;
+      })}
       ${rig.lights.map((_, k) => {
         const place = placeOf(ui, k);
         if (!place.position) return null;
@@ -115,6 +139,7 @@ export function RoomPlan({ ui, app }) {
           <line x1=${x} y1=${y} x2=${x + ARROW * dx} y2=${y + ARROW * dy} />
           <circle cx=${x} cy=${y} r="5" fill=${luminance(rgb) > 0 ? toHex(atFull(rgb)) : 'none'}
             data-tip=${label} onPointerDown=${(/** @type {PointerEvent} */ event) => {
+              if (isHanging) return;
               app.store.set({ lamp: k });
               if (place.why_not || place.rail) return;
               held.current = k;
@@ -122,6 +147,7 @@ export function RoomPlan({ ui, app }) {
             }}><title>${label}</title></circle></g>`;
       })}
     </svg>
+    <${AddLight} ui=${ui} app=${app} />
     <${MoveButton} ui=${ui} app=${app} />
   </div>`;
 }

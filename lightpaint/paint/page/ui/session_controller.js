@@ -186,6 +186,29 @@ export class SessionController extends SessionLink {
     return this.send('place', { run });
   }
 
+  /** Add a light, and choose it. @param {Requests["add_light"]} fields */
+  async addLight(fields) {
+    this.store.set({ pointing: null });
+    const reply = await this.send('add_light', fields);
+    if (reply?.kind !== 'state') return;
+    const lamp = this.store.value.lights.length - 1;
+    this.store.set(({ unfolded }) => ({ lamps: true, lamp, unfolded: [...unfolded, lamp] }));
+  }
+
+  /** @param {string} name of a light that was added */
+  removeLight(name) {
+    return this.send('remove_light', { name });
+  }
+
+  /** Search for places of new lights. @param {import("./ui_state.js").Ui["adding"]} adding */
+  findLights({ type, where, count }) {
+    const { lamps } = this.store.value;
+    if (!lamps) this.toggleLamps();
+    this.store.set({ placing: { what: 'place', done: 0, total: 0, unit: 'steps' }, ghosts: {} });
+    const on = where === 'anywhere' ? [] : [where];
+    return this.send('place', { run: true, new: type, count, on });
+  }
+
   /** Put a light back where the scene has it. @param {number} light */
   putBack(light) {
     this.lampMoves.ask(light, { kind: 'move', pose: {} });

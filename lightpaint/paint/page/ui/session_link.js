@@ -30,6 +30,7 @@ const EVENT_KINDS = [
   'patch',
   'renewed',
   'rig',
+  'trial',
   'placed',
   'progress',
   'stopped',
@@ -108,6 +109,8 @@ export class SessionLink {
         resources: { ...this.store.value.resources, ...m.resources },
       }),
       rig: (/** @type {HostEvents['rig']} */ m) => ({ rig: m }),
+      trial: (/** @type {HostEvents['trial']} */ m) =>
+        this.store.value.placing ? { trial: m } : {},
       placed: (/** @type {HostEvents['placed']} */ m) => this.placingEnded(m),
       progress: (/** @type {HostEvents['progress']} */ m) => progressUpdate(m, this.store.value),
       stopped: (/** @type {HostEvents['stopped']} */ m) => this.taskEnded(m.what),

@@ -15,7 +15,7 @@ export const TASK_ENDED = {
   verify: { verifying: null },
   explain: { explaining: false },
   preview: { preview: null },
-  place: { placing: null },
+  place: { placing: null, trial: null },
 };
 
 /** When nothing is known to be under way. */
@@ -33,8 +33,10 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
   const isBack = before.connection !== 'open' || before.closed !== null;
   const views = message.views ?? [];
   const view = before.view < views.length ? before.view : 0;
-  const { lights, asked, ties, settings, resolved, poses, history, looks, resources, basis } = message;
+  const { lights, asked, ties, settings, resolved, poses, added, history, looks, resources, basis } =
+    message;
   return {
+    ...lightNumbers(before, lights),
     ready: true,
     state: stateOfView(message, view),
     version: -1,
@@ -46,6 +48,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
     settings: settings ?? {},
     resolved: resolved ?? {},
     poses: poses ?? {},
+    added: added ?? [],
     history,
     looks: looks ?? [],
     resources: resources ?? {},
@@ -66,6 +69,32 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
     ...weightsOf(message),
   };
 }
+
+/** Where lights come or go, the numbers of others change. @param {Ui} before
+ * @param {Ui["lights"]} lights @returns {Partial<Ui>} */
+function lightNumbers(before, lights) {
+  const { rig } = before;
+  const now = (/** @type {number} */ k) =>
+    lights.findIndex((light) => light.name === before.lights[k]?.name);
+  const some = (/** @type {number[]} */ numbers) => numbers.map(now).filter((k) => k >= 0);
+  const names = (/** @type {Ui["lights"]} */ all) => all.map(({ name }) => name).join('\n');
+  if (!before.lights.length || names(lights) === names(before.lights)) return {};
+  const lamp = before.lamp === null ? -1 : now(before.lamp);
+  return {
+    solo: some(before.solo),
+    mute: some(before.mute),
+    unfolded: some(before.unfolded),
+    lamp: lamp < 0 ? null : lamp,
+    hovered: null,
+    pointed: null,
+    dragged: null,
+    // Where they hang is told next.
+    rig: rig && { ...rig, lights: lights.flatMap(({ name }) => rig.lights[indexOf(before, name)] ?? []) },
+  };
+}
+
+/** @param {Ui} ui @param {string} name */
+const indexOf = ({ lights }, name) => lights.findIndex((light) => light.name === name);
 
 /** @param {any} told @returns {NonNullable<Ui['verified']>} */
 const render = ({ is_old: isOld = false, ...about }) => ({ ...about, isOld });
@@ -204,7 +233,7 @@ export function answerUpdate(message, ui) {
   if (message.version < ui.version) return {};
   const made = /** @type {Partial<Ui>} */ (weightsOf(message));
   made.version = message.version ?? ui.version;
-  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'resolved', 'poses'])) {
+  for (const key of /** @type {const} */ (['history', 'asked', 'ties', 'settings', 'resolved', 'poses', 'added'])) {
     if (message[key]) made[key] = message[key];
   }
   if (message.lights) Object.assign(made, answerFields(message, ui));

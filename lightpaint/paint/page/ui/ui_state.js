@@ -20,8 +20,11 @@ import { ofKelvin } from './paint_colour.js';
  *   before: import("./engine_interface.js").Picture | null, after: import("./engine_interface.js").Picture | null}}
  *   Preview */
 /** @typedef {import("../engine/messages.js").Closeness} Seen */
-/** A light that the next click points; edge: what casts the shadow, once that was clicked.
- * @typedef {{light: number, how: "aim" | "highlight" | "shadow", edge?: [number, number]}} Pointing */
+/** What the next click does: it points a light, or hangs a new one. edge: what casts the shadow, once
+ * that was clicked.
+ * @typedef {{light: number, how: "aim" | "highlight" | "shadow", edge?: [number, number]}
+ *   | {how: "hang", type: NewKind}} Pointing */
+/** @typedef {"spot" | "point" | "panel"} NewKind */
 /** since: when it was first heard of, in ms, and how much was done then; left_s: about how many
  * seconds are left, once that can be told.
  * @typedef {{what: string, done: number, total: number, unit: string,
@@ -55,6 +58,7 @@ import { ofKelvin } from './paint_colour.js';
  * @property {Record<string, Constraints>} asked
  * @property {string[][]} ties
  * @property {Record<string, Record<string, any>>} poses of lights that were moved, by name
+ * @property {string[]} added names of lights that the scene does not have
  * @property {import("../engine/messages.js").Rig | null} rig where the lights hang, once it is known
  * @property {boolean} lamps whether lights are marked in the pictures
  * @property {number | null} lamp the marked light that was chosen, which has handles
@@ -64,8 +68,12 @@ import { ofKelvin } from './paint_colour.js';
  * @property {Progress | null} placing how far a search for places of the lights is
  * @property {Progress | null} sampling how near the lights are to the precision that was asked for,
  *   while samples are added
+ * @property {{positions: Record<string, number[]>, directions: Record<string, number[]>} | null} trial
+ *   places that a search tries at present, by name of light
+ * @property {{type: NewKind, where: string, count: number}} adding the light to add: where it hangs is
+ *   "click", "anywhere", or the name of a rail, surface or shape
  * @property {Record<string, number[]>} ghosts places of lights before a search has moved them, by name
- * @property {Pointing | null} pointing what the next click on a picture does to that light
+ * @property {Pointing | null} pointing what the next click on a picture does
  * @property {Record<string, any>} settings
  * @property {Record<string, any>} resolved
  * @property {{undo: string[], redo: string[], count?: number}} history labels of the last steps,
@@ -170,12 +178,15 @@ export function initialState() {
     asked: {},
     ties: [],
     poses: {},
+    added: [],
     rig: null,
     lamps: false,
     lamp: null,
     dragged: null,
     placing: null,
     sampling: null,
+    trial: null,
+    adding: { type: 'spot', where: 'click', count: 1 },
     ghosts: {},
     pointing: null,
     settings: {},

@@ -1,0 +1,130 @@
+"""Lights that a session adds to its scene: their values, and where a click hangs them."""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lightpaint.arrays import RGB, Doubles, Position
+from lightpaint.basis.lights import BasisLight
+from lightpaint.errors import PaintError, SceneError
+from lightpaint.paint.rig.cameras import FirstHit
+from lightpaint.paint.rig.pointing import FreeLength
+from lightpaint.placement.paths.frozen_paths import PanelSite
+from lightpaint.scene.lights.new_emitter import PLUGIN_OF, NewEmitter
+from lightpaint.scene.properties.emission import PLUGINS
+from lightpaint.scene.properties.pose import Pose, Site
+
+#: Keys of a pose, and of lights that are added, besides.
+POSE_KEYS, LIGHT_KEYS = ("position", "target", "cutoff", "beam"), ("kind", "size", "emission")
+
+#: Distance from the surface that a light is hung on, and side of a panel, relative to the diagonal
+#: of all that is seen; and the part of the way to the next surface that a light hangs at most.
+CLEARANCE, PANEL_SIDE, BEFORE_NEXT = 0.02, 0.08, 0.5
+
+#: Cone of a spot that is hung by hand, in degrees.
+CUTOFF, BEAM = 30.0, 20.0
+
+#: Luminance of a new light in the picture, as a share of that of the present look.
+FIRST_SHARE = 0.25
+
+
+def new_emitter(name: str, values: Mapping[str, Any]) -> NewEmitter:
+    """Return an added light where it hangs. Raises PaintError for values of none."""
+    if unknown := [key for key in values if key not in (*POSE_KEYS, *LIGHT_KEYS)]:
+        raise PaintError(f"{name}: a new light has no {unknown[0]!r}")
+    pose = {key: values[key] for key in POSE_KEYS if key in values}
+    kind, size = values.get("kind"), values.get("size")
+    if kind != "spot" and ("cutoff" in pose or "beam" in pose):
+        raise PaintError(f"{name} is a {kind}: it has no cone")
+    if kind == "point" and "target" in pose:
+        raise PaintError(f"{name} shines all around: it points nowhere")
+    try:
+        return NewEmitter(
+            name,
+            kind,  # type: ignore[arg-type]
+            Pose(**pose),
+            None if size is None else tuple(size),
+            values.get("emission", (1.0, 1.0, 1.0)),
+        )
+    except (SceneError, TypeError) as error:
+        raise PaintError(f"{name}: {error}") from None
+
+
+def values_of(emitter: NewEmitter) -> dict[str, Any]:
+    """Return a new light as the requests of a session have it."""
+    site = emitter.site
+    values: dict[str, Any] = {"kind": emitter.kind, "position": _listed(emitter.pose.position)}
+    if emitter.pose.target is not None:
+        values["target"] = _listed(emitter.pose.target)
+    if site.cutoff is not None:
+        values |= {"cutoff": site.cutoff, "beam": site.beam}
+    if emitter.size is not None:
+        values["size"] = list(emitter.size)
+    return {**values, "emission": [float(x) for x in emitter.emission]}
+
+
+def site_of_new(emitter: NewEmitter) -> Site:
+    """Return where a new light hangs, with what frozen paths know of its shape."""
+    site = emitter.site
+    if emitter.size is None:
+        return site
+    side = math.sqrt(emitter.size[0] * emitter.size[1])
+    return PanelSite(site.position, site.direction, side=side)
+
+
+def light_of_new(emitter: NewEmitter) -> BasisLight:
+    """Return a new light as a basis knows it."""
+    parameter, unit = PLUGINS[PLUGIN_OF[emitter.kind]]
+    x, y, z = emitter.pose.position or (0.0, 0.0, 0.0)
+    form = f"at ({x:.2f}, {y:.2f}, {z:.2f})"
+    return BasisLight(emitter.name, emitter.plugin, parameter, unit, emitter.emission, form)
+
+
+def free_name(kind: str, taken: Collection[str]) -> str:
+    """Return a name for a new light of a kind, like `spot_1`, which no other one has."""
+    return next(x for k in range(1, len(taken) + 2) if (x := f"{kind}_{k}") not in taken)
+
+
+def hung_before(
+    name: str, kind: str, hit: FirstHit, extent: float, free_length: FreeLength
+) -> NewEmitter:
+    """Return a new light that hangs a little before a surface and points away from it.
+
+    extent: diagonal of all that is seen.
+    """
+    nudge = 1e-4 * extent
+    room = nudge + free_length(hit.point + nudge * hit.normal, hit.normal)
+    clearance = min(CLEARANCE * extent, BEFORE_NEXT * room)
+    return hung_at(name, kind, hit.point + clearance * hit.normal, hit.normal, extent)
+
+
+def hung_at(name: str, kind: str, place: Doubles, direction: Doubles, extent: float) -> NewEmitter:
+    """Return a new light at a place, which points in a direction."""
+    values: dict[str, Any] = {"kind": kind, "position": _listed(place)}
+    if kind != "point":
+        values["target"] = _listed(place + 0.25 * extent * direction)
+    if kind == "spot":
+        values |= {"cutoff": CUTOFF, "beam": BEAM}
+    if kind == "panel":
+        values["size"] = [float(f"{PANEL_SIDE * extent:.3g}")] * 2
+    return new_emitter(name, values)
+
+
+def with_level(emitter: NewEmitter, alone: float, present: float) -> NewEmitter:
+    """Return a new light so bright that it is seen beside the others.
+
+    alone: mean luminance of the picture with it alone at unit emission. present: the same of the
+    present look.
+    """
+    level = FIRST_SHARE * present / alone if alone > 0 and present > 0 else 1.0
+    level = float(f"{level:.2g}")
+    emission: RGB = (level, level, level)
+    return replace(emitter, emission=emission)
+
+
+def _listed(point: Doubles | Position | None) -> list[float]:
+    """Return a point as JSON has it, without the noise of single precision."""
+    return [float(f"{x:.6g}") for x in np.asarray(point, dtype=float)]

@@ -1,0 +1,106 @@
+"""A studio of the test room, whose lights tests move and add."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from renderer import write_room
+
+from lightpaint.paint import protocol
+from lightpaint.paint.protocol import Message
+from lightpaint.paint.store.store import Store
+from lightpaint.paint.studio.studio import Studio
+from lightpaint.paint.subject import Subject
+from lightpaint.pipeline.job.settings import Settings
+from lightpaint.placement.space.free_space import pixels_of
+from lightpaint.scene.scene_reader import load_scene
+
+
+class Moving:
+    """A studio of the test room, and all that it says."""
+
+    def __init__(self, folder: Path, lights: str | None = None) -> None:
+        self.folder = folder
+        path = folder / "room.xml"
+        self.scene = load_scene(path if path.exists() else write_room(folder, lights=lights))
+        subject = Subject(
+            "room", folder, scene=self.scene, settings=Settings(spp=16, use_cache=False)
+        )
+        self.messages: list[Message] = []
+        self.studio = Studio([subject], lambda its: Store.open(folder / "session.db", its))
+        self.studio.on_message = self.messages.append
+        self.studio.start()
+        self.wait(lambda: any(m.kind == "state" for m in self.messages))
+
+    def wait(self, is_it: Callable[[], Any], seconds: float = 60) -> Any:
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            if found := is_it():
+                return found
+            time.sleep(0.02)
+        raise AssertionError([m.fields.get("text", m.kind) for m in self.messages])
+
+    def light(self, name: str) -> int:
+        return self.studio.session.basis.names.index(name)
+
+    def send(self, message: Any, **arrays: Any) -> list[Message]:
+        return self.studio.handle(message, arrays)
+
+    def plane(self, name: str) -> Any:
+        return np.array(self.studio.session.basis.planes.plane(self.light(name)))
+
+    def rendered(self) -> "Moving":
+        """Wait until all planes are rendered ones."""
+        session = self.studio.session
+        self.wait(lambda: not self.studio.rig.unrendered(session.requests.poses))
+        return self
+
+    def close(self) -> None:
+        self.studio.close()
+        self.studio.wait()
+
+
+def stroke(moving: Moving, number: int = 0) -> None:
+    region = (2, 9, 2, 9)
+    moving.send(
+        protocol.Paint(number, region, True),
+        image=np.full((7, 7, 3), 0.7, np.float32),
+        importance=np.ones((7, 7), np.float32),
+    )
+
+
+def opened_rig(moving: Moving) -> Any:
+    moving.send(protocol.ShowRig())
+    return moving.wait(lambda: next((m for m in moving.messages if m.kind == "rig"), None))
+
+
+def pixel_of(moving: Moving, point: Any) -> tuple[float, float]:
+    """Where the camera of the scene itself sees a point."""
+
+    def seen(loaded: Any) -> Any:
+        return pixels_of(moving.scene, loaded, np.array([point]))[0]
+
+    x, y = moving.scene.while_loaded(seen)
+    height, width = moving.scene.size
+    return x * width, y * height
+
+
+def exact(moving: Moving) -> Any:
+    """The exact answer to what was done last, and what is said of it."""
+
+    def is_it(fields: Any) -> bool:
+        return "delta_e" in fields and fields["version"] == moving.studio.session.version
+
+    return moving.wait(
+        lambda: next(
+            (m.fields for m in moving.messages if m.kind == "answer" and is_it(m.fields)), None
+        )
+    )
+
+
+def placed(moving: Moving) -> Any:
+    return moving.wait(
+        lambda: next((m.fields for m in moving.messages if m.kind == "placed"), None), 200
+    )

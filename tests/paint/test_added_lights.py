@@ -1,0 +1,176 @@
+"""Lights that a session adds to its scene: in undo, looks, files and exports, and their planes."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from moving import Moving, exact, opened_rig, pixel_of, placed, stroke
+
+import lightpaint as lp
+from lightpaint.errors import LightpaintError
+from lightpaint.paint import protocol
+from lightpaint.scene.scene_reader import load_scene
+
+#: A place on the floor that the camera sees, and one in the air.
+FLOOR, AIR = (-0.4, 0.0, 0.3), (-0.3, 1.2, 0.4)
+
+
+def added(moving: Moving, request: protocol.AddLight) -> Any:
+    """The state after a light was added, which is its answer."""
+    [state, *_] = moving.send(request)
+    assert state.kind == "state"
+    return state
+
+
+def names(moving: Moving) -> tuple[str, ...]:
+    return moving.studio.session.basis.names
+
+
+@pytest.mark.parametrize("kind", ["spot", "point", "panel"])
+def test_an_added_light_has_the_plane_of_its_place(moving: Moving, kind: Any) -> None:
+    """At once about, and rendered soon; the other planes and the present look stay."""
+    session = moving.studio.session
+    before = {name: moving.plane(name) for name in session.basis.names}
+    look = session.basis.present_look.copy()
+    state = added(moving, protocol.AddLight(kind, position=AIR))
+    name = f"{kind}_1"
+    assert [light.name for light in state.lights] == [*before, name]
+    assert state.added == (name,)
+    assert len(state.weights) == len(state.answer.lights) == len(state.views[0].scales) == 6
+    quick = moving.plane(name)
+    moving.rendered()
+    [there] = moving.studio.rig.moved_scene(session.requests.placed).added
+    basis = lp.render_basis(moving.scene.with_new_emitters([there]), spp=512, seed=7)
+    # A panel itself is seen once it is rendered.
+    truth, is_lit = basis.image(name), ~basis.emitters_seen
+    for plane in (quick, moving.plane(name)):
+        error = np.square(plane - truth)[is_lit].sum()
+        assert error < 0.15 * np.square(truth)[is_lit].sum()  # noise of few samples
+    for other, plane in before.items():
+        assert np.array_equal(moving.plane(other), plane)
+    assert np.array_equal(session.basis.present_look, look)
+    # It is seen: its part of the picture is a fifth, and three fifths are more than it may be.
+    assert 0.1 < state.answer.lights[-1].share < 0.6
+
+
+def test_the_painting_finds_a_light_that_is_missing(moving: Moving) -> None:
+    """The painting is the look with one light more; the search shows what it tries."""
+    there = lp.NewEmitter("lamp", "point", lp.Pose(position=(-0.2, 0.5, 0.7)), emission=(2, 2, 2))
+    wanted = lp.render_basis(moving.scene.with_new_emitters([there]), spp=128, seed=5)
+    look = wanted.mix(wanted.present_weights)
+    whole = (0, look.shape[0], 0, look.shape[1])
+    moving.send(
+        protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
+    )
+    moving.send(protocol.PlaceLights(new="point"))
+    result = placed(moving)
+    assert result["names"] == ["point_1"], result
+    assert any("point_1" in m.positions for m in moving.messages if m.kind == "trial")
+    found = moving.studio.session.requests.added["point_1"]
+    assert math.dist(found["position"], there.pose.position or ()) < 0.3
+    assert names(moving)[-1] == "point_1"
+    assert moving.studio.session.store.position == 2
+    moving.send(protocol.Undo())
+    assert moving.studio.session.requests.added == {}
+
+
+def test_a_click_hangs_a_light_before_the_surface(moving: Moving) -> None:
+    opened_rig(moving)
+    added(moving, protocol.AddLight("spot", at=pixel_of(moving, FLOOR)))
+    place = moving.studio.session.requests.added["spot_1"]
+    x, y, z = place["position"]
+    assert (x, z) == pytest.approx((FLOOR[0], FLOOR[2]), abs=2e-3)
+    assert 0 < y < 0.1
+    assert np.subtract(place["target"], place["position"])[1] > 0
+
+
+def test_undo_looks_and_the_file_keep_added_lights(moving: Moving) -> None:
+    session, before = moving.studio.session, names(moving)
+    added(moving, protocol.AddLight("point", position=AIR))
+    moving.rendered()
+    plane = moving.plane("point_1")
+    light = len(before)
+    moving.send(protocol.Ask(light, {"lock": [0.3, 0.2, 0.1]}))
+    moving.send(protocol.SaveLook("with"))
+    for _ in range(2):
+        [state, *_] = moving.send(protocol.Undo())
+    assert state.kind == "state"
+    assert names(moving) == before
+    assert session.weights.shape == (len(before), 3)
+    moving.send(protocol.SaveLook("without"))
+    moving.send(protocol.LoadLook(1))
+    assert names(moving) == (*before, "point_1")
+    assert np.array_equal(moving.plane("point_1"), plane)
+    assert session.weights[light] == pytest.approx((0.3, 0.2, 0.1))
+    moving.send(protocol.LoadLook(2))
+    assert names(moving) == before
+    moving.send(protocol.Undo())
+    moving.close()
+    again = Moving(moving.folder)
+    try:
+        assert names(again) == (*before, "point_1")
+        assert again.studio.session.weights[light] == pytest.approx((0.3, 0.2, 0.1))
+        again.rendered()
+        assert np.allclose(again.plane("point_1"), plane)
+    finally:
+        again.close()
+
+
+def test_an_added_light_moves_is_named_anew_and_goes(moving: Moving) -> None:
+    session, before = moving.studio.session, names(moving)
+    for _ in range(2):
+        added(moving, protocol.AddLight("point", position=AIR))
+    assert names(moving)[-2:] == ("point_1", "point_2")
+    here = moving.plane("point_2")
+    there = [0.4, 1.2, 0.1]
+    moving.send(protocol.MoveLights({"point_2": {"position": there}}))
+    assert not np.array_equal(moving.plane("point_2"), here)
+    moving.send(protocol.TieLights((("point_1", "point_2"),)))
+    moving.send(protocol.RemoveLight("point_1"))
+    assert names(moving) == (*before, "point_2")
+    assert session.requests.ties == ()
+    assert opened_rig(moving).lights[-1].position == pytest.approx(there)
+    moving.send(protocol.MoveLights({"point_2": {}}))
+    assert np.array_equal(moving.plane("point_2"), here)
+    moving.send(protocol.RemoveLight("point_2"))
+    assert session.requests.placed == {}
+    moving.send(protocol.Undo())
+    assert names(moving) == (*before, "point_2")
+
+
+def test_added_lights_are_solved_for_exported_and_verified(moving: Moving) -> None:
+    added(moving, protocol.AddLight("spot", position=AIR))
+    stroke(moving)
+    assert exact(moving)["lights"][-1]["error"]
+    moving.send(protocol.Export(("lighting", "relit", "report")))
+    moving.wait(lambda: [m for m in moving.messages if m.kind == "exported"])
+    relit = load_scene(moving.folder / "relit.xml")
+    site = relit.light("spot_1").members[0].site
+    assert site.position == pytest.approx(AIR)
+    assert site.cutoff == pytest.approx(30)
+    moving.send(protocol.Verify())
+    verified = moving.wait(lambda: next((m for m in moving.messages if m.kind == "verified"), None))
+    assert verified.fields["agrees"], verified.fields["text"]
+
+
+@pytest.mark.parametrize(
+    ("request_", "text"),
+    [
+        (protocol.AddLight("spot"), "a new light needs a place"),
+        (protocol.AddLight("spot", position=(math.nan, 0, 0)), "position is (nan"),
+        (protocol.AddLight("spot", position=(1.0, 2.0)), "expected three numbers"),
+        (protocol.AddLight("spot", at=(0.5, 0.5)), "nothing is seen there"),
+        (protocol.AddLight("spot", at=(math.nan, 0.5)), "outside the picture"),
+        (protocol.AddLight("spot", at=(5.0, 5.0), view=3), "no view 3"),
+        (protocol.RemoveLight("bulb"), "a light of the scene: turn it off"),
+        (protocol.RemoveLight("ghost"), "no light is called 'ghost'"),
+    ],
+)
+def test_lights_that_cannot_be_added_or_removed(moving: Moving, request_: Any, text: str) -> None:
+    version, before = moving.studio.session.version, names(moving)
+    with pytest.raises(LightpaintError) as caught:
+        moving.send(request_)
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert (moving.studio.session.version, names(moving)) == (version, before)
