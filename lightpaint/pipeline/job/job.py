@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.cache.cached_render import check_same_view
@@ -155,12 +156,10 @@ class Job:
         )
         results = self._result_folder(views, scenes, targets)
         results.check()
-        # The only place that sets these fields; they are frozen afterwards.
-        fields = vars(self)
         fit = resolve_for_targets(self.settings, [view.target for view in views])
-        fields.update(views=views, all_constraints=all_constraints, fit=fit, results=results)
-        fields.update(all_rigging=all_rigging)
-        fields.update(remarks=tuple(self._remarks(targets, scenes)))
+        self._set(views=views, all_constraints=all_constraints, fit=fit, results=results)
+        self._set(all_rigging=all_rigging)
+        self._set(remarks=tuple(self._remarks(targets, scenes)))
 
     @property
     def groups(self) -> LightGroups | None:
@@ -173,17 +172,15 @@ class Job:
 
         scenes: those of the views, on the same films. constraints: on lights that they add.
         """
-        moved = copy(self)
-        vars(moved)["all_constraints"] = self.all_constraints.and_then(constraints)
         views = zip(self.views, scenes, strict=True)
-        vars(moved)["views"] = tuple(replace(x, scene=scene, basis=None) for x, scene in views)
-        return moved
+        return copy(self)._set(
+            all_constraints=self.all_constraints.and_then(constraints),
+            views=tuple(replace(x, scene=scene, basis=None) for x, scene in views),
+        )
 
     def with_placement(self, placement: PlacementRecord) -> "Job":
         """Return this job with lights where they were found for another look."""
-        placed = copy(self)
-        vars(placed)["placement"] = placement
-        return placed
+        return copy(self)._set(placement=placement)
 
     def to_json(self) -> str:
         """Return this job as text, to run it elsewhere; paths stay as they were given.
@@ -222,6 +219,12 @@ class Job:
 
     def __hash__(self) -> int:
         return hash(self.folder)
+
+    def _set(self, **fields: Any) -> "Job":
+        """Set fields of a job that nobody else has yet, and return it; it is frozen afterwards."""
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+        return self
 
     def _check_counts(self) -> None:
         """Raise unless every view has a painting, and there is a scene or a basis."""
