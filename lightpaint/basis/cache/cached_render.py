@@ -88,18 +88,10 @@ def obtain_basis(
     cached = cache.find(scene.identity, scene.sensor_names[scene.sensor], seed, scene.size)
     if cached is not None and not is_of(scene, cached, seed):
         cached = None
-    goal_spp = scene.spp if spp is None else spp
-    start = cached
-    if start is not None and (time_s is not None or start.origin.spp < goal_spp):
-        start = replace(start, sums=cache.sums_of(start))
-    if exact_spp:
-        if start is not None and not is_on_the_way(scene, start, spp):
-            start = None
-    elif time_s is None and (cached is None or cached.origin.spp < goal_spp):
-        start = gather_planes(scene, start, spp=goal_spp, seed=seed, before=before)
-    elif cached is None:
-        start = gather_planes(scene, None, spp=None, seed=seed, before=before)
-
+    goal_spp = None if time_s is not None else scene.spp if spp is None else spp
+    start = _starting_planes(
+        scene, cached, goal_spp=goal_spp, seed=seed, exact_spp=exact_spp, before=before
+    )
     is_composed = start is not None and start.origin.is_composed
 
     def keep(basis: Basis) -> bool:
@@ -111,27 +103,57 @@ def obtain_basis(
         # One kept by an earlier version may know less of the same lights.
         start = replace(start, lights=basis_lights(scene), source=str(scene.path))
         enough = [
-            sum(counts[:2]) >= (1 if time_s is not None else goal_spp)
-            for counts in counts_of(start)
+            sum(counts[:2]) >= (1 if goal_spp is None else goal_spp) for counts in counts_of(start)
         ]
         if 0 < sum(enough) < len(enough):
             report_reuse(sum(enough), len(enough))
     options = dict[str, Any](
         time_s=time_s, seed=seed, keep=keep, is_final=is_final, progress=progress
     )
-    basis = _completed(
-        scene, start, spp=goal_spp if time_s is None else None, render=render, options=options
-    )
+    basis = _completed(scene, start, spp=goal_spp, render=render, options=options)
     if basis is start:
         return basis
     basis = _marked(basis, is_composed=is_composed)
+    return _as_from_cache(scene, basis, keep)
+
+
+def _starting_planes(
+    scene: Scene,
+    cached: Basis | None,
+    *,
+    goal_spp: int | None,
+    seed: int,
+    exact_spp: bool,
+    before: Basis | None,
+) -> Basis | None:
+    """Return the planes to which a render adds samples; None to begin without any.
+
+    cached: the basis of the scene as it is. goal_spp: None for a time, whose samples add to any.
+    The other arguments are those of `obtain_basis`.
+    """
+    lacks_samples = goal_spp is None or cached is None or cached.origin.spp < goal_spp
+    start = cached
+    if cached is not None and lacks_samples:
+        start = replace(cached, sums=cache.sums_of(cached))
+    if exact_spp:
+        is_usable = start is not None and is_on_the_way(scene, start, goal_spp)
+        return start if is_usable else None
+    if goal_spp is not None and lacks_samples:
+        return gather_planes(scene, start, spp=goal_spp, seed=seed, before=before)
+    if cached is None:
+        return gather_planes(scene, None, spp=None, seed=seed, before=before)
+    return start
+
+
+def _as_from_cache(scene: Scene, basis: Basis, keep: Callable[[Basis], bool]) -> Basis:
+    """Keep a basis in the cache, and return it as it is read from there."""
     if not is_large(len(basis.lights), basis.size):
         # As from its file, so that the next run finds the same.
         basis = replace(as_stored(basis, keep), sums=None)
         file = cache.file_of(basis)
         return basis if file is None else leave_indirect(basis, file)
     if keep(basis):
-        of_file = cache.find(scene.identity, basis.origin.sensor, seed, basis.size)
+        of_file = cache.find(scene.identity, basis.origin.sensor, basis.origin.seed, basis.size)
         if of_file is not None and of_file.origin == basis.origin:
             basis = replace(basis, planes=of_file.planes, noise=of_file.noise)
             return replace(basis, indirect=of_file.indirect, sums=None)
