@@ -174,3 +174,48 @@ def test_lights_that_cannot_be_added_or_removed(moving: Moving, request_: Any, t
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)
     assert (moving.studio.session.version, names(moving)) == (version, before)
+
+
+def test_a_drag_is_answered_while_a_search_runs_which_then_moves_nothing(moving: Moving) -> None:
+    stroke(moving)
+    opened_rig(moving)
+    moving.send(protocol.PlaceLights())
+    moving.wait(lambda: [m for m in moving.messages if m.kind == "trial"])
+    for done in (False, False, True):
+        moving.send(protocol.MoveLights({"bulb": {"position": [0.4, 1.2, 0.1]}}, done=done))
+    assert not [m for m in moving.messages if m.kind == "placed"]
+    assert "somebody moved lights meanwhile" in placed(moving)["text"]
+    assert set(moving.studio.session.requests.placed) == {"bulb"}
+
+
+def test_undo_and_removal_while_a_plane_renders(moving: Moving) -> None:
+    before = names(moving)
+    for last in (protocol.Undo(), protocol.RemoveLight("spot_1")):
+        added(moving, protocol.AddLight("spot", position=AIR))
+        moving.send(protocol.MoveLights({"bulb": {"position": [0.4, 1.2, 0.1]}}))
+        moving.send(last)
+        moving.send(protocol.Undo())
+        moving.rendered()
+    moving.send(protocol.Undo())
+    moving.send(protocol.Undo())
+    assert names(moving) == before
+    assert moving.studio.session.requests.placed == {}
+    assert not [m for m in moving.messages if m.kind == "say" and "inside" in m.fields["text"]]
+
+
+@pytest.mark.parametrize(
+    ("request_", "text"),
+    [
+        (protocol.PlaceLights(new="spot", count=0), "count is 0"),
+        (protocol.PlaceLights(new="spot", count=99), "count is 99"),
+        (protocol.PlaceLights(new="spot", on=("nowhere",)), "no rail, surface or shape 'nowhere'"),
+    ],
+)
+def test_searches_for_impossible_lights(moving: Moving, request_: Any, text: str) -> None:
+    with pytest.raises(LightpaintError, match="nothing is painted yet"):
+        moving.send(request_)
+    stroke(moving)
+    with pytest.raises(LightpaintError) as caught:
+        moving.send(request_)
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -14,6 +14,7 @@ import lightpaint as lp
 from lightpaint.errors import LightpaintError
 from lightpaint.paint import protocol
 from lightpaint.paint.rig.rig_state import rig_state
+from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene_reader import load_scene
 
 #: Where the bulb goes.
@@ -248,3 +249,23 @@ def test_what_cannot_be_placed_is_said(moving: Moving) -> None:
     moving.send(protocol.AskAll(held))
     with pytest.raises(LightpaintError, match="no light is free to move"):
         moving.send(protocol.PlaceLights())
+
+
+def test_what_comes_no_closer_to_the_eye_is_not_done(
+    dim: Moving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The painting is the present look: every move is a step away, whatever a search says."""
+    session = dim.studio.session
+    look = session.basis.present_look.copy()
+    whole = (0, look.shape[0], 0, look.shape[1])
+    dim.send(
+        protocol.Paint(0, whole, True), image=look, importance=np.ones(look.shape[:2], np.float32)
+    )
+    old = dim.scene.light("bulb").members[0].site
+    move = lp.Move("bulb", old, Site((0.8, 0.2, -0.5)), gain_share=0.1)
+    found = lp.Placement((dim.scene,), (move,), (), 0.1, 0.05)
+    monkeypatch.setattr("lightpaint.paint.rig.light_placer.place", lambda *_, **__: found)
+    dim.send(protocol.PlaceLights())
+    assert "no closer to the eye" in placed(dim)["text"]
+    assert session.requests.placed == {}
+    assert session.store.position == 1

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Protocol
 
+from lightpaint.basis.basis import Basis
 from lightpaint.errors import LightpaintError, PaintError
 from lightpaint.paint.background_threads import BackgroundThreads, StoppedError
 from lightpaint.paint.protocol import (
@@ -54,6 +55,10 @@ class PlacerHost(Protocol):
 
         before: where they were; returns False, and does nothing, if that is so no more.
         """
+
+    @property
+    def unmoved_bases(self) -> tuple[Basis, ...]:
+        """Bases of all views, with every light where the scene has it."""
 
     def publish(self, message: Message | None) -> None:
         """Send a message to pages."""
@@ -126,6 +131,12 @@ class LightPlacer:
         try:
             with cancellable(check), MITSUBA.low_priority():
                 snapshot, placement = self._searched(request, check)
+                placed = {
+                    move.name: pose_values(move, snapshot.requests.poses.get(move.name, {}))
+                    for move in placement.moves
+                }
+                placed |= {light.name: values_of(light.emitter) for light in placement.additions}
+                before, after = self._differences(snapshot, placed)
                 check()
         except StoppedError:
             if self._request is None:  # else a page waits for the next one
@@ -134,13 +145,15 @@ class LightPlacer:
         except LightpaintError as error:
             self._publish(f"No light was {_done(request)}: {error}")
             return
-        placed = {
-            move.name: pose_values(move, snapshot.requests.poses.get(move.name, {}))
-            for move in placement.moves
-        }
-        placed |= {light.name: values_of(light.emitter) for light in placement.additions}
         if not placed:
             reason = "none is surely worth a hundredth of what is missing"
+            self._publish(f"No light was {_done(request)}: {reason}.")
+            return
+        if after >= before:
+            # The search counts light; what is seen may differ, as in the dark.
+            reason = (
+                f"what was found is no closer to the eye (ΔE {after:.1f} instead of {before:.1f})"
+            )
             self._publish(f"No light was {_done(request)}: {reason}.")
             return
         label = f"{'move' if request.new is None else 'add'} {', '.join(placed)}"
@@ -149,6 +162,22 @@ class LightPlacer:
             return
         summary = "; ".join(map(str, (*placement.moves, *placement.additions)))
         self._publish(summary[0].upper() + summary[1:] + ".", tuple(placed))
+
+    def _differences(self, snapshot: SessionSnapshot, placed: Placed) -> tuple[float, float]:
+        """Return the ΔE of the exact answer now, and with these lights moved and added."""
+        if not placed:
+            return 0.0, 0.0
+        added = snapshot.requests.added
+        moves = {name: x for name, x in placed.items() if "kind" not in x or name in added}
+        new = {name: x for name, x in placed.items() if name not in moves}
+        requests = snapshot.requests.with_poses(moves).with_added(new)
+        bases = self._rig.bases(self._host.unmoved_bases, requests.placed)
+        differences = []
+        for its in (snapshot, replace(snapshot, bases=tuple(bases))):
+            solution = its.solution()
+            assert solution is not None
+            differences.append(its.delta_e(solution))
+        return differences[0], differences[1]
 
     def _publish(self, text: str, names: tuple[str, ...] = ()) -> None:
         self._host.publish(PlacingResult(text=text, names=names))

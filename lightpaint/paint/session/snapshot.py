@@ -1,6 +1,7 @@
 """A session's paintings and requests at one time, for work that takes longer than a stroke."""
 
 from dataclasses import dataclass, replace
+from statistics import mean
 from typing import Any
 
 import numpy as np
@@ -79,6 +80,15 @@ class SessionSnapshot:
         return Problem.of(
             [self.bases[k] for k in self.painted_views], self.painted_targets, **options
         )
+
+    def delta_e(self, solution: Solution) -> float:
+        """Return the mean ΔE between the paint and an answer to it, over the painted views."""
+        differences = []
+        for k, answer in zip(self.painted_views, solution.views, strict=True):
+            look = PaintComparison.of_problem(answer.problem)
+            picture = look.pixels(self.bases[k].mix(solution.weights))
+            differences.append(float(look.mean(look.difference(picture))))
+        return mean(differences)
 
     def explain(self, view: int = 0) -> tuple[list[str], npt.NDArray[np.uint8]]:
         """Return why the painting of a view is not met: sentences, and a picture (h, w) of where.

@@ -310,6 +310,11 @@ class Studio:
         self._mover.finish(self.session.requests.placed, check)
 
     @property
+    def unmoved_bases(self) -> tuple[Basis, ...]:
+        """Bases of all views, with every light where the scene has it."""
+        return self.session.bases
+
+    @property
     def rig(self) -> LampRig:
         """The lights and their places."""
         return self._mover.rig
