@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import run
 from renderer import write_room
 
 import lightpaint as lp
@@ -282,3 +283,58 @@ def test_sums_alone_are_refused_where_lights_may_move(tmp_path: Path) -> None:
         plan(tmp_path / "looks.toml", tmp_path / "out")
     (tmp_path / "looks.toml").write_text(f"[[look]]\n{look}{settings}move_lights = false\n")
     assert not plan(tmp_path / "looks.toml", tmp_path / "out").looks[0].failure
+
+
+class _Stop:
+    """Progress that is interrupted in the midst of a search."""
+
+    def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+        if label == "poses" and done:
+            raise KeyboardInterrupt
+
+
+def test_an_interrupted_search_leaves_nothing_half_written(room: Scene, tmp_path: Path) -> None:
+    small = room.reduced("1/2")
+    target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).present_look)
+    how = {"rigging": lp.Rigging.of({"beam": {"aim": 60}}), "spp": 64, "hold": 0}
+    how |= {"space": "linear", "verify": False, "report": False}
+    with pytest.raises(KeyboardInterrupt):
+        lp.paint_with_light(small, target, tmp_path / "a", **how, progress=_Stop())
+    assert not (tmp_path / "a").exists()
+    look = lp.paint_with_light(small, target, tmp_path / "a", **how)
+    assert look.placement is not None
+    assert [move.name for move in look.placement.moves] == ["beam"]
+
+
+def test_samples_are_added_for_lights_where_they_hang_now(room: Scene, tmp_path: Path) -> None:
+    """An error that is asked for is met with the lights moved, by a basis of where they are."""
+    small = room.reduced("1/2")
+    target = lp.Target.of(lp.render_basis(small.moved({"beam": AIMED}), spp=64).present_look)
+    rigging = lp.Rigging.of({"beam": {"aim": 60}})
+    how = {"space": "linear", "hold": 0, "verify": False, "report": False, "use_cache": False}
+    look = lp.paint_with_light(small, target, tmp_path, rigging=rigging, error=0.1, **how)
+    assert look.placement is not None
+    assert [move.name for move in look.placement.moves] == ["beam"]
+    exact = lp.render_basis(look.placement.scene, spp=512, seed=9)
+    beam = look.basis.image("beam")
+    assert np.abs(beam - exact.image("beam")).sum() < 0.2 * exact.image("beam").sum()
+    found = lp.solve(exact, target, space="linear", hold=0).lighting
+    assert look.lighting["beam"].emission == pytest.approx(found["beam"].emission, rel=0.1)
+
+
+def test_variations_hang_as_the_look_that_they_vary(room: Scene, tmp_path: Path) -> None:
+    small = room.reduced("1/2")
+    seen = lp.render_basis(small.moved({"beam": AIMED}), spp=64).present_look
+    for name in ("one", "two"):
+        write_rgb(tmp_path / f"{name}.exr", seen)
+        seen = 0.5 * seen
+    options = ["--aim", "beam=60", "--resolution", "1/2", "--spp", "64", "--literal"]
+    options += ["--variations", "fewer-lights,warmer", "--no-verify", "-o", "out"]
+    done = run(tmp_path, "solve", room.path, "one.exr", "two.exr", *options)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("poses: ") == 2  # a search for each painting
+    for name in ("one", "two"):
+        folders = [tmp_path / "out" / f"{name}{its}" for its in ("", "-fewer-lights", "-warmer")]
+        sites = [load_scene(x / "relit.xml").light("beam").members[0].site for x in folders]
+        assert sites[0] == sites[1] == sites[2]
+        assert np.dot(sites[0].direction, room.light("beam").members[0].site.direction) < 0.99

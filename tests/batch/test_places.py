@@ -17,7 +17,7 @@ from lightpaint.errors import BatchError
 from lightpaint.images.formats.exr import write_rgb
 from lightpaint.lighting.answer.lighting_file import read_lighting
 from lightpaint.placement.placement_record import read_placement
-from lightpaint.progress import Listener
+from lightpaint.progress import Interrupted, Listener
 
 LOOKS = """
 [defaults]
@@ -167,3 +167,15 @@ def test_a_job_with_places_is_sent_and_read_again(here: Path) -> None:
     assert moved.places == "/elsewhere/out/places/day.json"
     assert json.loads(moved.job)["placement"] == {"path": moved.places}
     assert moved == replace(type(task).from_json(moved.to_json()))
+
+
+def test_an_interrupt_amid_the_search_leaves_no_places(here: Path) -> None:
+    class Stopped(_Heard):
+        def __call__(self, label: str, done: int, total: int, unit: str = "passes") -> None:
+            if label == "poses" and done:
+                raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="6 looks are left; the same command goes on"):
+        run_batch(plan(here / "looks.toml", here / "out"), RunOptions(), Stopped())
+    assert not (here / "out" / "places").exists()
+    assert len(plan(here / "looks.toml", here / "out").chosen_looks) == len(NAMES)

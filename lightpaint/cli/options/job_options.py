@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lightpaint.cli.options.source_options import basis_of, scene_of
-from lightpaint.cli.output.vocabulary import from_any_folder
+from lightpaint.cli.output.vocabulary import BY_OPTION, from_any_folder
 from lightpaint.colour.display.view_transform import TransformChoice
 from lightpaint.errors import LOOK_ERRORS, OutputError, TargetError
 from lightpaint.files import check_files, is_name, is_utf_8, one_line
@@ -21,9 +21,6 @@ from lightpaint.screen import some_names
 
 if TYPE_CHECKING:
     from lightpaint.pipeline.job.job import Job
-
-#: Place of constraints from options, in errors.
-BY_OPTION = "on the command line"
 
 
 def is_folder(output: Path) -> bool:

@@ -58,6 +58,20 @@ SPELLINGS = {
     "verify=False": "--no-verify",
 }
 
+#: The name of the options as the source of constraints and places; the options of their keys that
+#: are not called like these.
+BY_OPTION = "on the command line"
+OPTIONS_OF_KEYS = {"limits": "limit", "duv": "kelvin"}
+
+#: How an error of a light's constraint or place by option begins, one of a light that is not there,
+#: and one of a new light.
+_LIGHT = re.compile(
+    BY_OPTION + r": light\.(.+?)\.(lock|off|limits|color|kelvin|duv|primaries|move|aim|cone)"
+    r"(?:\.\w+)?(?=:? )"
+)
+_UNKNOWN = re.compile(BY_OPTION + r": light\.[^:]+: (?=no light )")
+_NEW = re.compile(BY_OPTION + r": new( \d+)?(?:\.(?:on(?=: )|(\w+)))?(:?) ")
+
 #: `name=value` as the library writes it: a separate word, so that no path matches.
 _ARGUMENT = re.compile(
     r"""(?<![^\s(])(\w+)=(\.\.\.|True|False|\d+|'[^']*'|"\w+"|\{'\w+':\ \.\.\.\})"""
@@ -68,7 +82,15 @@ _ARGUMENT = re.compile(
 
 def spoken(text: str) -> str:
     """Return `text` of the library with the options of the command line."""
+    text = _LIGHT.sub(lambda its: f"--{OPTIONS_OF_KEYS.get(its[2], its[2])} {its[1]}", text)
+    text = _NEW.sub(_spoken_new, _UNKNOWN.sub("", text)).replace(f"{BY_OPTION}: ", "")
     return _ARGUMENT.sub(_spoken, text)
+
+
+def _spoken_new(match: re.Match[str]) -> str:
+    """Return how an error of a new light begins: `--add 2: count is`."""
+    number, key, colon = match.groups()
+    return f"--add{number or ''}: {key}{colon} " if key else f"--add{number or ''}: "
 
 
 def _spoken(match: re.Match[str]) -> str:

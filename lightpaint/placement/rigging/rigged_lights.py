@@ -61,7 +61,7 @@ def freedoms_of(rigging: Rigging, scene: Scene) -> dict[str, Freedom]:
     tables: dict[str, dict[str, Any]] = {}
     places: dict[str, str] = {}
     for name, table, where in rigging.lights:
-        matches = _matches(name, scene, where)
+        matches = _matches(name, scene, f"{where}.{next(iter(table))}" if table else where)
         for key, value in table.items():
             refused = []
             for light in matches:

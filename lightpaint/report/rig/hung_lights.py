@@ -76,7 +76,8 @@ class HungLights:
     @property
     def shared_sentence(self) -> str:
         """The sentence on what the changes bring all looks that share them."""
-        names = some_names(self.looks, " and ")
+        *others, last = self.looks
+        names = f"{some_names(others)} and {some_names([last])}"
         if not self.changes:
             return (
                 f"{names} share places. No light is moved: no move would surely bring a hundredth "
