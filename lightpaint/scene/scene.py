@@ -314,9 +314,10 @@ class Scene(Shown):
 
     @property
     def up(self) -> Position:
-        """The axis of the scene that is nearest to what its camera has upwards."""
+        """The axis that is up in the scene, as far as its camera and its lights tell."""
         node = self.parsed.state.nodes[self.parsed.sensor_nodes[self.sensor]]
-        return upward_axis(node.props)
+        shining = [x.site.direction for x in self.emitters if x.site.direction is not None]
+        return upward_axis(node.props, shining)
 
     @property
     def moved_elements(self) -> tuple[tuple[Path, int, Mapping[str, str]], ...]:

@@ -8,10 +8,9 @@ from typing import Literal
 import numpy as np
 
 from lightpaint.basis.lights import BasisLight
-from lightpaint.cli.options.job_options import BY_OPTION
 from lightpaint.cli.output import terminal
 from lightpaint.cli.output.tables import spoken_agreement
-from lightpaint.cli.output.vocabulary import spoken
+from lightpaint.cli.output.vocabulary import BY_OPTION, spoken
 from lightpaint.colour.color import LUMINANCE, luminance, rgb_to_hex
 from lightpaint.lighting.analysis.appearance.constraint_kinds import KEYS_BY_KIND
 from lightpaint.lighting.analysis.appearance.limiting_reasons import Reason

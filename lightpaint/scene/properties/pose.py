@@ -5,6 +5,7 @@ point at its target, so that a texture in its beam keeps its roll.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -23,6 +24,11 @@ DEFAULT_CUTOFF, DEFAULT_BEAM_SHARE = 20.0, 0.75
 
 #: Most extreme coordinate of a place, in units of the scene.
 FARTHEST = 1e7
+
+
+#: Least component of a direction that is not level; of one that is along an axis; and how much
+#: farther lights shine along a camera's view than down its picture if it looks down.
+LEVEL, STRAIGHT, FARTHER = 0.02, 0.999, 0.3
 
 
 @keywords()
@@ -108,13 +114,33 @@ def site_of(emitter: Any, plugin: str, shape_plugin: str) -> Site:
     return Site(_three(matrix[:3, 3]), direction, cutoff, beam)
 
 
-def upward_axis(props: Any) -> Position:
-    """Return the axis nearest to what a sensor with these properties has upwards."""
-    up = np.array([0.0, 1.0, 0.0]) if "to_world" not in props else _matrix(props)[:3, 1]
+def upward_axis(props: Any, light: Sequence[Position] = ()) -> Position:
+    """Return the axis that is up in the scene of a sensor with these properties.
+
+    That is what the sensor has upwards, or behind it where it looks straight down. light: the
+    directions that lights shine in, by which these two are told apart: most light comes from above.
+    """
+    if "to_world" not in props:
+        return (0.0, 1.0, 0.0)
+    left, up, ahead = _matrix(props)[:3, :3].T
     axis = np.zeros(3)
-    k = int(np.argmax(np.abs(up)))
-    axis[k] = 1.0 if up[k] >= 0 else -1.0
+    # A horizon that is level is across what is up.
+    level = np.where(np.abs(left) < LEVEL, up, -np.inf)
+    k, behind = int(np.argmax(level)), int(np.argmax(-ahead))
+    looks_down = -ahead[behind] > STRAIGHT
+    if looks_down and (level[k] < LEVEL or _shines(light, ahead + up) > FARTHER):
+        axis[behind] = 1.0
+    elif level[k] >= LEVEL:
+        axis[k] = 1.0
+    else:
+        k = int(np.argmax(np.abs(up)))
+        axis[k] = 1.0 if up[k] >= 0 else -1.0
     return _three(axis)
+
+
+def _shines(light: Sequence[Position], way: Doubles) -> float:
+    """Return how far lights shine along `way`, -1 to 1 on average."""
+    return float(np.mean(np.array(light) @ way)) if len(light) else 0.0
 
 
 def _matrix(parameters: Any) -> Doubles:
