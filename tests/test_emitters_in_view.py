@@ -3,6 +3,7 @@
 A bulb is painted as bright as it is, on a wall that it would have to be 350 times as bright for.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -133,3 +134,18 @@ def test_light_groups_know_of_no_emitters(tmp_path: Path, image: Any):
     write_parts(tmp_path / "t.exr", [ExrPart("", channels)])
     said = refused(tmp_path, "solve", "g.exr", "t.exr", "--emitters", "count")
     assert "--emitters" in said
+
+
+@pytest.mark.parametrize("untold", [True, False])
+def test_a_bulb_that_is_known_by_sight_alone_can_be_told_so(
+    basis: lp.Basis, image: Any, untold: bool
+):
+    """As one in a glass ball, whose light few paths find on walls."""
+    target = lp.Target.of(image)
+    solution = lp.solve(basis, target)
+    lights = [replace(x, untold=untold) for x in solution.lighting.lights]
+    solution = replace(solution, lighting=replace(solution.lighting, lights=tuple(lights)))
+    said = emitter_remarks(target, solution, lp.combine(basis, solution.lighting))
+    told = [text for text in said if "the camera sees it" in text]
+    assert len(told) == untold
+    assert all("light of bulb on surfaces" in text for text in told)  # and nothing of the sky

@@ -4,7 +4,8 @@ answer.
 
 import numpy as np
 
-from lightpaint.arrays import Bools, Floats
+from lightpaint.arrays import Bools, Doubles, Floats, Indices
+from lightpaint.basis.basis import Basis
 from lightpaint.colour.color import luminance
 from lightpaint.images.bands import sum_by_bands
 from lightpaint.images.estimate import Estimate
@@ -29,6 +30,7 @@ def emitter_remarks(target: Target, solution: Solution, predicted: Estimate) -> 
         return [
             f"{_share(ignored, painted)}, and count nothing; "
             'emitters="count" holds the emitters themselves to how bright they were painted',
+            *_known_by_sight_alone(solution, ignored),
             *_too_bright(target, solution, predicted, ignored),
         ]
     counted = sees_emitter & painted
@@ -61,6 +63,33 @@ def _share(selected: Bools, painted: Bools) -> str:
     )
 
 
+def _known_by_sight_alone(solution: Solution, ignored: Bools) -> list[str]:
+    """Return a warning of undetermined lights that are seen where nothing counts.
+
+    As of a bulb in a glass ball: few paths find its light elsewhere, and many samples show it.
+    """
+    # Noise may have solved it far too dim.
+    weights = np.maximum(solution.weights, solution.basis.present_weights)
+    brightest = _brightest_lights(solution.basis, weights, ignored)
+    lights = solution.lighting.lights
+    names = [lights[k].name for k in np.unique(brightest) if lights[k].untold]
+    if not names:
+        return []
+    it, is_ = ("it", "it is") if len(names) == 1 else ("them", "they are")
+    return [
+        f"WARNING: too few samples show the light of {some_of(names, room=300)} on surfaces, but "
+        f'the camera sees {it}: emitters="count" solves {it} by how bright {is_} painted'
+    ]
+
+
+def _brightest_lights(basis: Basis, weights: Doubles, pixels: Bools) -> Indices:
+    """Return the brightest light in each of some pixels, (p,). weights: (n, 3). pixels: (h, w)."""
+    if not pixels.any():
+        return np.zeros(0, np.intp)
+    images = basis.planes.pixels(np.flatnonzero(pixels)) * weights[:, None].astype(np.float32)
+    return np.asarray(np.argmax(luminance(images), axis=0))
+
+
 def _too_bright(
     target: Target, solution: Solution, predicted: Estimate, ignored: Bools
 ) -> list[str]:
@@ -69,12 +98,7 @@ def _too_bright(
     # Where the painting means "at least", nothing is too bright.
     if target.at_least is not None:
         ignored = ignored & ~target.at_least.any(axis=-1)
-    images = basis.planes.pixels(np.flatnonzero(ignored)) * solution.weights[:, None].astype(
-        np.float32
-    )
-    brightest_light = (
-        np.argmax(luminance(images), axis=0) if ignored.any() else np.zeros(0, np.intp)
-    )
+    brightest_light = _brightest_lights(basis, solution.weights, ignored)
     predicted_light, painted_light = (
         np.asarray(luminance(x[ignored])) for x in (predicted.image, target.image)
     )
