@@ -106,7 +106,7 @@ def _place(patch: Patch) -> list[int]:
 
 
 class PatchPlace(NamedTuple):
-    """Where a stored patch belongs. marked: whether it has "at least" marks."""
+    """The place of a stored patch. marked: whether it has "at least" marks."""
 
     view: int
     region: Region
