@@ -166,7 +166,7 @@ class FreeLight:
 
 
 def places_of(freedom: Freedom, position: Doubles, surfaces: Places | None = None) -> Places:
-    """Return the places of a freedom. here: (3,), the present one. surfaces: of its shapes."""
+    """Return the places of a freedom. position: (3,), the present one. surfaces: of its shapes."""
     parts: list[Places] = [] if surfaces is None else [surfaces]
     if freedom.all_rails:
         parts.append(Rails(np.array(freedom.all_rails, dtype=float)))

@@ -78,10 +78,10 @@ def gather_planes(
 
     Lights of which it has none are black, without a sample. None where it has none at all.
 
-    cached: the basis of the scene as it is, which is returned itself where no other adds to it. spp:
-    samples per pixel beyond which more are no reason to look for others; None for as many as there
-    are. before: a basis of the same seed and film, of the scene in another state, whose planes are
-    taken as well. use_cache: False to take of no other.
+    cached: the basis of the scene as it is, which is returned itself where no other adds to it.
+    spp: samples per pixel beyond which more are no reason to look for others; None for as many as
+    there are. before: a basis of the same seed and film, of the scene in another state, whose
+    planes are taken as well. use_cache: False to take of no other.
     """
     identities = scene.light_identities
     planes: list[KeptPlane | None] = [None] * len(identities)
