@@ -38,8 +38,9 @@ from lightpaint.scene.properties.film import reduction_to
 from lightpaint.scene.properties.pose import Pose, Site
 from lightpaint.scene.scene import Scene
 
-#: Pixels of the films that are searched on, all together, if possible.
-PIXELS = 2**12
+#: Pixels of the films that places all over are compared on, and of those for the last steps, all
+#: together, if possible.
+PIXELS, FINE_PIXELS = 2**12, 2**14
 
 #: Steps of all lights together along many paths.
 STEPS = 12
@@ -102,35 +103,39 @@ def place(
     for name, freedom in freedoms.items():
         free_light(scene, name, freedom)
     lights = new_lights_of(scene, new)
-    small = [on_small_film(x, its, PIXELS // len(views)) for x, its in views]
+    large = [on_small_film(x, its, FINE_PIXELS // len(views)) for x, its in views]
+    small = [reduced_film(x, PIXELS // len(views)) for x in large]
     names = [light.name for light in basis.lights]
 
     def search(loaded: Any) -> _Result:
-        paths = SearchPaths(small, loaded, seed=seed)
+        paths = SearchPaths(small, large, loaded, seed=seed)
         if not len(paths.space.points):
             raise NoPlaceError(f"the camera of {scene.path} sees nothing that light falls on")
         movables = movables_of(scene, names, freedoms, pairs, paths, seed=seed)
         slots = new_movables_of(scene, lights, len(names), paths, seed=seed)
-        fit = fit_of(
-            [its for _, its in views],
-            looks,
-            [x.size for x in small],
-            [light.as_basis_light for light in lights],
-            constraints,
+        coarse, fine = (
+            fit_of(
+                [its for _, its in views],
+                looks,
+                [x.size for x in films],
+                [light.as_basis_light for light in lights],
+                constraints,
+            )
+            for films in (small, large)
         )
-        poses = PoseSearch(fit, paths, PoseRules(paths), seed=seed)
+        poses = PoseSearch(coarse, paths, PoseRules(paths), seed=seed)
         if watch is not None:
             poses.steps.watch = lambda its: watch(_sites_by_name(its, names))
-        found = _searched(poses, movables, slots, progress)
-        judge = PlacementJudge(fit, poses.steps, paths)
+        judge = PlacementJudge(fine, poses.steps.on(fine), paths)
+        found = _searched(poses, judge, movables, slots, progress)
         errors = judge.errors(found.arrangement)
         order = _additions(found)
         growth = judge.growth(found.arrangement, order) if order else []
         places = [x.position or (0.0, 0.0, 0.0) for x in found.arrangement.sites]
-        seen = pixels_of(small[0], loaded, np.array(places, dtype=float).reshape(-1, 3))
-        return _Result(found, errors, seen, growth, paths.space.spread or 1.0, small[0].size)
+        seen = pixels_of(large[0], loaded, np.array(places, dtype=float).reshape(-1, 3))
+        return _Result(found, errors, seen, growth, paths.space.spread or 1.0, large[0].size)
 
-    result = small[0].while_loaded(search, views=small[1:])
+    result = large[0].while_loaded(search, views=large[1:])
     return _placement([x for x, _ in views], result, lights, len(names))
 
 
@@ -183,7 +188,11 @@ def _additions(found: Found) -> list[int]:
 
 
 def _searched(
-    poses: PoseSearch, movables: list[Movable], slots: list[Movable], progress: Progress
+    poses: PoseSearch,
+    judge: PlacementJudge,
+    movables: list[Movable],
+    slots: list[Movable],
+    progress: Progress,
 ) -> Found:
     """Return what is worth it of all moves and new lights."""
     total = TURNS * len(movables) + len(slots) + STEPS
@@ -199,11 +208,10 @@ def _searched(
     start = Arrangement(tuple(movables), sites, steps.fitted(movables, sites, paths.compare))
     found = poses.by_blocks(start, count)
     if slots:
-        found = NewLightSearch(poses, slots).run(found, count)
-    found = steps.refitted(found, paths.refine)
-    found = steps.descend(found, paths.refine, STEPS, is_central=True, progress=count)
+        found = NewLightSearch(poses, slots, judge).run(found, count)
+    found = judge.refined(found, STEPS, progress=count)
     progress("poses", total, total)
-    return PlacementJudge(poses.fit, steps, paths).judged(start, found)
+    return judge.judged(start, found)
 
 
 def _placement(
@@ -296,5 +304,9 @@ def on_small_film(scene: Scene, basis: Basis, pixels: int) -> Scene:
             f"the basis is {mine_w}x{mine_h}, whose pixels are no blocks of those of the film "
             f"of {scene.path}, {width}x{height}: make it again"
         )
-    on_its_film = scene.reduced(f"{mine_w}x{mine_h}")
-    return on_its_film.reduced(f"1/{reduction_to(on_its_film.film, pixels)}")
+    return reduced_film(scene.reduced(f"{mine_w}x{mine_h}"), pixels)
+
+
+def reduced_film(scene: Scene, pixels: int) -> Scene:
+    """Return `scene` on a film of `pixels` or fewer, if possible without rest."""
+    return scene.reduced(f"1/{reduction_to(scene.film, pixels)}")

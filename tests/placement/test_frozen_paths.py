@@ -11,7 +11,9 @@ from renderer import write_room
 import lightpaint as lp
 from lightpaint.arrays import Floats
 from lightpaint.errors import SceneError
+from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.placement.paths.frozen_paths import FrozenPaths, falloff
+from lightpaint.placement.paths.view_paths import SearchPaths
 from lightpaint.scene.properties.pose import Site
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_reader import load_scene
@@ -43,6 +45,22 @@ def test_columns_are_the_planes_of_a_basis(room: Scene) -> None:
     for plane, column in zip(planes, columns, strict=True):
         assert column.mean() == pytest.approx(plane.mean(), rel=0.02)  # noise
         assert np.square(column - plane).sum() < 0.03 * np.square(plane).sum()  # noise
+
+
+def test_a_search_refines_on_a_larger_film_than_it_compares_on(room: Scene) -> None:
+    small = room.reduced("1/2")
+
+    def columns(loaded: Any) -> list[Floats]:
+        paths = SearchPaths([small], [room], loaded, seed=1)
+        return [at.columns(sites(room)) for at in (paths.compare, paths.refine, paths.judge)]
+
+    compared, refined, judged = room.while_loaded(columns)
+    assert refined.shape == judged.shape == (3, 20 * 24, 3)
+    assert np.abs(refined - judged).max() > 0  # paths of their own
+    for one, other in zip(compared, refined, strict=True):
+        reduced = block_mean(other.reshape(20, 24, 3), 2).reshape(one.shape)
+        assert one.mean() == pytest.approx(reduced.mean(), rel=0.1)  # noise
+        assert np.square(one - reduced).sum() < 0.2 * np.square(reduced).sum()  # noise
 
 
 def test_direct_light_alone_is_that_of_the_direct_integrator(tmp_path: Path) -> None:

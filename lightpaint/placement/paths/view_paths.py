@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightpaint.arrays import Bools, Floats, Indices
+from lightpaint.images.denoiser import Features
 from lightpaint.placement.paths.frozen_paths import FrozenPaths
 from lightpaint.placement.space.free_space import (
     CLEARANCE,
@@ -21,9 +22,12 @@ from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 from lightpaint.scene.surfaces import loaded_features
 
-#: First hits of a pixel, and paths that go on: to rank, compare, refine and judge candidates, and
-#: to ask how far places spread.
-SAMPLES = ((1, 0), (9, 2), (36, 8), (36, 8), (36, 8))
+#: First hits of a pixel, and paths that go on: to rank and compare candidates, on small films.
+COARSE_SAMPLES = ((1, 0), (9, 2))
+
+#: First hits of all pixels of a larger film, about, to refine and judge candidates, and to ask how
+#: far places spread; how many by how many of a pixel that may be; and paths that go on for each.
+FINE_HITS, FINE_SIDES, GOING_ON = 2**18, (4, 6), 2 / 9
 
 
 class ViewPaths:
@@ -60,45 +64,51 @@ class ViewPaths:
 class SearchPaths:
     """All paths of a search, made when they are first asked for.
 
+    Two films serve it. Places all over are compared on a small one; what a bright piece of metal
+    or the edge of a shadow tells is lost there, so the last steps and the judgement are on a
+    larger one.
+
     Args:
-        views: The scenes on their small films, which differ in the sensor alone.
-        loaded: They, loaded.
+        small, large: The scenes on small and on larger films, which differ in the sensor alone.
+        loaded: The larger ones, loaded.
         seed: Of the paths.
     """
 
-    def __init__(self, views: Sequence[Scene], loaded: Any, *, seed: int) -> None:
-        self._views, self.loaded, self._seed = views, loaded, seed
-        self._features = [loaded_features(view, loaded, seed) for view in views]
-        self.space = FreeSpace.of_views([free_space(view, loaded, seed=seed) for view in views])
+    def __init__(
+        self, small: Sequence[Scene], large: Sequence[Scene], loaded: Any, *, seed: int
+    ) -> None:
+        self._small, self._large, self.loaded, self._seed = small, large, loaded, seed
+        self._features = [loaded_features(view, loaded, seed) for view in large]
+        self.space = FreeSpace.of_views([free_space(view, loaded, seed=seed) for view in large])
 
     @cached_property
     def rank(self) -> ViewPaths:
         """Few first hits, for direct light."""
-        return self._made(0)
+        return self._coarse(0)
 
     @cached_property
     def compare(self) -> ViewPaths:
         """Paths for trials."""
-        return self._made(1)
+        return self._coarse(1)
 
     @cached_property
     def refine(self) -> ViewPaths:
-        """Many, for the last steps."""
-        return self._made(2)
+        """Paths on the larger films, for the last steps."""
+        return self._fine(2)
 
     @cached_property
     def judge(self) -> ViewPaths:
         """Paths as many, from other random numbers, to judge by."""
-        return self._made(3)
+        return self._fine(3)
 
     @cached_property
     def spread(self) -> ViewPaths:
         """Paths as many, from others again, to tell how far places spread."""
-        return self._made(4)
+        return self._fine(4)
 
     def in_view(self, places: Floats) -> Bools:
         """Return which of some places any camera sees, (k,)."""
-        seen = [seen_by_camera(view, self.loaded, places) for view in self._views]
+        seen = [seen_by_camera(view, self.loaded, places) for view in self._large]
         return np.asarray(np.any(seen, axis=0))
 
     def clear(self, places: Floats) -> Bools:
@@ -109,16 +119,30 @@ class SearchPaths:
         """Return which places, (k,), are clear of surfaces and see something of the picture."""
         return self.space.usable(self.loaded, places, clear)
 
-    def _made(self, k: int) -> ViewPaths:
-        first_hits, bounces = SAMPLES[k]
+    def _coarse(self, k: int) -> ViewPaths:
+        features = [
+            its.reduced(its.size[0] // view.size[0])
+            for its, view in zip(self._features, self._small, strict=True)
+        ]
+        return self._made(k, self._small, features, COARSE_SAMPLES[k])
+
+    def _fine(self, k: int) -> ViewPaths:
+        pixels = sum(math.prod(view.size) for view in self._large)
+        side = round(float(np.clip(math.sqrt(FINE_HITS / pixels), *FINE_SIDES)))
+        samples = side**2, round(GOING_ON * side**2)
+        return self._made(k, self._large, self._features, samples)
+
+    def _made(
+        self, k: int, views: Sequence[Scene], features: Sequence[Features], samples: tuple[int, int]
+    ) -> ViewPaths:
         view_paths = []
-        for j, (view, features) in enumerate(zip(self._views, self._features, strict=True)):
+        for j, (view, its) in enumerate(zip(views, features, strict=True)):
             paths = FrozenPaths(
                 view,
                 self.loaded,
-                first_hits=first_hits,
-                bounces=bounces,
-                seed=pass_seed(self._seed, Stream.FROZEN_PATHS, k + len(SAMPLES) * j),
+                first_hits=samples[0],
+                bounces=samples[1],
+                seed=pass_seed(self._seed, Stream.FROZEN_PATHS, k + 5 * j),
             )
-            view_paths.append(paths.filtered_along(features))
+            view_paths.append(paths.filtered_along(its))
         return ViewPaths(view_paths)

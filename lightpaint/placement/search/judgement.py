@@ -6,7 +6,7 @@ is missed alone would promise too much.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +15,18 @@ from lightpaint.arrays import Bools, Doubles, Floats
 from lightpaint.placement.movable import Arrangement, all_sites, by_column
 from lightpaint.placement.paths.view_paths import SearchPaths, ViewPaths
 from lightpaint.placement.placement_fit import PlacementFit
-from lightpaint.placement.search.new_light_search import SURE, WORTH, standard_error
 from lightpaint.placement.search.pose_steps import PoseSteps
 from lightpaint.scene.properties.pose import Site
+
+#: Least gain of a move or a new light, as a share of what is missed, and in standard errors.
+WORTH, SURE = 0.01, 3.0
+
+#: Pixels whose noise one light explains by chance, of many places that it is tried at; and the
+#: share of pixels whose miss is no more than the noise of a pixel where nothing else is missed.
+BY_CHANCE, USUAL_SHARE = 24, 0.9
+
+#: Share of ‖Ψ‖² that counts as nothing.
+NOTHING = 1e-4
 
 #: Steps of a fit along other paths, and the share of the first differences that they begin with.
 REFIT_STEPS, REFIT_SHARE = 5, 0.5
@@ -67,6 +76,14 @@ class PlacementJudge:
     def __init__(self, fit: PlacementFit, steps: PoseSteps, paths: SearchPaths) -> None:
         self._fit, self._steps, self._paths = fit, steps, paths
 
+    def refined(
+        self, best: Arrangement, steps: int, *, progress: Callable[[], None]
+    ) -> Arrangement:
+        """Return the arrangement after the last steps, on the film that it is judged on."""
+        at = self._paths.refine
+        start = self._steps.refitted(best, at)
+        return self._steps.descend(start, at, steps, first_share=REFIT_SHARE, progress=progress)
+
     def judged(self, start: Arrangement, best: Arrangement) -> Found:
         """Return what is worth it of `best`, whose first movables are those of `start`."""
         movables, count_before = best.movables, len(start.movables)
@@ -115,6 +132,34 @@ class PlacementJudge:
             total / norm2,
             float(after[1].sum()) / norm2,
         )
+
+    def is_worth(self, before: Arrangement, after: Arrangement) -> bool:
+        """Return whether the last light gains enough on paths that nothing was fitted to."""
+        if after.missed >= before.missed:
+            return False
+        maps = []
+        for its in (before, after):
+            fitted, judged = (
+                self._steps.fitted(its.movables, its.sites, at)
+                for at in (self._paths.refine, self._paths.judge)
+            )
+            maps.append(
+                [
+                    self._fit.missed_map(columns, fitted.weights)
+                    for columns in (fitted.columns, judged.columns)
+                ]
+            )
+        gain = np.array(maps[0]) - np.array(maps[1])
+        least = max(
+            WORTH * float(maps[0][1].sum()),
+            SURE * standard_error(gain),
+            NOTHING * self._fit.norm2,
+        )
+        # Noise of painting and basis, which no other paths can tell, is that of single pixels: a
+        # search fits some of them by chance.
+        usual = np.sort(maps[0][1])[: max(1, round(USUAL_SHARE * len(maps[0][1])))]
+        least = max(least, BY_CHANCE * float(usual.mean()))
+        return float(gain[1].sum() - gain[1].max()) >= least
 
     def errors(self, best: Arrangement) -> list[PoseError]:
         """Return how far each pose differs between fits along independent paths."""
@@ -187,3 +232,11 @@ def _error(sites: Sequence[Site], slides: bool) -> PoseError:
         angles = np.arccos(np.clip(axes @ mean, -1, 1))
         turn = math.degrees(math.sqrt(float(np.square(angles).sum()) / (len(sites) - 1)))
     return PoseError(place, turn)
+
+
+def standard_error(differences: Doubles) -> float:
+    """Return the standard error of a sum over pixels, (2, p): by how much two sets of paths differ.
+
+    They share what is signal, and have independent noise at each pixel.
+    """
+    return float(np.sqrt(np.square(differences[0] - differences[1]).sum() / 2))

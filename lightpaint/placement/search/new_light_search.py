@@ -10,20 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpaint.arrays import Doubles, Floats
+from lightpaint.arrays import Floats
 from lightpaint.placement.movable import Arrangement, Movable
+from lightpaint.placement.search.judgement import NOTHING, PlacementJudge
 from lightpaint.placement.search.pose_search import SHORT_STEPS, PoseSearch
 from lightpaint.scene.properties.pose import Site
 
-#: Least gain of a new light, as a share of what is missed, and in standard errors.
-WORTH, SURE = 0.01, 3.0
-
 #: Least fall of what is missed for which a new light goes elsewhere once all are there.
 WORTH_AGAIN = 0.05
-
-#: Pixels whose noise one light explains by chance, of many places that it is tried at; and the
-#: share of pixels whose miss is no more than the noise of a pixel where nothing else is missed.
-BY_CHANCE, USUAL_SHARE = 24, 0.9
 
 #: Steps of all lights together, after each one that is added.
 STEPS = 6
@@ -37,9 +31,6 @@ MERGED_RISE = 0.03
 #: Distance of lights that may be one, relative to the spread of visible points.
 MERGED_DISTANCE = 0.5
 
-#: Share of ‖Ψ‖² that counts as nothing.
-NOTHING = 1e-4
-
 
 class NewLightSearch:
     """A search for lights to add.
@@ -47,10 +38,11 @@ class NewLightSearch:
     Args:
         search: Of poses.
         slots: New lights that may be added; those of one group are alike.
+        judge: Of what each gives.
     """
 
-    def __init__(self, search: PoseSearch, slots: Sequence[Movable]) -> None:
-        self._search, self._free = search, list(slots)
+    def __init__(self, search: PoseSearch, slots: Sequence[Movable], judge: PlacementJudge) -> None:
+        self._search, self._free, self._judge = search, list(slots), judge
         self._fit, self._steps, self._paths = search.fit, search.steps, search.paths
 
     def run(self, start: Arrangement, progress: Callable[[], None]) -> Arrangement:
@@ -59,7 +51,7 @@ class NewLightSearch:
         while self._free and arrangement.missed > NOTHING * self._fit.norm2:
             more = self._with_one_more(arrangement)
             progress()
-            if more is None or not self._is_worth(arrangement, more):
+            if more is None or not self._judge.is_worth(arrangement, more):
                 break
             added = more.movables[-1]
             self._free = [slot for slot in self._free if slot.columns != added.columns]
@@ -94,32 +86,6 @@ class NewLightSearch:
                 if best is None or more.missed < best.missed:
                     best = more
         return best
-
-    def _is_worth(self, before: Arrangement, after: Arrangement) -> bool:
-        """Return whether the last light gains enough on paths that nothing was fitted to."""
-        if after.missed >= before.missed:
-            return False
-        maps = []
-        for candidate in (before, after):
-            judged = self._steps.fitted(candidate.movables, candidate.sites, self._paths.judge)
-            fitted = candidate.fitted
-            maps.append(
-                [
-                    self._fit.missed_map(columns, fitted.weights)
-                    for columns in (fitted.columns, judged.columns)
-                ]
-            )
-        gain = np.array(maps[0]) - np.array(maps[1])
-        least = max(
-            WORTH * float(maps[0][1].sum()),
-            SURE * standard_error(gain),
-            NOTHING * self._fit.norm2,
-        )
-        # Noise of painting and basis, which no other paths can tell, is that of single pixels: a
-        # search fits some of them by chance.
-        usual = np.sort(maps[0][1])[: max(1, round(USUAL_SHARE * len(maps[0][1])))]
-        least = max(least, BY_CHANCE * float(usual.mean()))
-        return float(gain[1].sum() - gain[1].max()) >= least
 
     def _without_off(self, arrangement: Arrangement) -> Arrangement:
         """Return the arrangement without new lights that are off, whose slots are free again."""
@@ -197,11 +163,3 @@ def _between(first: Site, second: Site, share: float) -> Site:
         return site
     x, y, z = (way / length).tolist()
     return replace(site, direction=(x, y, z))
-
-
-def standard_error(differences: Doubles) -> float:
-    """Return the standard error of a sum over pixels, (2, p): by how much two sets of paths differ.
-
-    They share what is signal, and have independent noise at each pixel.
-    """
-    return float(np.sqrt(np.square(differences[0] - differences[1]).sum() / 2))

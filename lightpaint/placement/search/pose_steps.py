@@ -46,8 +46,15 @@ class PoseSteps:
     ) -> None:
         self._fit, self._permits = fit, permits
         self.watch: Callable[[Arrangement], None] = lambda _: None
+        self._spread = spread
         self.first_step = FIRST_STEP * spread
         self._unit = spread / 3
+
+    def on(self, fit: PlacementFit) -> "PoseSteps":
+        """Return the same steps for another fit: on another film."""
+        steps = PoseSteps(fit, self._spread, self._permits)
+        steps.watch = self.watch
+        return steps
 
     def fitted(self, movables: Sequence[Movable], sites: Sequence[Site], at: ViewPaths) -> Fitted:
         """Return the best lighting with these poses."""
@@ -69,7 +76,6 @@ class PoseSteps:
         *,
         moving: Sequence[int] | None = None,
         first_share: float = 1.0,
-        is_central: bool = False,
         progress: Callable[[], None] = lambda: None,
     ) -> Arrangement:
         """Return the arrangement after at most so many steps; see `step`.
@@ -79,9 +85,7 @@ class PoseSteps:
         step, last, ridge = first_share * self.first_step, LAST_SHARE * self.first_step, RIDGE
         for _ in range(steps):
             before = arrangement.missed
-            arrangement, ridge = self.step(
-                arrangement, at, step, ridge, moving=moving, is_central=is_central
-            )
+            arrangement, ridge = self.step(arrangement, at, step, ridge, moving=moving)
             self.watch(arrangement)
             progress()
             share = 1 - arrangement.missed / max(before, 1e-300)
@@ -100,12 +104,10 @@ class PoseSteps:
         ridge: float = RIDGE,
         *,
         moving: Sequence[int] | None = None,
-        is_central: bool = False,
     ) -> tuple[Arrangement, float]:
         """Return an arrangement that misses less, or itself, and the ridge of the next step.
 
-        step: length of the differences. moving: movables that move; None for all. is_central:
-        whether differences are to both sides, which costs twice as much.
+        step: length of the differences. moving: movables that move; None for all.
         """
         every = range(len(arrangement.movables)) if moving is None else moving
         scales = {
@@ -114,7 +116,7 @@ class PoseSteps:
         numbers = [(k, j) for k, stepped in scales.items() for j in range(len(stepped))]
         if not numbers:
             return arrangement, ridge
-        slopes, owners, places = self._slopes(arrangement, at, numbers, scales, step, is_central)
+        slopes, owners, places = self._slopes(arrangement, at, numbers, scales, step)
         matrix, gradient = self._fit.newton(arrangement.fitted, slopes, owners, places)
         diagonal = np.diag(matrix) + 1e-9 * np.trace(matrix) + 1e-300
         for _ in range(TRIALS):
@@ -148,11 +150,9 @@ class PoseSteps:
         numbers: Sequence[tuple[int, int]],
         scales: dict[int, Doubles],
         step: float,
-        is_central: bool,
     ) -> tuple[Floats, list[int], list[int]]:
         """Return slopes of columns (s, p, 3), the index of each one's column and number."""
         ahead: list[Site] = []
-        back: list[Site] = []
         owners: list[int] = []
         places: list[int] = []
         widths: list[float] = []
@@ -161,10 +161,7 @@ class PoseSteps:
             change = np.zeros(len(scales[k]))
             change[j] = step * scales[k][j]
             new_site, width = movable.light.stepped(site, change), step
-            if is_central:
-                back += movable.sites(movable.light.stepped(site, -change))
-                width = 2 * step
-            elif new_site == site:
+            if new_site == site:
                 # It stands at a bound: look the other way.
                 new_site, width = movable.light.stepped(site, -change), -step
             ahead += movable.sites(new_site)
@@ -172,7 +169,7 @@ class PoseSteps:
             places += [q] * len(movable.columns)
             widths += [width] * len(movable.columns)
         slopes = at.columns(ahead)
-        slopes -= at.columns(back) if is_central else arrangement.fitted.columns[owners]
+        slopes -= arrangement.fitted.columns[owners]
         slopes /= np.array(widths, np.float32)[:, None, None]
         return slopes, owners, places
 
