@@ -11,7 +11,8 @@ from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
 from lightpaint.pipeline.results import results
-from lightpaint.pipeline.results.results import VIEW_KEY, verify_result
+from lightpaint.pipeline.results.repeated_verification import verify_result
+from lightpaint.pipeline.results.results import VIEW_KEY
 
 IMAGE = np.ones((2, 3, 3), np.float32)
 

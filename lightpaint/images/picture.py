@@ -20,7 +20,7 @@ from lightpaint.images.formats.bitmap_decoder import (
     unpremultiply,
 )
 from lightpaint.images.formats.exr import ExrPart, read_parts
-from lightpaint.images.formats.exr_layers import ALPHA_NAMES, RGB_NAMES, Layer, choose_layer
+from lightpaint.images.formats.exr_layers import ALPHA_NAMES, RGB_NAMES, ExrLayer, choose_layer
 from lightpaint.images.formats.file_kinds import head_of, kind_of, name_of
 from lightpaint.images.formats.openraster import LAYERED, layered_kind, read_merged
 
@@ -137,7 +137,7 @@ def _bitmap(path: Path, kind: str) -> Bitmap:
     return read_merged(path, kind) if kind in LAYERED.values() else read_bitmap(path, kind)
 
 
-def _picture_of_layer(layer: Layer) -> Picture:
+def _picture_of_layer(layer: ExrLayer) -> Picture:
     stored_part = layer.part
     layer = replace(layer, part=stored_part.in_display_window())
     image = layer.rgb()
@@ -163,7 +163,7 @@ def _picture_of_layer(layer: Layer) -> Picture:
     )
 
 
-def _at_least(layer: Layer) -> Mask | None:
+def _at_least(layer: ExrLayer) -> Mask | None:
     """Return where an EXR marks light that may be brighter, as the largest code of 8 bits does."""
     inner = replace(layer, prefix=f"{layer.prefix}.{AT_LEAST}" if layer.prefix else AT_LEAST)
     marks = [inner.channel(*names) for names in zip(*RGB_NAMES, strict=True)]

@@ -14,7 +14,7 @@ from lightpaint.pipeline.job.settings import Settings
 from lightpaint.pipeline.job.sources import content
 from lightpaint.pipeline.job_bases import obtain, view_listener
 from lightpaint.pipeline.needed_samples import problem_of, without_noise
-from lightpaint.pipeline.results.results import all_changes, spoken_change
+from lightpaint.pipeline.results.placement_changes import all_changes, spoken_change
 from lightpaint.placement.place import place
 from lightpaint.placement.placement import Placement
 from lightpaint.placement.placement_record import PlacementRecord

@@ -5,7 +5,7 @@ from html import escape
 
 from lightpaint.batch.plan.place_groups import PlaceGroup
 from lightpaint.batch.plan.plan import Plan
-from lightpaint.pipeline.results.results import hung_of
+from lightpaint.pipeline.results.placement_changes import hung_of
 from lightpaint.placement.placement_record import PlacementRecord
 
 

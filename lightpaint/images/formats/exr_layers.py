@@ -33,7 +33,7 @@ UNSPECIFIED = ("", "data", "unknown")
 
 
 @dataclass(frozen=True)
-class Layer:
+class ExrLayer:
     """A colour image in a part: its channels are those with this prefix.
 
     name: its name for people; "" if it is the only layer in its file and has none.
@@ -115,17 +115,17 @@ def linear_rgb(part: ExrPart, layer: str = "") -> Floats:
     return _in_rec709(image, primaries)
 
 
-def colour_layers(parts: Sequence[ExrPart]) -> list[Layer]:
+def colour_layers(parts: Sequence[ExrPart]) -> list[ExrLayer]:
     """Return every layer of a file that holds a colour, in the file's order, the unnamed first."""
     layers = []
     for part in parts:
         prefixes = dict.fromkeys(name.rpartition(".")[0] for name in part.channels)
         for prefix in sorted(filter(lambda p: _is_colour(part, p), prefixes), key=bool):
-            layers.append(Layer(_layer_name(part, prefix, several=len(parts) > 1), part, prefix))
+            layers.append(ExrLayer(_layer_name(part, prefix, several=len(parts) > 1), part, prefix))
     return layers
 
 
-def choose_layer(parts: Sequence[ExrPart], requested: str | None = None) -> Layer:
+def choose_layer(parts: Sequence[ExrPart], requested: str | None = None) -> ExrLayer:
     """Return the layer called `requested`: by its name, its part's or view's name, or its prefix.
 
     Without a request it returns the only layer, or the only one without a prefix, unless Krita
@@ -161,7 +161,7 @@ def choose_layer(parts: Sequence[ExrPart], requested: str | None = None) -> Laye
     raise ImageError(f"has no layer {requested!r}: it has {_names(layers)}")
 
 
-def _names(layers: Sequence[Layer]) -> str:
+def _names(layers: Sequence[ExrLayer]) -> str:
     return some_names(layer.name or "one without a name" for layer in layers)
 
 
@@ -171,7 +171,7 @@ def _layer_name(part: ExrPart, prefix: str, *, several: bool) -> str:
     return _joined(part.name, prefix) if prefix else part.name
 
 
-def _views(layer: Layer) -> list[str]:
+def _views(layer: ExrLayer) -> list[str]:
     """Return the names of the view that the layer is: the part's, or the first in a multi-view
     part.
     """

@@ -1,55 +1,46 @@
 """The results of a solve in its folder, and reading them back."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lightpaint.basis.basis import Basis
 from lightpaint.basis.origin import Origin
-from lightpaint.errors import ImageError, OutputError, SceneError
+from lightpaint.errors import SceneError
 from lightpaint.files import is_name, one_line, write_bytes, write_text
 from lightpaint.images.bands import in_turns
-from lightpaint.images.estimate import Estimate, read_estimate, write_estimate
+from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.formats.png import png_bytes
-from lightpaint.images.pixel_blocks import Size, whole_factor
+from lightpaint.images.pixel_blocks import Size
 from lightpaint.keywords import keywords
 from lightpaint.lighting.analysis.analysis import Analysis
 from lightpaint.lighting.analysis.diagnosis import Diagnosis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.lighting.solution import Solution
-from lightpaint.placement.placement import HARDLY_VISIBLE, AddedLight, Move, Placement
-from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.pipeline.results.placement_changes import hung_of
+from lightpaint.placement.placement import Placement
 from lightpaint.placement.suggestions.suggestion import MoveSuggestion, Suggestion
-from lightpaint.progress import Progress, silent
 from lightpaint.relit.export.exports import EXPORTS
 from lightpaint.relit.verification import Verification
-from lightpaint.relit.verification_render import verify
 from lightpaint.report.answer_pictures import report_transform, residual_of
 from lightpaint.report.clean_pictures import CleanLooks
 from lightpaint.report.comparison import comparison_image
 from lightpaint.report.page.notebook_html import look_html
 from lightpaint.report.page.page import report_page
 from lightpaint.report.report_json import report_numbers
-from lightpaint.report.rig.hung_lights import HungLights, LightChange, hung_lights, spoken_fraction
 from lightpaint.report.verdict import verdict
 from lightpaint.report.visible_emitters import emitter_remarks
 from lightpaint.scene.scene import Scene
-from lightpaint.scene.scene_reader import load_scene
-from lightpaint.scene.scene_render import Stream
 from lightpaint.scene.surfaces import render_features
 from lightpaint.screen import some_names
-from lightpaint.storage.json_records import read_record, strict_json
 from lightpaint.storage.staging import finish
 from lightpaint.target.target import Target
 
 #: Header attribute of predicted.exr: the sensor, film and samples of the basis.
 VIEW_KEY = "lightpaint.view"
-
-#: Least errors of a turn, in degrees, and of a way, as a share of it, that are worth a number.
-LEAST_TURN_ERROR, LEAST_SHARE = 0.05, 0.001
 
 #: Files of every solve.
 SOLVE_RESULTS = ("lighting.json", "predicted.exr", "comparison.png", "report.html", "report.json")
@@ -256,131 +247,3 @@ def _report_arguments(look: Look, command: str) -> dict[str, Any]:
         "appearance": look.analysis.appearance,
         "color_choices": look.analysis.color_choices,
     }
-
-
-def hung_of(placement: Placement | PlacementRecord, lighting: Lighting | None) -> HungLights:
-    """Return what a placement changed, and the lights of an answer; none without one."""
-    changes = [_change_of(change) for change in all_changes(placement)]
-    changes.sort(key=lambda change: -change.numbers["gain_share"])
-    missed = placement.missed_before, placement.missed_after
-    lights = () if lighting is None else hung_lights(lighting)
-    up = (0.0, 1.0, 0.0) if lighting is None else lighting.up
-    return HungLights(lights, tuple(changes), up, *missed, placement.looks)
-
-
-def all_changes(placement: Placement | PlacementRecord) -> list[Move | AddedLight]:
-    """Return the moves, then the new lights."""
-    return [*placement.moves, *placement.additions]
-
-
-def _change_of(change: Move | AddedLight) -> LightChange:
-    numbers: dict[str, Any] = {
-        "gain_share": change.gain_share,
-        "place_error": change.place_error,
-        "turn_error": change.turn_error,
-        "is_hardly_visible": change.is_hardly_visible,
-    }
-    if isinstance(change, Move):
-        numbers |= {"distance": change.distance, "turn": change.turn, "cutoff": change.new.cutoff}
-    return LightChange(change.name, spoken_change(change), numbers)
-
-
-def spoken_change(change: Move | AddedLight) -> str:
-    """Return what a light did and gained: `spot_knot turned by 12°, slid 0.6: a fifth …`."""
-    if isinstance(change, Move):
-        done = spoken_move(change)
-    else:
-        x, y, z = (f"{v:.2f}" for v in change.site.position or (0.0, 0.0, 0.0))
-        done = f"a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
-        if change.place_error:
-            done += f" ± {change.place_error:.1g}"
-    text = f"{change.name} {done}: {spoken_fraction(change.gain_share)} of what was missed"
-    return f"{text}; {HARDLY_VISIBLE}" if change.is_hardly_visible else text
-
-
-def spoken_move(move: Move) -> str:
-    """Return what a light did, with the errors of that: `turned by 12° ± 1°, slid 0.6 ± 0.05`."""
-    done = []
-    if move.turn >= 0.5:
-        error = f" ± {move.turn_error:.1g}°" if (move.turn_error or 0) >= LEAST_TURN_ERROR else ""
-        done.append(f"turned by {move.turn:.0f}°{error}")
-    if move.distance > 0:
-        is_told = (move.place_error or 0) >= LEAST_SHARE * move.distance
-        error = f" ± {move.place_error:.1g}" if is_told else ""
-        done.append(f"slid {move.distance:.2g}{error}")
-    if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
-        done.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
-    return ", ".join(done)
-
-
-def verify_result(
-    folder: str | Path,
-    *,
-    spp: int | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Verification:
-    """Render the relit.xml of a result folder again and compare it with its predicted.exr.
-
-    spp: samples per pixel, by default those recorded in predicted.exr. Raises OutputError if
-    `folder` holds no such result, ImageError if predicted.exr is damaged.
-    """
-    folder = Path(folder)
-    for candidate in (folder, folder.parent):
-        finish(candidate)
-    relit_xml = folder / "relit.xml"
-    if not relit_xml.is_file() and (folder.parent / "relit.xml").is_file():
-        relit_xml = folder.parent / "relit.xml"  # one of several views
-    missing = [file.name for file in (folder / "predicted.exr", relit_xml) if not file.is_file()]
-    if missing:
-        raise OutputError(
-            f"{folder} is not a result folder with a relit scene: it has no "
-            f"{' and no '.join(missing)}; give one that lightpaint solve made from a scene"
-        )
-    path = folder / "predicted.exr"
-    predicted, attributes = read_estimate(path)
-    view = _read_view(path, attributes.get(VIEW_KEY, "{}"))
-    relit = load_scene(
-        relit_xml, sensor=view.sensor, parameters=view.parameters, use_lights_file=False
-    )
-    if view.width is not None and view.height is not None:
-        film = (view.height, view.width)
-        # A scene that was edited by hand may have another film, which `verify` refuses.
-        if relit.size != film and whole_factor(relit.size, film) is not None:
-            relit = relit.reduced(f"{view.width}x{view.height}")
-    return verify(
-        predicted,
-        relit,
-        spp=view.spp if spp is None else spp,
-        seed=seed,
-        stream=Stream.SECOND_VERIFICATION,
-        progress=progress,
-    )
-
-
-@dataclass(frozen=True)
-class _RecordedView:
-    """The content of VIEW_KEY; None for what is missing.
-
-    spp: samples per pixel. width, height: film of the verification; None for the whole film.
-    parameters: values of `$name` parameters of the scene.
-    """
-
-    sensor: str | None = None
-    spp: int | None = None
-    width: int | None = None
-    height: int | None = None
-    parameters: Mapping[str, str] | None = None
-
-    def __post_init__(self) -> None:
-        if self.spp == 0:
-            raise ValueError("spp is a whole number > 0, not 0")
-
-
-def _read_view(path: Path, text: str) -> _RecordedView:
-    try:
-        return read_record(_RecordedView, strict_json(text), others=True)
-    except ValueError as error:
-        raise ImageError(
-            f"{path} is damaged in its attribute {VIEW_KEY}: {one_line(str(error))}; solve again"
-        ) from None

@@ -1,0 +1,66 @@
+"""Changes of a placement, as records for reports and as sentences for people."""
+
+from typing import Any
+
+from lightpaint.lighting.answer.lighting import Lighting
+from lightpaint.placement.placement import HARDLY_VISIBLE, AddedLight, Move, Placement
+from lightpaint.placement.placement_record import PlacementRecord
+from lightpaint.report.rig.hung_lights import HungLights, LightChange, hung_lights, spoken_fraction
+
+#: Least errors of a turn, in degrees, and of a way, as a share of it, that are worth a number.
+LEAST_TURN_ERROR, LEAST_SHARE = 0.05, 0.001
+
+
+def hung_of(placement: Placement | PlacementRecord, lighting: Lighting | None) -> HungLights:
+    """Return what a placement changed, and the lights of an answer; none without one."""
+    changes = [_change_of(change) for change in all_changes(placement)]
+    changes.sort(key=lambda change: -change.numbers["gain_share"])
+    missed = placement.missed_before, placement.missed_after
+    lights = () if lighting is None else hung_lights(lighting)
+    up = (0.0, 1.0, 0.0) if lighting is None else lighting.up
+    return HungLights(lights, tuple(changes), up, *missed, placement.looks)
+
+
+def all_changes(placement: Placement | PlacementRecord) -> list[Move | AddedLight]:
+    """Return the moves, then the new lights."""
+    return [*placement.moves, *placement.additions]
+
+
+def _change_of(change: Move | AddedLight) -> LightChange:
+    numbers: dict[str, Any] = {
+        "gain_share": change.gain_share,
+        "place_error": change.place_error,
+        "turn_error": change.turn_error,
+        "is_hardly_visible": change.is_hardly_visible,
+    }
+    if isinstance(change, Move):
+        numbers |= {"distance": change.distance, "turn": change.turn, "cutoff": change.new.cutoff}
+    return LightChange(change.name, spoken_change(change), numbers)
+
+
+def spoken_change(change: Move | AddedLight) -> str:
+    """Return what a light did and gained: `spot_knot turned by 12°, slid 0.6: a fifth …`."""
+    if isinstance(change, Move):
+        done = spoken_move(change)
+    else:
+        x, y, z = (f"{v:.2f}" for v in change.site.position or (0.0, 0.0, 0.0))
+        done = f"a new {change.emitter.kind} at ({x}, {y}, {z})".replace("-", "−")
+        if change.place_error:
+            done += f" ± {change.place_error:.1g}"
+    text = f"{change.name} {done}: {spoken_fraction(change.gain_share)} of what was missed"
+    return f"{text}; {HARDLY_VISIBLE}" if change.is_hardly_visible else text
+
+
+def spoken_move(move: Move) -> str:
+    """Return what a light did, with the errors of that: `turned by 12° ± 1°, slid 0.6 ± 0.05`."""
+    done = []
+    if move.turn >= 0.5:
+        error = f" ± {move.turn_error:.1g}°" if (move.turn_error or 0) >= LEAST_TURN_ERROR else ""
+        done.append(f"turned by {move.turn:.0f}°{error}")
+    if move.distance > 0:
+        is_told = (move.place_error or 0) >= LEAST_SHARE * move.distance
+        error = f" ± {move.place_error:.1g}" if is_told else ""
+        done.append(f"slid {move.distance:.2g}{error}")
+    if move.new.cutoff is not None and move.new.cutoff != move.old.cutoff:
+        done.append(f"its cone ends at {move.new.cutoff:.0f}° (was {move.old.cutoff:.0f}°)")
+    return ", ".join(done)
