@@ -31,8 +31,8 @@ ASKED = {
     "take_over": {},
 }
 
-#: Requests of a rig, which the session that tests make up does not have.
-RIG = {"move", "point", "show_rig", "place"}
+#: Requests of a rig and of layers, which the session that tests make up does not have.
+RIG = {"move", "point", "show_rig", "place", "add_light", "remove_light", "change_layers"}
 
 
 def check(told: dict[str, Any]) -> None:
