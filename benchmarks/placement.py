@@ -257,7 +257,8 @@ def show_gallery() -> None:
         lighting = lp.solve(again, target, space="linear", hold=0, resize=True).lighting
         with tempfile.TemporaryDirectory() as folder:
             relit = lp.relight(placement.scene, lighting, Path(folder) / "relit.xml")
-            picture = block_mean(rendered(relit, seed=6, spp=BASIS_SPP), 2)
+            picture = rendered(relit, seed=6, spp=BASIS_SPP)
+        picture = block_mean(picture, picture.shape[0] // painted.shape[0])
         print(
             f"  {len(placement.additions)} new: {plain_share(again, painted):.3f}, rendered "
             f"{math.sqrt(missed(picture, painted)):.3f}, in {seconds:.0f} s",
