@@ -72,7 +72,9 @@ def test_the_scene_stays_loaded_over_the_rounds(
     target = painting(small_room)
     loads: list[Scene] = []
     load = Scene.load
-    monkeypatch.setattr(Scene, "load", lambda self, *a: loads.append(self) or load(self, *a))
+    monkeypatch.setattr(
+        Scene, "load", lambda self, *a, **o: loads.append(self) or load(self, *a, **o)
+    )
     pilot = render_basis(small_room, spp=PILOT_SPP)
     rendered = len(loads)
     job = Job(

@@ -10,7 +10,7 @@ import pytest
 from lightpaint.errors import ImageError
 from lightpaint.images.estimate import Estimate, write_estimate
 from lightpaint.images.formats.exr import ExrPart, rgb_channels, write_parts
-from lightpaint.pipeline.results import results
+from lightpaint.pipeline.results import repeated_verification
 from lightpaint.pipeline.results.repeated_verification import verify_result
 from lightpaint.pipeline.results.results import VIEW_KEY
 
@@ -75,8 +75,12 @@ def test_the_view_of_the_solve_is_taken_unless_another_is_given(
     expected: tuple[str | None, int | None],
 ):
     used: list[Any] = []
-    monkeypatch.setattr(results, "load_scene", lambda _path, sensor, **_: used.append(sensor))
-    monkeypatch.setattr(results, "verify", lambda *_args, spp, **_options: used.append(spp))
+    instead = {
+        "load_scene": lambda _path, sensor, **_: used.append(sensor),
+        "verify": lambda *_args, spp, **_options: used.append(spp),
+    }
+    for name, function in instead.items():
+        monkeypatch.setattr(repeated_verification, name, function)
     folder = _result(tmp_path, None if view is None else json.dumps(view))
     verify_result(folder, spp=given)
     assert tuple(used) == expected

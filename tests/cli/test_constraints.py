@@ -142,12 +142,12 @@ def test_a_temperature_away_from_plancks_locus_is_solved_for(room: Path, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--lock", "pannel"), "light.pannel: no light 'pannel'; did you mean 'panel'"),
+        (("--lock", "pannel"), "no light 'pannel'; did you mean 'panel'"),
         (("--limit", "bulb=3"), "'3' is not MIN:MAX"),
         (("--limit", "bulb=3:2"), "min of 3 above its max of 2"),
-        (("--limit", "bulb=:"), "limits is empty"),
+        (("--limit", "bulb=:"), "--limit bulb is empty: expected min, max or both"),
         (("--color", "bulb"), "'bulb' is not NAME=VALUE"),
-        (("--color", "bulb=blue"), "light.bulb.color is 'blue': expected a colour"),
+        (("--color", "bulb=blue"), "--color bulb is 'blue': expected a colour"),
         (("--kelvin", "bulb=warm"), "is not NAME=2700:6500"),
         (("--kelvin", "bulb=2700,duv=green"), "with or without ,duv=0.003 after it"),
         (("--kelvin", "bulb=2700,tint=0.01"), "with or without ,duv=0.003 after it"),

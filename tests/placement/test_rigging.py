@@ -157,7 +157,7 @@ def test_a_wrong_value_is_one_line_with_its_file_and_key(
 @pytest.mark.parametrize(
     ("lights", "words"),
     [
-        ({"lamp": {"aim": 10}}, "light.lamp: no light 'lamp'; there are panel, bulb"),
+        ({"lamp": {"aim": 10}}, "light.lamp.aim: no light 'lamp'; there are panel, bulb"),
         ({"beem": {"aim": 10}}, "did you mean 'beam'"),
         ({"sky": {"move": 1}}, "light.sky.move: light 'sky' is of the kind constant"),
         ({"bulb": {"cone": [10, 20]}}, "light.bulb.cone: light 'bulb' has no cone"),

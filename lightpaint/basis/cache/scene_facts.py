@@ -87,7 +87,9 @@ def recall_facts(key: str) -> SceneFacts | None:
             if record["format"] == FORMAT and _is_unchanged(record["places"], record["texts"]):
                 facts = record["known"]
                 facts |= {name: tuple(facts[name]) for name in ("size", "remarks")}
-                lights = tuple(read_record(BasisLight, light) for light in facts["lights"]["each"])
+                lights = tuple(
+                    read_record(BasisLight, light) for light in facts["lights"]["records"]
+                )
                 requests = SceneRequests(**facts["lights"]["requests"])
                 return SceneFacts(**{**facts, "lights": Lights(lights, requests)})
     return None

@@ -102,7 +102,7 @@ class LookLibrary:
         """Continue from a look."""
         look = self._find(message.look)
         paintings = dict(enumerate(self._paintings(look)))
-        requests = SessionRequests.of(look.fields["wishes"])
+        requests = _requests(look)
         weights = np.asarray(look.arrays["weights"], np.float64)
         stored = look.fields.get("layers")
         layers = None if stored is None else LayeredPaintings.from_fields(stored, look.arrays)
@@ -111,14 +111,14 @@ class LookLibrary:
 
     def _names(self, look: StoredLook) -> tuple[str, ...]:
         """Return the names of the lights that a look has weights of."""
-        return (*self._session.bases[0].names, *look.fields["wishes"].get("added", {}))
+        return (*self._session.bases[0].names, *_requests(look).added)
 
     def _weights(self, look: StoredLook) -> Doubles:
         """Return the weights of a look, (n, 3), of the lights that there are now.
 
         Lights that it does not have are off.
         """
-        requests = SessionRequests.of(look.fields["wishes"])
+        requests = _requests(look)
         return self._in_order(np.asarray(look.arrays["weights"]), requests)
 
     def _in_order(self, weights: Doubles, requests: SessionRequests) -> Doubles:
@@ -164,7 +164,7 @@ class LookLibrary:
             raise PaintError(f"part is {part:g}: expected 0 for the first look to 1 for the second")
         looks = [self._find(k) for k in (message.first, message.second)]
         shares = 1 - part, part
-        requests = [SessionRequests.of(x.fields["wishes"]) for x in looks]
+        requests = [_requests(x) for x in looks]
         if requests[0].placed != requests[1].placed:
             first, second = (x.fields["name"] for x in looks)
             raise PaintError(
@@ -297,3 +297,8 @@ def _mix_pixels(pair: tuple[Pixels, Pixels], shares: tuple[float, float]) -> Pix
         unsure |= fixed & (count > 0)[..., None]
     at_least = ~unsure & (total > 0)[..., None]
     return Pixels(image, total.astype(np.float32), at_least if at_least.any() else None)
+
+
+def _requests(look: StoredLook) -> SessionRequests:
+    """Return the requests of a look; none where its file does not have them."""
+    return SessionRequests.of(look.fields.get("wishes", {}))
