@@ -69,6 +69,11 @@ class Room:
         box = self.page.locator(f'[data-lamp="{name}"]').first.bounding_box()
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
+    def until_step(self, count: int) -> None:
+        """Wait for a step to be kept, and for its requests to be in effect, which follow it."""
+        session = self.studio.session
+        until(lambda: session.store.position == count and not session.is_open)
+
     def drag(self, start: tuple[float, float], dx: float, dy: float) -> None:
         mouse = self.page.mouse
         mouse.move(*start)
@@ -102,7 +107,7 @@ def test_lights_are_marked_dragged_and_taken_back(room: Room) -> None:
     assert room.mark("bulb") == pytest.approx(room.seen(bulb), abs=1)
     assert room.page.locator('[data-lamp="sky"]').count() == 0
     room.drag(room.mark("bulb"), 40, 0)
-    until(lambda: room.studio.session.store.position == 1)
+    room.until_step(1)
     place = room.poses["bulb"]["position"]
     assert place[1] == pytest.approx(bulb[1])  # in its horizontal plane
     assert place[0] > bulb[0]
@@ -110,7 +115,7 @@ def test_lights_are_marked_dragged_and_taken_back(room: Room) -> None:
     room.page.keyboard.down("Shift")
     room.drag(room.mark("bulb"), 0, -30)
     room.page.keyboard.up("Shift")
-    until(lambda: room.studio.session.store.position == 2)
+    room.until_step(2)
     higher = room.poses["bulb"]["position"]
     assert (higher[0], higher[2]) == pytest.approx((place[0], place[2]))
     assert higher[1] > place[1]
@@ -151,7 +156,7 @@ def test_a_light_is_added_by_a_click_dragged_and_removed(room: Room) -> None:
     until(lambda: room.mark("spot_1") == pytest.approx(room.seen(place), abs=1))
     assert not session.is_painted
     room.drag(room.mark("spot_1"), 40, 0)
-    until(lambda: session.store.position == 2)
+    room.until_step(2)
     moved = room.poses["spot_1"]["position"]
     assert moved[0] > place[0]
     row = page.get_by_role("group", name="spot_1", exact=True)
