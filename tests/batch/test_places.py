@@ -60,7 +60,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 class _Heard(Listener):
-    """What a batch tells: remarks, and labels of what makes progress."""
+    """A listener that keeps the remarks of a batch and the labels of its progress."""
 
     def __init__(self) -> None:
         self.labels: list[str] = []

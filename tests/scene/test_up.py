@@ -1,4 +1,4 @@
-"""What is up in a scene, by its camera: pan, tilt and plans of the room are about it."""
+"""The up direction of a scene, which its camera gives, and pan, tilt and plans that follow it."""
 
 from pathlib import Path
 

@@ -1,7 +1,7 @@
 """The options of `lightpaint solve`: paintings, method, constraints."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from lightpaint.cli.options import arguments
@@ -232,6 +232,23 @@ def add_tolerances(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _repeated(
+    group: argparse._ArgumentGroup, dests: Mapping[str, str]
+) -> Callable[[str, str, Callable[[str], Any], str], None]:
+    """Return a function that adds an option which may be repeated: its flag, metavar, type, help.
+
+    dests: attributes of the options whose attribute is not named as they are.
+    """
+
+    def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
+        dest = dests.get(option, option[2:])
+        group.add_argument(
+            option, dest=dest, type=kind, action="append", default=[], metavar=metavar, help=about
+        )
+
+    return add
+
+
 def add_constraints(parser: argparse.ArgumentParser) -> None:
     """Add the constraints on lights, which override those of the lights file."""
     group = parser.add_argument_group(
@@ -241,11 +258,7 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
         "3200K or r,g,b.",
     )
 
-    def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
-        dest = "limits" if option == "--limit" else option[2:]
-        group.add_argument(
-            option, dest=dest, type=kind, action="append", default=[], metavar=metavar, help=about
-        )
+    add = _repeated(group, {"--limit": "limits"})
 
     add(
         "--lock",
@@ -313,11 +326,7 @@ def add_rigging(parser: argparse.ArgumentParser) -> None:
         "they bring the answer closest to the painting.",
     )
 
-    def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
-        dest = "added" if option == "--add" else option[2:]
-        group.add_argument(
-            option, dest=dest, type=kind, action="append", default=[], metavar=metavar, help=about
-        )
+    add = _repeated(group, {"--add": "added"})
 
     add(
         "--move",

@@ -8,27 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from blender import in_blender
+from exported_places import DOWN, OLD, PLACES, RGB, WAY, z_up
 from fake_blender import FakeMatrix, fake_blender, run_in
 
 from lightpaint.relit.export.scene_script import scene_script
-from lightpaint.scene.properties.site import EmitterPlace, Site
+from lightpaint.scene.properties.site import EmitterPlace
 
 #: Blender's matrices and cones are float32.
 FLOAT32 = 1e-5
 
-RGB = (2.0, 1.0, 0.25)
-DOWN, WAY = (0.0, -1.0, 0.0), (0.6, -0.8, 0.0)
-
-#: A spot that moved and turned, a bulb that stayed, a sun that turned, and new lights; y is up.
-OLD = Site((1.0, 2.0, 3.0), DOWN, 30.0, 20.0)
-PLACES = (
-    EmitterPlace("spot", (1.5, 2.5, 3.0), WAY, 40.0, 10.0, moved_from=OLD),
-    EmitterPlace("bulb", (4.0, 1.0, -2.0)),
-    EmitterPlace("sun", None, WAY, moved_from=Site(None, DOWN)),
-    EmitterPlace("key", (0.0, 3.0, 1.0), WAY, 25.0, 5.0, new="spot"),
-    EmitterPlace("fill", (0.5, 3.0, 1.0), new="point"),
-    EmitterPlace("window", (0.0, 2.0, -1.0), WAY, new="panel", size=(2.0, 0.5)),
-)
 STAYED = (EmitterPlace("spot", OLD.position, DOWN, 30.0, 20.0), PLACES[1])
 CONE = (math.radians(60), 0.25)
 
@@ -36,12 +24,6 @@ CONE = (math.radians(60), 0.25)
 def script(places: Any, up: Any = (0.0, 1.0, 0.0)) -> str:
     emitters = [(place.name, "radiance" if place.size else "intensity", RGB) for place in places]
     return scene_script("evening", "hall.xml", emitters, places=places, up=up)
-
-
-def z_up(point: Any) -> np.ndarray:
-    """A point of a scene whose y is up, in Blender."""
-    x, y, z = point
-    return np.array([x, -z, y])
 
 
 def lamps(scale: float = 1.0) -> dict[str, tuple[str, list[list[float]]]]:
@@ -117,8 +99,8 @@ def assert_all_hung(before: Any, first: Any, second: Any, again: Any) -> None:
         assert first[place.name]["type"] == kind
         assert_hangs(first[place.name], place.position, place.direction)
     assert_cone(first["key"], 25, 5)
-    assert first["window"]["size"] == [2.0, 0.5]
-    height = np.array(first["window"]["matrix"])[:3, 1]
+    assert first["window light"]["size"] == [2.0, 0.5]
+    height = np.array(first["window light"]["matrix"])[:3, 1]
     assert height @ z_up(WAY) == pytest.approx(0, abs=FLOAT32)
     for name, found in first.items():
         np.testing.assert_allclose(second[name]["matrix"], found["matrix"], atol=FLOAT32)
@@ -157,7 +139,7 @@ def test_new_lamps_have_the_watts_of_their_light(monkeypatch: pytest.MonkeyPatch
     run_in(modules, script(PLACES), monkeypatch)
     objects = modules[0].data.objects
     # Intensity over all directions; radiance over a half space, π, and 2 by .5.
-    for name, factor in (("key", 4 * math.pi), ("fill", 4 * math.pi), ("window", math.pi)):
+    for name, factor in (("key", 4 * math.pi), ("fill", 4 * math.pi), ("window light", math.pi)):
         data = objects[name].data
         np.testing.assert_allclose(np.array(data.color) * data.energy, factor * np.array(RGB))
 
@@ -172,7 +154,7 @@ def test_lamps_that_hang_elsewhere_than_in_the_scene_stay(
     after = hung_in(modules)
     assert after == before
     told = capsys.readouterr().out
-    for name in ("spot", "sun", "key", "fill", "window"):
+    for name in ("spot", "sun", "key", "fill", "window light"):
         assert f"{name!r} is no lamp, or not where the scene has it" in told
 
 

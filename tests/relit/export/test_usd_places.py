@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exported_places import OLD, PLACES, RGB, WAY, z_up
 from renderer import write_room
 
 from lightpaint.relit.export.usd import Overrides, usd_overrides
 from lightpaint.scene.lights.new_emitter import new_emitter_at
-from lightpaint.scene.properties.site import EmitterPlace, Site
 from lightpaint.scene.scene_reader import load_scene
 
 pytest.importorskip("pxr.UsdLux", reason="usd-core")
@@ -20,32 +20,12 @@ FLOAT32 = 1e-6
 #: Matrices are float64, and one is inverted.
 FLOAT64 = 1e-9
 
-RGB = (2.0, 1.0, 0.25)
-DOWN = (0.0, -1.0, 0.0)
-WAY = (0.6, -0.8, 0.0)
-
-#: A spot that moved and turned, another that stayed, a sun that turned, and new lights; y is up.
-OLD = Site((1.0, 2.0, 3.0), DOWN, 30.0, 20.0)
-PLACES = (
-    EmitterPlace("spot", (1.5, 2.5, 3.0), WAY, 40.0, 10.0, moved_from=OLD),
-    EmitterPlace("bulb", (4.0, 1.0, -2.0)),
-    EmitterPlace("sun", None, WAY, moved_from=Site(None, DOWN)),
-    EmitterPlace("key", (0.0, 3.0, 1.0), WAY, 25.0, 5.0, new="spot"),
-    EmitterPlace("fill", (0.5, 3.0, 1.0), new="point"),
-    EmitterPlace("window light", (0.0, 2.0, -1.0), WAY, new="panel", size=(2.0, 0.5)),
-)
 EMITTERS = [
     ("spot", "intensity", RGB),
     ("sun", "irradiance", RGB),
     *((name, "intensity", RGB) for name in ("bulb", "key", "fill")),
     ("window light", "radiance", RGB),
 ]
-
-
-def z_up(point: Any) -> np.ndarray:
-    """A point or direction of a scene whose y is up, in axes whose z is up."""
-    x, y, z = point
-    return np.array([x, -z, y])
 
 
 def stage_at(path: Path, *, scale: float = 1.0, up: str = "Z") -> Any:
