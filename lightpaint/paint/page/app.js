@@ -32,8 +32,8 @@ import { ViewTabs, showView } from './ui/view_tabs.js';
 /**
  * Show the painter in an element.
  *
- * `global`: keys work wherever the focus is, for a page that is nothing else. `engine`: the picture
- * engine over that host.
+ * `global`: keys work wherever the focus is, for a page that holds only the painter. `engine`: the
+ * picture engine over that host.
  * @param {HTMLElement} element @param {Host} host
  * @param {{global?: boolean, engine: Engine}} options
  * @returns {Promise<{store: Store<Ui>, session: SessionController, close: () => void}>}
@@ -43,7 +43,7 @@ export async function mount(element, host, { global = false, engine }) {
   const store = new Store({ ...initialState(), ...storedTool(), open });
   const root = document.createElement('div');
   root.className = 'lightpaint';
-  root.dataset.lmSuppressShortcuts = 'true'; // of JupyterLab, which hears keys before the painter
+  root.dataset.lmSuppressShortcuts = 'true'; // JupyterLab's, which receive keys before the painter
   element.append(root);
   const session = new SessionController(host, store);
   const app = { store, session, engine };
@@ -95,10 +95,10 @@ function listen(app) {
   });
 }
 
-/** Pixels below which panels lie over the pictures: style.css says it, too. */
+/** Width in pixels below which panels overlay the pictures; style.css has the same number. */
 const NARROW = 760;
 
-/** Panels fold where there is no room beside the pictures, and come back when there is.
+/** Hide panels while there is no room beside the pictures, and show them again when there is.
  * @param {HTMLElement} root @param {Store<Ui>} store */
 function foldByItself(root, store) {
   let isFolded = false;

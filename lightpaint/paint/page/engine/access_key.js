@@ -2,21 +2,22 @@
  * The key to the painter's server: how a page gets it and presents it.
  *
  * The address that a terminal shows has a token in its fragment, which browsers never send. The
- * page takes it from there and exchanges it for the key. What a browser would attach by itself, a
- * cookie, goes to all servers of the machine; the key goes where the page sends it.
+ * page takes it from there and exchanges it for the key. Browsers attach a cookie to requests to
+ * every server of the machine; the key goes only where the page sends it.
  */
 
-/** What a socket speaks. */
+/** WebSocket subprotocol. */
 export const PROTOCOL = 'lightpaint';
 
-/** Under which name the key is kept for a page that is loaded anew: for one tab, and one origin,
- * which has its port. */
+/** Storage name of the key, which survives a reload. Storage belongs to one tab and one origin,
+ * port included. */
 const KEPT = 'lightpaint-key';
 
-/** How a server answers a page of an earlier start, or one that shows no key. */
+/** HTTP statuses for a page from an earlier start of the server, or one without a key. */
 export const REFUSALS = [403, 410];
 
-/** Who shows a key, or a token. @param {string | null} key @returns {RequestInit} */
+/** Return request options that present a key or a token. @param {string | null} key
+ * @returns {RequestInit} */
 export function authorization(key) {
   return { credentials: 'omit', headers: { authorization: `Bearer ${key}` } };
 }
@@ -25,15 +26,17 @@ export class AccessKey {
   /** Where the page came from. @param {string | URL} base */
   constructor(base) {
     this.url = new URL('key', new URL('.', base));
-    /** Until it is exchanged, or refused. @type {string | null} */
+    /** Kept until it is exchanged or refused. @type {string | null} */
     this.token = tokenIn(location.hash);
-    // Who is given a new address in the same tab stays on the page: only its fragment changes.
+    // A new address opened in the same tab does not reload the page, since only its fragment
+    // changes.
     addEventListener('hashchange', () => {
       if (tokenIn(location.hash)) location.reload();
     });
   }
 
-  /** The key, or null for who has none; fails where no server is. @returns {Promise<string | null>} */
+  /** Return the key, or null without one. Rejects if no server answers.
+   * @returns {Promise<string | null>} */
   async key() {
     if (this.token === null) return storedKey();
     const answer = await fetch(this.url, { ...authorization(this.token), cache: 'no-store' });
@@ -41,7 +44,7 @@ export class AccessKey {
     const key = answer.ok ? await answer.text() : storedKey();
     if (key !== null) storeKey(key);
     this.token = null;
-    // Nobody who looks at the page, or at what its browser remembers, is to see it.
+    // Hide the token from onlookers and from the browser's history.
     history.replaceState(history.state, '', location.pathname + location.search);
     return key;
   }
@@ -56,7 +59,7 @@ function storedKey() {
   try {
     return sessionStorage.getItem(KEPT);
   } catch {
-    return null; // The browser is told to keep nothing.
+    return null; // The browser may refuse to store anything.
   }
 }
 
@@ -65,6 +68,6 @@ function storeKey(key) {
   try {
     sessionStorage.setItem(KEPT, key);
   } catch {
-    // A page that is loaded anew then has to come by the address again.
+    // Then a reloaded page needs the address with the token again.
   }
 }

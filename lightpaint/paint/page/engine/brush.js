@@ -5,17 +5,17 @@
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {{x: number, y: number, pressure: number}} Point */
-/** size: diameter. hardness: part of the radius that is covered whole. flow: how far one stamp
- * covers, at full pressure.
+/** size: diameter. hardness: fully covered part of the radius. flow: coverage of one stamp at full
+ * pressure.
  * @typedef {{size: number, hardness: number, flow: number}} Brush */
 
-/** Part of the diameter from one stamp to the next. */
+/** Distance between stamps, as a part of the diameter. */
 export const SPACING = 0.12;
 
-/** How far a stamp covers, in [0, 1], by the distance from its middle over the radius.
+/** Return a stamp's coverage in [0, 1] at a distance from its centre, in radii.
  * @param {number} distance in pixels @param {number} radius @param {number} hardness */
 export function profile(distance, radius, hardness) {
-  // A hard edge is one pixel wide, half of it beyond the radius, so that its area is right.
+  // A hard edge is one pixel wide and centred on the radius, which preserves the area.
   const inner = hardness * Math.max(0, radius - 0.5);
   const outer = radius + 0.5 * hardness;
   if (distance <= inner) return 1;
@@ -23,7 +23,7 @@ export function profile(distance, radius, hardness) {
   return 0.5 + 0.5 * Math.cos((Math.PI * (distance - inner)) / (outer - inner));
 }
 
-/** One stamp. Coverage that is there grows towards 1 by what the stamp covers.
+/** Apply one stamp. It moves the existing coverage towards 1.
  * @param {PaintCanvas} canvas @param {Point} point its middle; pixel (0, 0) has its own at ½, ½
  * @param {Brush} brush @returns {Region} */
 export function stamp(canvas, { x, y, pressure }, { size, hardness, flow }) {
@@ -43,7 +43,7 @@ export function stamp(canvas, { x, y, pressure }, { size, hardness, flow }) {
   return region;
 }
 
-/** A way of the brush, on which it stamps at even distances, whatever points it goes through. */
+/** A path of the brush with stamps at even distances, independent of the spacing of its points. */
 export class Path {
   /** @param {PaintCanvas} canvas @param {Brush} brush */
   constructor(canvas, brush) {
@@ -52,16 +52,16 @@ export class Path {
     /** @type {Point | null} */
     this.last = null;
     this.step = Math.max(0.5, SPACING * brush.size);
-    /** Distance to the next stamp. */
+    /** Distance left to the next stamp. */
     this.left = 0;
   }
 
-  /** Go on to a point. @param {Point} point @returns {Region[]} what is covered anew */
+  /** Continue the path to a point. @param {Point} point @returns {Region[]} what is covered anew */
   moveTo(point) {
     const from = this.last ?? point;
     const length = Math.hypot(point.x - from.x, point.y - from.y);
     const regions = [];
-    // Steps that do not add up to the last bit still reach its end.
+    // The tolerance lets steps with round-off reach the end.
     for (; this.left <= length + 1e-6; this.left += this.step) {
       const t = length > 0 ? this.left / length : 0;
       const between = {
@@ -77,7 +77,7 @@ export class Path {
   }
 }
 
-/** Cover one object, whole. @param {PaintCanvas} canvas @param {number} object
+/** Cover one whole object. @param {PaintCanvas} canvas @param {number} object
  * @param {number} flow @returns {Region} */
 export function fill(canvas, object, flow) {
   const { objects, width } = canvas;
@@ -99,7 +99,7 @@ export function flood(canvas) {
   return canvas.whole;
 }
 
-/** Where an object is seen. @param {Int16Array} objects @param {number} width
+/** Return the bounding box of an object. @param {Int16Array} objects @param {number} width
  * @param {number} object @returns {Region} */
 function boundsOf(objects, width, object) {
   let [top, bottom, left, right] = [Infinity, 0, Infinity, 0];

@@ -3,10 +3,10 @@
  * types.
  *
  * A frame is: uint32 length of the JSON, little endian | JSON | padding to 8 bytes | buffers, each
- * padded. `buffers` in the JSON says what they are. Colours are linear Rec.709.
+ * padded. `buffers` in the JSON describes them. Colours are linear Rec.709.
  */
 
-/** Of this protocol. */
+/** Version of this protocol. */
 export const VERSION = 2;
 
 /** @typedef {import("../../../viewer/drawing/lut.js").Data} Data */
@@ -15,7 +15,7 @@ export const VERSION = 2;
 /** @typedef {import("../../../viewer/drawing/view.js").Region} Region */
 /** @typedef {import("../../../viewer/drawing/colour.js").RGB} RGB */
 
-/** A message as it came: its fields, and its arrays beside them.
+/** A received message: its fields together with its arrays.
  * @typedef {{kind: string, seq?: number, reply?: number, arrays: Arrays, [field: string]: any}}
  * Message */
 
@@ -24,13 +24,13 @@ export const VERSION = 2;
 
 /** @typedef {{name: string, dtype: string, shape: number[]}} About */
 
-/** What something of a view is called: by its name alone of the first, `name@1` of the next.
+/** Return the name of a view's item: the plain name in the first view, `name@1` in the second.
  * @param {string} name @param {number} view */
 export function inView(name, view) {
   return view ? `${name}@${view}` : name;
 }
 
-/** A state as it is of one view: its size, its objects, and how its planes are scaled.
+/** Return the state of one view: its size, its objects and the scales of its planes.
  * @param {Message} state @param {number} view @returns {Message} */
 export function stateOfView(state, view) {
   const viewState = state.views?.[view];
@@ -52,7 +52,7 @@ const DTYPES = {
   uint8: Uint8Array,
 };
 
-/** What the bytes of an array are.
+/** Description of the bytes of an array.
  * @param {string} dtype @param {number[]} shape @param {ArrayBuffer} buffer @param {number} at
  * @returns {Picture} */
 export function pictureOf(dtype, shape, buffer, at = 0) {
@@ -64,7 +64,7 @@ export function pictureOf(dtype, shape, buffer, at = 0) {
   return { data: new made(buffer, at, length), shape };
 }
 
-/** Name of what an array holds. Halves travel from session to page only.
+/** Element type of an array. Halves travel from session to page only.
  * @param {Data} data */
 export function dtypeOf(data) {
   for (const [name, made] of Object.entries(DTYPES))
@@ -72,7 +72,7 @@ export function dtypeOf(data) {
   throw new Error('an array that no message holds');
 }
 
-/** What `buffers` says of some arrays.
+/** Return the `buffers` entries of some arrays.
  * @param {Arrays} arrays @returns {About[]} */
 export function bufferInfo(arrays) {
   return Object.entries(arrays).map(([name, { data, shape }]) => ({
@@ -82,7 +82,7 @@ export function bufferInfo(arrays) {
   }));
 }
 
-/** One binary frame of a message.
+/** Encode a message as one binary frame.
  * @param {Record<string, unknown>} content @param {Arrays} [arrays]
  * @returns {ArrayBuffer} */
 export function frame(content, arrays = {}) {
@@ -102,7 +102,7 @@ export function frame(content, arrays = {}) {
   return made;
 }
 
-/** The message of a binary frame. Throws for what is none.
+/** Decode a binary frame. Throws if it is not one.
  * @param {ArrayBuffer} buffer @returns {Message} */
 export function unframe(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
@@ -111,7 +111,7 @@ export function unframe(buffer) {
   return withArrays(content, buffer, padded(4 + length));
 }
 
-/** A message whose buffers lie one after the other, each padded.
+/** Decode a message whose buffers are consecutive, each padded.
  * @param {Record<string, any>} content @param {ArrayBuffer} buffer @param {number} at
  * @returns {Message} */
 function withArrays(content, buffer, at) {

@@ -7,17 +7,17 @@ import { VERSION, bufferInfo, pictureOf } from './message_frames.js';
 /** @typedef {import("./message_frames.js").Message} Message */
 /** @typedef {import("./message_frames.js").Picture} Picture */
 
-/** What anywidget has of a model.
+/** The part of anywidget's model that is used.
  * @typedef {{get: (name: string) => unknown,
  *   on: (event: string, listener: (...values: any[]) => void) => void,
  *   off: (event: string, listener: (...values: any[]) => void) => void,
  *   send: (content: unknown, callbacks?: unknown, buffers?: (ArrayBuffer | ArrayBufferView)[]) =>
  *   void}} Model */
 
-/** Numbers of one page's messages: other pages of the same model have others. */
+/** Message numbers of this page; other pages of the same model use others. */
 const MESSAGES = 2 ** 32;
 
-/** Milliseconds without an answer after which that is said. */
+/** Milliseconds without an answer before the page reports it. */
 const SILENCE_MS = 10_000;
 
 const ENDED_TEXT = 'The kernel has ended. Run the cell again to continue.';
@@ -35,8 +35,8 @@ export class ModelHost extends Emitter {
     /** @type {(content: any, buffers: DataView[]) => void} */
     this.onContent = (content, buffers) => this.receive(content, buffers);
     model.on('msg:custom', this.onContent);
-    // A comm lives from its beginning, and what changes is that it ends: with a kernel that is
-    // started again, for one. What is sent to it then reaches nobody.
+    // A comm is open from the start and can only close, for example when the kernel restarts. Later
+    // messages are lost.
     this.end = () => this.ended();
     model.on('comm_live_update', this.end);
     this.isOver = false;
@@ -45,21 +45,21 @@ export class ModelHost extends Emitter {
     this.timer = undefined;
   }
 
-  /** Ask for all there is. */
+  /** Request the whole state. */
   open() {
     this.send('hello', { version: VERSION }).catch(() => {});
   }
 
   /** @param {any} content @param {DataView[]} buffers */
   receive(content, buffers) {
-    // One model may be shown at several places, each of which hears all.
+    // A model may have several views, and each receives all messages.
     if (content.page !== this.page) return;
     /** @type {Arrays} */
     const arrays = {};
     content.buffers.forEach(
       (/** @type {any} */ { name, dtype, shape }, /** @type {number} */ k) => {
         const { buffer, byteOffset, byteLength } = buffers[k];
-        // A copy, since numbers need not begin where an array of them could.
+        // Copied, since the buffer may not be aligned for a typed array.
         arrays[name] = pictureOf(
           dtype,
           shape,
@@ -77,9 +77,9 @@ export class ModelHost extends Emitter {
     this.listen(message.reply);
   }
 
-  /** Wait for the next answer, if there is one to come: a kernel that is busy answers late, and one
-   * that has ended never does, of which a model may not be told. What was said before something
-   * that is answered may have been lost on its way, and says nothing of the kernel.
+  /** Wait for the next answer, if one is pending. A busy kernel answers late; one that has ended
+   * never answers, and the model may not learn of it. A message older than an answered one may have
+   * been lost, which says nothing about the kernel.
    * @param {number} answered */
   listen(answered) {
     clearTimeout(this.timer);
@@ -93,14 +93,14 @@ export class ModelHost extends Emitter {
     this.isSilent = isSilent;
   }
 
-  /** Nobody is there any more. */
+  /** Handle the end of the kernel. */
   ended() {
     this.leave(ENDED_TEXT);
     this.hush(false);
     this.emit('closed', { kind: 'closed', reason: 'ended', text: ENDED_TEXT });
   }
 
-  /** Nothing is asked or answered any more. @param {string} why */
+  /** Reject pending and later requests. @param {string} why */
   leave(why) {
     this.isOver = true;
     clearTimeout(this.timer);
@@ -119,7 +119,7 @@ export class ModelHost extends Emitter {
       this.asked.set(seq, { resolve, reject });
       if (this.timer === undefined) this.listen(seq - 1);
       const content = { kind, seq, ...fields, buffers: bufferInfo(arrays) };
-      // Copies: what is painted on meanwhile is of another message.
+      // Copied, since painting continues in these arrays.
       const bytes = Object.values(arrays).map(({ data }) =>
         data.buffer.slice(data.byteOffset, data.byteOffset + data.byteLength),
       );
@@ -130,7 +130,7 @@ export class ModelHost extends Emitter {
   /** @param {string} name @returns {Promise<Picture>} */
   async fetch(name) {
     const message = await this.send('fetch', { name });
-    // A place that has just lost the painter is told that, and is given no picture.
+    // A view that has just lost the session gets a notice instead of a picture.
     if (message.kind !== 'fetched') throw new Error(`${name}: ${message.text}`);
     return message.arrays.data;
   }

@@ -1,9 +1,9 @@
 /**
  * The painting: linear light and importance of each pixel, and the stroke in progress.
  *
- * A stroke covers pixels, from 0 to 1, and what it makes of a pixel follows from how that was
- * before and from how far it is covered. So a stroke can change as long as it lasts (a line, a
- * drag that asks), and be dropped. What was before is kept in tiles, where the stroke has been.
+ * A stroke covers pixels from 0 to 1. The new value of a pixel follows from its old value and its
+ * coverage, so a stroke in progress can change (a line, an adjusting drag) or be cancelled. Tiles
+ * keep the old values where the stroke has been.
  */
 import { pixelChange } from './stroke_effects.js';
 import { VALUES, toFloats } from '../../../viewer/drawing/half.js';
@@ -12,7 +12,7 @@ import { union } from '../../../viewer/drawing/layer.js';
 /** @typedef {import("./message_frames.js").Region} Region */
 /** @typedef {import("./stroke_effects.js").Effect} Effect */
 
-/** How a pixel was before a stroke: (s, s, 3), (s, s), and how far the stroke covers it.
+/** Pixels before a stroke, (s, s, 3) and (s, s), and the stroke's coverage.
  * @typedef {{top: number, left: number, image: Float32Array, importance: Float32Array,
  *   coverage: Float32Array}} Tile */
 
@@ -22,16 +22,16 @@ const TILE = 64;
 /** Importance below which a pixel is not painted. */
 const MIN_IMPORTANCE = 1e-3;
 
-/** Importance of the rest of a picture beside that of a stroke, and by how much at most a stroke
- * counts more than the rest: that makes up for a stroke over a fortieth of the picture. */
+/** Importance of the rest of a picture relative to a stroke, and the largest importance of a stroke
+ * relative to the rest. The latter compensates for a stroke over a fortieth of the picture. */
 const REST_SHARE = 4;
 const MAX_ACCENT = 10;
 
-/** By how much what covers that part of a picture counts more than the rest of it, where all is
- * painted. @param {number} part */
+/** Return the factor by which a stroke over this part of a fully painted picture counts more than
+ * the rest. @param {number} part */
 const accent = (part) => Math.min(MAX_ACCENT, Math.max(1, (1 - part) / (REST_SHARE * part)));
 
-/** What halves can hold, so that both views can show it. */
+/** The largest half: values are clamped to it, so that both renderers can show them. */
 const MAX_HALF = 65504;
 
 export class PaintCanvas {
@@ -45,17 +45,17 @@ export class PaintCanvas {
     this.importance = new Float32Array(height * width);
     /** (h, w, 3) halves. @type {Uint16Array | null} */
     this.albedo = null;
-    /** Whether there was no pixel without paint before the stroke. */
+    /** Whether every pixel had paint before the stroke. */
     this.isAll = false;
-    /** Which object each pixel shows, -1 for none. @type {Int16Array | null} */
+    /** Index of the object at each pixel, -1 for none. @type {Int16Array | null} */
     this.objects = null;
     /** @type {Map<number, Tile> | null} */
     this.tiles = null;
-    /** Where the stroke has been. @type {Region | null} */
+    /** Bounding box of the stroke. @type {Region | null} */
     this.region = null;
     /** Importance of what the stroke paints. */
     this.full = 1;
-    /** By how much what was painted before it counts more than it did. */
+    /** Factor on the importance of earlier paint. */
     this.lift = 1;
   }
 
@@ -84,17 +84,17 @@ export class PaintCanvas {
   }
 
   /**
-   * The stroke covers this part of the picture, as far as is known: over a picture of which all is
-   * painted (a whole that was asked to be darker, say) it is to come about as it does over one that
-   * is not, of which the rest is held. @param {number} part
+   * Set the part of the picture that the stroke covers, as far as is known. Over a fully painted
+   * picture (darkened as a whole, say) a stroke should have the same effect as over an unpainted
+   * one, whose rest is held. @param {number} part
    */
   covers(part) {
     this.full = this.isAll ? accent(part) : 1;
   }
 
   /**
-   * The stroke covers all: what was painted before it is not to get lost in that, but to come about
-   * as it did while the rest was held.
+   * Mark the stroke as covering everything. Earlier strokes keep the effect that they had while the
+   * rest was held.
    */
   coversAll() {
     const painted = this.importance.reduce((sum, x) => sum + x, 0);
@@ -112,7 +112,7 @@ export class PaintCanvas {
     });
   }
 
-  /** Nothing is covered any more, and all as it was. @returns {Region | null} what has changed */
+  /** Clear the coverage and restore all pixels. @returns {Region | null} what has changed */
   uncover() {
     const { region } = this;
     if (region)
@@ -123,7 +123,7 @@ export class PaintCanvas {
     return region;
   }
 
-  /** Make of the pixels what the stroke does to them.
+  /** Apply the stroke's effect to the pixels.
    * @param {Region} region @param {Effect} effect */
   apply(region, effect) {
     const change = pixelChange(this, effect);
@@ -138,7 +138,7 @@ export class PaintCanvas {
     });
   }
 
-  /** The stroke is done. @returns {Region | null} where it was */
+  /** Finish the stroke. @returns {Region | null} where it was */
   end() {
     const { region } = this;
     this.tiles = null;
@@ -146,13 +146,13 @@ export class PaintCanvas {
     return region;
   }
 
-  /** The stroke has never been. @returns {Region | null} where it was */
+  /** Cancel the stroke. @returns {Region | null} where it was */
   drop() {
     this.uncover();
     return this.end();
   }
 
-  /** What the session says of a region. @param {Region} region @param {Float32Array} image
+  /** Replace a region by the session's values. @param {Region} region @param {Float32Array} image
    * @param {Float32Array} importance */
   set([top, bottom, left, right], image, importance) {
     const width = right - left;
@@ -168,7 +168,7 @@ export class PaintCanvas {
       });
   }
 
-  /** Another present look, of a better basis: it is what shows where nothing is painted.
+  /** Set a new present look, from a better basis. It shows wherever nothing is painted.
    * @param {Uint16Array} present */
   setPresent(present) {
     this.present = present;
@@ -187,7 +187,7 @@ export class PaintCanvas {
     });
   }
 
-  /** A copy of a region, as messages have it. @param {Region} region */
+  /** Return a copy of a region in the format of messages. @param {Region} region */
   copy([top, bottom, left, right]) {
     const [height, width] = [bottom - top, right - left];
     const image = new Float32Array(3 * height * width);
@@ -203,15 +203,15 @@ export class PaintCanvas {
     };
   }
 
-  /** Object that a pixel shows; -1 for none. @param {number} x @param {number} y */
+  /** Return the object at a pixel, -1 for none. @param {number} x @param {number} y */
   objectAt(x, y) {
     const [column, row] = [Math.floor(x), Math.floor(y)];
     const isIn = column >= 0 && row >= 0 && column < this.width && row < this.height;
     return isIn && this.objects ? this.objects[row * this.width + column] : -1;
   }
 
-  /** Visit pixels of a region, by the tile of the stroke that they lie in. isNew: whether tiles
-   * are made where there is none; else they are passed over.
+  /** Visit the pixels of a region, tile by tile of the stroke. isNew: create missing tiles instead
+   * of skipping them.
    * @param {Region} region @param {boolean} isNew
    * @param {(tile: Tile, q: number, p: number, x: number, y: number) => void} visit q: place in
    * the tile, p: in the picture */

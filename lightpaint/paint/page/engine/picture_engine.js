@@ -23,10 +23,10 @@ import { SessionMirror } from './session_mirror.js';
 /** @typedef {import("../../../viewer/drawing/view.js").Kind} Kind */
 /** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
 
-/** Albedo that is black: what falls there is not seen. */
+/** Albedo below which a surface is black and shows no light. */
 const MIN_ALBEDO = 0.02;
 
-/** The session behind the server that the page came from. @returns {Host} */
+/** The session on the page's own server. @returns {Host} */
 export function openHost() {
   const host = new SocketHost();
   void host.open();
@@ -85,7 +85,8 @@ export class PictureEngine extends Emitter {
     }));
   }
 
-  /** What to show for the pictures to be larger by a factor around a place, in CSS pixels.
+  /** Return the view parameters that enlarge the pictures by a factor around a place, in CSS
+   * pixels.
    * @param {number} x @param {number} y @param {number} factor */
   zoomAt(x, y, factor) {
     const { ratio, params } = this.screen;
@@ -94,15 +95,16 @@ export class PictureEngine extends Emitter {
     return zoomed(params, at(panes, px, py)?.pane ?? panes[0], px, py, factor);
   }
 
-  /** Light of a picture at a pixel. @param {Kind} kind @param {number} x @param {number} y
+  /** Return the light of a picture at a pixel. @param {Kind} kind @param {number} x
+   * @param {number} y
    * @returns {RGB} */
   lightAt(kind, x, y) {
     const place = this.within(x, y);
     return place && this.screen.view ? this.screen.view.lightAt(kind, ...place) : [0, 0, 0];
   }
 
-  /** What to paint with, in the manner that is in the hand, for a pixel to have the light that a
-   * picture has there: as light, what falls on it.
+  /** Return the paint that gives a pixel the light of a picture there, in the current paint mode.
+   * In light mode that is the incident light.
    * @param {Kind} kind @param {number} x @param {number} y @param {RGB} [light] that light, where it
    * is known: the GPU is waited for else @returns {RGB} */
   paintAt(kind, x, y, light = this.lightAt(kind, x, y)) {
@@ -115,7 +117,8 @@ export class PictureEngine extends Emitter {
     );
   }
 
-  /** What is seen at a pixel, and the share of each light in the answer's luminance there.
+  /** Return the object and light at a pixel, and each light's share of the answer's luminance
+   * there.
    * @param {number} x @param {number} y
    * @returns {{object: string | null, index: number, shares: number[]} | null} */
   pointed(x, y) {
@@ -132,19 +135,19 @@ export class PictureEngine extends Emitter {
     return { object, index, shares: levels.map((level) => (whole > 0 ? level / whole : 0)) };
   }
 
-  /** Which object each pixel shows, once that is known.
+  /** Return the object index of each pixel, once known.
    * @returns {{data: Int16Array, width: number, height: number} | null} */
   objects() {
     const { objects, width, height } = this.mirror.canvas ?? {};
     return objects && width && height ? { data: objects, width, height } : null;
   }
 
-  /** The greatest importance that is painted, and 1 at least: what an overlay shows as all. */
+  /** Return the greatest painted importance, at least 1: full ink in the overlay. */
   greatest() {
     return fullOf(this.mirror.canvas?.importance ?? new Float32Array(0));
   }
 
-  /** Codes that light is shown with, at an exposure. @param {RGB} rgb @param {number} stops */
+  /** Return the display codes of light at an exposure. @param {RGB} rgb @param {number} stops */
   codes(rgb, stops) {
     const { lut } = this.mirror;
     if (this.encoder?.lut !== lut || this.encoder.stops !== stops)
@@ -161,20 +164,20 @@ export class PictureEngine extends Emitter {
     return column >= 0 && row >= 0 && column < width && row < height ? [column, row] : null;
   }
 
-  /** Show, and paint, another view of the session. @param {number} view */
+  /** Switch to another view of the session. @param {number} view */
   showView(view) {
     if (this.stroke) this.end();
     this.mirror.showView(view);
   }
 
-  // What the hand does
+  // Tools and strokes
 
   /** @param {ToolSettings} settings */
   setTool(settings) {
     this.tool = settings;
   }
 
-  /** Where strokes go, if there is any painting to be done. */
+  /** The target of strokes, if painting is possible. */
   get place() {
     const { canvas, strokes, isReady } = this.mirror;
     return canvas && strokes && isReady ? { canvas, strokes } : null;
@@ -209,7 +212,7 @@ export class PictureEngine extends Emitter {
     place.strokes.end(LABELS[stroke.settings.tool]);
   }
 
-  /** The stroke that has begun is none. @returns {boolean} whether one had begun */
+  /** Cancel the stroke that has begun. @returns {boolean} whether one had begun */
   cancel() {
     const { stroke, place } = this;
     if (!stroke || !place) return false;
@@ -220,8 +223,8 @@ export class PictureEngine extends Emitter {
     return true;
   }
 
-  /** The stroke in the hand is given up: it would lie over what another page has painted, or be
-   * heard by nobody. */
+  /** Cancel the current stroke: it would overwrite another page's paint, or nobody would receive
+   * it. */
   dropStroke() {
     if (!this.stroke) return;
     this.ended();
@@ -234,14 +237,14 @@ export class PictureEngine extends Emitter {
     this.mirror.isPainting = this.screen.isHeld = false;
   }
 
-  /** A straight stroke, whole. @param {Point} from @param {Point} to */
+  /** Draw a whole straight stroke. @param {Point} from @param {Point} to */
   line(from, to) {
     this.begin(from);
     this.move([to]);
     this.end();
   }
 
-  /** Brighter and warmer by so much, in an object, or for null everywhere.
+  /** Make an object, or for null everything, brighter and warmer.
    * @param {{stops: number, mired: number, object: number | null}} asked */
   adjust(asked) {
     if (this.stroke) this.end();

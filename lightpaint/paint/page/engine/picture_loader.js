@@ -1,16 +1,16 @@
 /**
  * Fetches the pictures of the session, again whenever one is replaced.
  *
- * Planes are clean ones where there are any and they are wanted, else raw ones. A few are on
- * their way at a time, and what is there is not fetched again.
+ * It prefers denoised planes if they exist and are wanted, else it takes raw ones. It fetches a few
+ * at a time, and none twice.
  */
 
 /** @typedef {import("./message_frames.js").Picture} Picture */
 
-/** Pictures on their way at a time. */
+/** Concurrent fetches. */
 const MAX_FETCHES = 4;
 
-/** Milliseconds before what could not be fetched is tried again. */
+/** Milliseconds before a failed fetch is retried. */
 const RETRY_MS = 2000;
 
 export class PictureLoader {
@@ -24,38 +24,38 @@ export class PictureLoader {
     this.onProgress = onProgress;
     /** @type {Record<string, number>} */
     this.resources = {};
-    /** Name of the picture that each slot is to have. @type {Map<string, string>} */
+    /** Name of the picture wanted in each slot. @type {Map<string, string>} */
     this.wanted = new Map();
-    /** What each slot has: name and generation. @type {Map<string, string>} */
+    /** Name and generation of the picture in each slot. @type {Map<string, string>} */
     this.there = new Map();
     /** @type {Set<string>} */
     this.onTheWay = new Set();
     this.total = 0;
-    /** Whether nothing is asked for: another page has the session. */
+    /** Whether fetching is paused, since another page has the session. */
     this.isHeld = false;
     this.isOver = false;
   }
 
-  /** Which pictures there are, by name. @param {Record<string, number>} resources */
+  /** Existing pictures by name. @param {Record<string, number>} resources */
   know(resources) {
     this.resources = { ...this.resources, ...resources };
     this.pump();
   }
 
-  /** Which pictures there are, and no others. @param {Record<string, number>} resources */
+  /** Replace the list of existing pictures. @param {Record<string, number>} resources */
   begin(resources) {
     this.isHeld = false;
     this.resources = {};
     this.know(resources);
   }
 
-  /** Ask for nothing until the session says again what there is. */
+  /** Pause until the session lists its pictures again. */
   hold() {
     this.isHeld = true;
   }
 
-  /** Have pictures in slots, and their newer ones. Nothing is fetched before all are named, as it
-   * would be what a slot had to have before.
+  /** Set the wanted pictures of slots, and keep them up to date. Fetching begins once all are
+   * named, since it could otherwise fetch a slot's earlier picture.
    * @param {[slot: string, name: string | null][]} named null for none any more */
   want(named) {
     for (const [slot, name] of named)
@@ -64,18 +64,18 @@ export class PictureLoader {
     this.pump();
   }
 
-  /** A picture is another one. @param {string} name */
+  /** Note that a picture has changed. @param {string} name */
   renew(name) {
     this.know({ [name]: (this.resources[name] ?? 0) + 0.5 });
   }
 
-  /** All is to be set again, when it is wanted next: the view has lost it.
+  /** Forget the pictures in slots, which the view has lost.
    * @param {(slot: string) => boolean} [which] */
   forget(which = () => true) {
     for (const slot of [...this.there.keys()]) if (which(slot)) this.there.delete(slot);
   }
 
-  /** Slots that do not have what they are to have. */
+  /** Return the slots without their wanted picture. */
   missing() {
     return [...this.wanted].filter(
       ([slot, name]) => name in this.resources && this.there.get(slot) !== this.version(name),
@@ -111,7 +111,7 @@ export class PictureLoader {
         this.use(slot, name, picture);
       }
     } catch (error) {
-      // What was refused since another page has the session comes when this one has it again.
+      // If it was refused since another page has the session, it comes when this page has it again.
       if (!this.isHeld) {
         wait = RETRY_MS;
         console.warn(error);

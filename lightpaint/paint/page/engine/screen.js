@@ -6,7 +6,7 @@ import { DEFAULTS, panes } from '../../../viewer/drawing/view.js';
 /** @typedef {import("../../../viewer/drawing/view.js").Params} Params */
 /** @typedef {import("../../../viewer/drawing/view.js").Pane} Pane */
 
-/** Milliseconds after which a picture that was drawn quickly is drawn sharply. */
+/** Milliseconds without changes before a quick draft is redrawn sharply. */
 const REST = 180;
 
 /** Milliseconds that a GPU has to come back. */
@@ -14,8 +14,8 @@ const PATIENCE = 3000;
 
 export class Screen {
   /** @param {HTMLElement} element
-   * @param {{view?: 'gl' | 'cpu' | null, refill: () => void}} options refill: all that is shown is to
-   * be set again */
+   * @param {{view?: 'gl' | 'cpu' | null, refill: () => void}} options refill: called when the view
+   * has lost its pictures */
   constructor(element, options) {
     this.element = element;
     this.options = options;
@@ -30,9 +30,9 @@ export class Screen {
     this.height = 0;
     this.frame = 0;
     this.isLive = false;
-    /** Whether a brush is down: what takes long waits until it is lifted. */
+    /** Whether a brush is down; slow work waits until it is lifted. */
     this.isHeld = false;
-    /** Whether the solution is the present look. */
+    /** Whether the solution equals the present look. */
     this.isPresent = false;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.rest = undefined;
@@ -42,7 +42,7 @@ export class Screen {
     this.waiting = undefined;
   }
 
-  /** A view of pictures of a size, and of so many lights.
+  /** Start a view for pictures of a size and a number of lights.
    * @param {[height: number, width: number]} size @param {number} count
    * @param {'gl' | 'cpu' | null} [which] */
   begin(size, count, which = this.options.view ?? null) {
@@ -58,15 +58,16 @@ export class Screen {
     this.fit();
   }
 
-  /** The same pictures of so many lights. @param {number} count */
+  /** Change the number of lights. @param {number} count */
   setCount(count) {
     this.count = count;
     this.view?.setCount(count);
   }
 
-  /** The GPU has gone; without it, if it does not come back. @param {PictureView} view */
+  /** Handle the loss of the GPU: continue without it if it does not come back.
+   * @param {PictureView} view */
   lost(view) {
-    // One that is closed gives its context up, and is told so when the next one is there already.
+    // A closed view releases its context, and its event arrives after the next view has started.
     if (view !== this.view) return;
     clearTimeout(this.waiting);
     this.waiting = setTimeout(() => {
@@ -90,7 +91,7 @@ export class Screen {
     this.fit();
   }
 
-  /** As many pixels as the display has. */
+  /** Match the canvas to the pixels of the display. */
   fit() {
     if (!this.view) return;
     const { canvas } = this.view;
@@ -105,7 +106,7 @@ export class Screen {
     this.now();
   }
 
-  /** Device pixels for each CSS pixel. */
+  /** Device pixels per CSS pixel. */
   get ratio() {
     return Math.max(1, window.devicePixelRatio || 1);
   }
@@ -116,7 +117,7 @@ export class Screen {
     return panes(this.params, { width, height }, this.size);
   }
 
-  /** Draw soon. isLive: and once more, sharply, when nothing has come for a while.
+  /** Draw in the next frame. isLive: draw a quick draft, and redraw sharply after a pause.
    * @param {boolean} [isLive] */
   request(isLive = false) {
     if (isLive) {
@@ -126,7 +127,7 @@ export class Screen {
     this.frame ||= requestAnimationFrame(() => this.now());
   }
 
-  /** Draw sharply after a while. */
+  /** Draw sharply after a pause. */
   wait() {
     clearTimeout(this.rest);
     this.rest = setTimeout(() => {
@@ -144,7 +145,8 @@ export class Screen {
     this.view?.draw({ ...this.params, ...shown, live: this.isLive });
   }
 
-  /** The picture that is shown for another. @param {import('../../../viewer/drawing/view.js').Kind} kind */
+  /** Return the picture shown in place of another.
+   * @param {import('../../../viewer/drawing/view.js').Kind} kind */
   standIn(kind) {
     return kind === 'solution' && this.isPresent ? 'present' : kind;
   }

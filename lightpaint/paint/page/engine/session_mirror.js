@@ -29,11 +29,12 @@ export class SessionMirror {
       (slot, name, picture) => this.loaded(slot, name, picture),
       (done, total, isFirst) => emit('loading', { done, total, isFirst }),
     );
-    /** As the session said it last, and as it is of the view. @type {Message | null} */
+    /** The last state from the session, and its part for the current view.
+     * @type {Message | null} */
     this.latestState = null;
     /** @type {Message | null} */
     this.state = null;
-    /** Which view is shown, and painted. */
+    /** Index of the current view. */
     this.view = 0;
     /** @type {PaintCanvas | null} */
     this.canvas = null;
@@ -42,18 +43,18 @@ export class SessionMirror {
     /** @type {Show | null} */
     this.shown = null;
     this.weights = new Float64Array();
-    /** Whether lights are elsewhere than in the present look. */
+    /** Whether lights have moved since the present look. */
     this.isMoved = false;
-    /** How often the session had changed, as its last message says. */
+    /** Revision of the session in its last message. */
     this.version = -1;
     /** @type {import("../../../viewer/drawing/lut.js").Lut} */
     this.lut = SRGB;
-    /** Whether the present look is there, and whether the view has it. */
+    /** Whether the present look exists, and whether the view has it. */
     this.knowsPresent = false;
     this.hasPresent = false;
-    /** How often the session has said what the canvas holds. */
+    /** Number of times that the session has sent the canvas. */
     this.patches = 0;
-    /** Whether the canvas is what the session has. */
+    /** Whether the canvas equals the session's. */
     this.isReady = false;
     /** Whether a stroke is in progress. */
     this.isPainting = false;
@@ -83,7 +84,7 @@ export class SessionMirror {
   showView(view) {
     const { latestState } = this;
     if (!latestState?.views?.[view] || view === this.view) return;
-    // Whatever was done since is to be asked for.
+    // The next state is complete again, whatever changed since the last one.
     this.open({ ...latestState, first: false }, view);
     this.weigh();
     this.want();
@@ -120,7 +121,7 @@ export class SessionMirror {
     this.setLut(this.lut);
   }
 
-  /** Lights have come or gone: the painting stays, and their pictures come anew.
+  /** Lights were added or removed: keep the painting and fetch all planes again.
    * @param {number} count */
   setLights(count) {
     const { loader, screen } = this;
@@ -129,7 +130,7 @@ export class SessionMirror {
     this.refill();
   }
 
-  /** What an answer or a patch says of weights, unless it is of before what was said already.
+  /** Take the weights of an answer or a patch, unless a later message has arrived already.
    * @param {Message} message */
   answered(message) {
     if (message.version < this.version) return;
@@ -146,7 +147,7 @@ export class SessionMirror {
     if (!weights) return;
     this.weights = Float64Array.from(weights);
     this.weigh();
-    // The exact one comes at rest, and is to be looked at.
+    // The exact answer comes when the brush rests, and should be drawn sharply.
     this.screen.request(!message.exact);
   }
 
@@ -160,7 +161,7 @@ export class SessionMirror {
     if (!canvas || !image || !importance || isOwn) return;
     const { view = 0, views = [] } = message;
     if (view !== this.view) {
-      // What is undone is seen.
+      // Show the view in which undo changed something.
       if (views.length && !views.includes(this.view)) this.emit('view', { view });
       return;
     }
@@ -174,7 +175,7 @@ export class SessionMirror {
     this.redraw([region]);
   }
 
-  /** The canvas as the session has it, once it has all strokes. */
+  /** Replace the canvas by the session's, once it has all strokes. */
   async sync() {
     const { canvas, strokes } = this;
     if (!canvas || !strokes) return;
@@ -185,7 +186,7 @@ export class SessionMirror {
       const [image, importance] = await Promise.all(
         ['painting', 'importance'].map((name) => this.host.fetch(inView(name, this.view))),
       );
-      // What has been painted or undone since then is newer.
+      // Paint or undo since then is newer.
       if (strokes.isPending || canvas !== this.canvas) return;
       if (strokes.count !== count || this.patches !== patches) {
         if (!this.isReady) this.sync();
@@ -199,7 +200,7 @@ export class SessionMirror {
       this.isReady = true;
       this.redraw([canvas.whole]);
     } catch (error) {
-      // Who does not have the session has been told so.
+      // A page without the session has been told so already.
       if (this.loader.isHeld) return;
       this.emit('trouble', { text: error instanceof Error ? error.message : String(error) });
     }
@@ -251,7 +252,7 @@ export class SessionMirror {
     this.screen.view?.setLut(lut);
   }
 
-  /** Set all of it again: the view is another one, or has lost it. */
+  /** Set all pictures again, in a new view or one that has lost them. */
   refill() {
     this.setLut(this.lut);
     this.weigh();
@@ -286,8 +287,8 @@ export class SessionMirror {
     this.stand(weights);
   }
 
-  /** Lights that are as they were make the present look, which is there before their planes are,
-   * and is clean. @param {Float64Array} weights */
+  /** Unchanged lights give the present look, which arrives before the planes and is denoised.
+   * @param {Float64Array} weights */
   stand(weights) {
     const { screen, canvas, state, shown } = this;
     const present =
