@@ -10,6 +10,7 @@ from lightpaint.paint.protocol import (
     Findings,
     ProgressReport,
     SampleCount,
+    SessionPending,
     SessionState,
     TableInfo,
     TransformInfo,
@@ -25,6 +26,11 @@ def fake_answer(**fields: Any) -> AnswerUpdate:
 
 def fake_progress(what: str, done: int) -> ProgressReport:
     return ProgressReport(what=what, done=done, total=1000, unit="passes")
+
+
+def fake_pending() -> SessionPending:
+    fields = {"version": VERSION, "scene": "room", "folder": "/shows/room", "text": ""}
+    return SessionPending(**fields, can_render=False, can_report=False, progress=None)  # type: ignore[arg-type]
 
 
 def fake_state(resources: dict[str, int], **fields: Any) -> SessionState:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_messages import fake_answer, fake_progress, fake_state
+from fake_messages import fake_answer, fake_pending, fake_progress, fake_state
 from fake_session import FakeSession
+from live_server import until
 from raw_message import RawMessage
 from server_key import bearer, offered
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
@@ -28,6 +29,7 @@ from lightpaint.paint.protocol import (
     Propose,
     RenameLook,
     SaveLook,
+    SessionPending,
 )
 from lightpaint.paint.server import client, session_clients
 from lightpaint.paint.server.address import Address, Reach
@@ -248,6 +250,37 @@ def test_who_paints_is_sent_the_same_however_many_observe(served: Served) -> Non
     assert messages_to_who_paints(served, 3) == alone
     again = [request for request in served.session.heard if request.kind == "paint"]
     assert len(again) == 2 * len(strokes)
+
+
+@pytest.mark.parametrize(("kind", "ask"), [("page", "hello"), ("program", "observe")])
+def test_no_older_state_follows_a_newer_one(
+    served: Served, monkeypatch: pytest.MonkeyPatch, kind: str, ask: str
+) -> None:
+    """The first basis arrives while a client is told that there is none yet."""
+
+    known = dict.fromkeys(served.session.pictures, 1)
+
+    def pending_then_known(**_: Any) -> SessionPending:
+        served.session.on_message(fake_state(known))  # type: ignore[misc]
+        served.session.on_message(PictureUpdate(resources={"present": 2}))  # type: ignore[misc]
+        until(lambda: served.line.generations.get("present") == 2, "they are not handled")
+        return fake_pending()
+
+    for name in ("greet", "state"):
+        monkeypatch.setattr(served.session, name, pending_then_known)
+    with getattr(served, kind)() as client:
+        say(client, ask, version=VERSION)
+        received = [hear(client)]
+        say(client, "fetch", 2, name="present")
+        while received[-1].get("reply") != 2:
+            received.append(hear(client))
+        *news, _ = received
+        assert [(one["kind"], one.get("reply")) for one in news] == [
+            ("waiting", 1),
+            ("state", None),
+            ("renewed", None),
+        ]
+    assert served.line.generations["present"] == 2
 
 
 def test_who_has_the_session_does_not_become_an_observer(served: Served) -> None:

@@ -74,7 +74,6 @@ class Client:
 
     Attributes:
         is_observer: Whether it has begun as an observer, which it stays.
-        awaits_state: Whether it is an observer that no state has been sent to yet.
         is_disconnected: Whether it sends no more; queued messages may still wait for an answer.
     """
 
@@ -83,13 +82,14 @@ class Client:
         self._socket = socket
         self._incoming: list[IncomingMessage] = []
         self._unsent: list[tuple[Message, int | None]] = []
+        self._withheld: list[tuple[Message, int | None]] | None = None
         self._has_incoming, self._has_room = asyncio.Event(), asyncio.Event()
         self._has_unsent, self._all_sent = asyncio.Event(), asyncio.Event()
         self._all_answered, self._may_read_on = asyncio.Event(), asyncio.Event()
         self._all_sent.set()
         self._all_answered.set()
         self._is_abandoned = False
-        self.is_disconnected = self.is_observer = self.awaits_state = False
+        self.is_disconnected = self.is_observer = False
 
     async def receive_all(self) -> None:
         """Queue the client's messages until it disconnects, as many as the queue takes."""
@@ -161,17 +161,28 @@ class Client:
         """Queue a message for the client. reply: number of the message that it answers."""
         if self._is_abandoned:
             return
-        if reply is None and (key := _replacement_key(message)) is not None:
-            for k, (queued, reply_to) in enumerate(self._unsent):
-                if reply_to is None and _replacement_key(queued) == key:
-                    message = _merge(queued, message)
-                    del self._unsent[k]
-                    break
-        self._unsent.append((message, reply))
+        if reply is None and self._withheld is not None:
+            _append(self._withheld, message)
+            return
+        _append(self._unsent, message, reply)
         self._all_sent.clear()
         self._has_unsent.set()
         if len(self._unsent) > MAX_UNSENT:
             self.abandon()
+
+    def withhold_events(self) -> None:
+        """Withhold events from now on, and drop those that are withheld already.
+
+        The state is made in another thread: an event of a later change may be here before it is,
+        and the client would take the older state for the newer one.
+        """
+        self._withheld = []
+
+    def release_events(self) -> None:
+        """Send the events that were withheld, in their order."""
+        events, self._withheld = self._withheld or [], None
+        for event, _ in events:
+            self.send(event)
 
     async def send_all(self) -> None:
         """Send queued messages until the client is abandoned."""
@@ -241,6 +252,19 @@ def _sequence_numbers(content: Mapping[str, Any]) -> list[int]:
 def _is_within(inner: tuple[int, ...], outer: tuple[int, ...]) -> bool:
     top, bottom, left, right = outer
     return top <= inner[0] and inner[1] <= bottom and left <= inner[2] and inner[3] <= right
+
+
+def _append(
+    queue: list[tuple[Message, int | None]], message: Message, reply: int | None = None
+) -> None:
+    """Append a message to a queue, in place of an event there that it outdates."""
+    if reply is None and (key := _replacement_key(message)) is not None:
+        for k, (queued, reply_to) in enumerate(queue):
+            if reply_to is None and _replacement_key(queued) == key:
+                message = _merge(queued, message)
+                del queue[k]
+                break
+    queue.append((message, reply))
 
 
 def _replacement_key(message: Message) -> tuple[Any, ...] | None:

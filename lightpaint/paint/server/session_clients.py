@@ -125,6 +125,7 @@ class Connections:
         self._is_closed = True
         self.session.on_message = None
         for client in self._clients:
+            client.release_events()
             client.send(Closing(reason="ended", text=self.farewell))
         await _wait_all([client.wait_sent() for client in self._clients])
         await asyncio.to_thread(self._worker.shutdown, cancel_futures=True)
@@ -188,6 +189,7 @@ class Connections:
                 client.send(first, seq)
             for message in further:
                 client.send(message)
+            client.release_events()  # those that a state had to precede
 
     async def _handle(self, client: Client, incoming: IncomingMessage) -> list[Message]:
         """Return the answers to one message; every error becomes an answer."""
@@ -201,6 +203,7 @@ class Connections:
                 if not (incoming.takes_over or self._owner.is_free_for(client)):
                     return [_taken_message("the painter is open in another tab")]
                 is_back = self._hand_over(client)
+                client.withhold_events()
                 return [await self._run(partial(self.session.greet, is_back=is_back))]
             if self._owner.page is not client:
                 return [_taken_message("this tab does not have the session")]
@@ -226,16 +229,11 @@ class Connections:
             others = [other for other in self._clients if other.is_observer and other is not client]
             if len(others) >= MAX_OBSERVERS:
                 raise PaintError(f"{MAX_OBSERVERS} observers are there already: close one of them")
-            client.is_observer = client.awaits_state = True
+            client.is_observer = True
+            client.withhold_events()
             await self._brush_up.wait()
-            try:
-                state = await self._run(self.session.state)
-            finally:
-                client.awaits_state = False
-            # Nothing precedes the state; pictures that were renewed meanwhile follow it.
-            known = dict(state.resources) if isinstance(state, SessionState) else {}
-            newer = {k: n for k, n in self.generations.items() if n > known.get(k, n)}
-            return [state, PictureUpdate(resources=newer)] if newer else [state]
+            client.withhold_events()  # the state has those until now
+            return [await self._run(self.session.state)]
         is_export = isinstance(request, Export) and request.run
         if not (is_export or isinstance(request, Fetch | Propose)):
             raise PaintError(
@@ -262,7 +260,7 @@ class Connections:
         event = message.answer if isinstance(message, CanvasPatch) else message
         if isinstance(event, OBSERVED_EVENTS):
             for client in self._clients:
-                if client.is_observer and not client.awaits_state and client is not but:
+                if client.is_observer and client is not but:
                     client.send(event)
 
     async def _release_disconnected(self, client: Client) -> None:
@@ -294,10 +292,13 @@ class Connections:
 
     def _update_generations(self, message: Message) -> None:
         """Store the generation numbers of the pictures in a message."""
-        if isinstance(message, SessionState):
-            self.generations = dict(message.resources)
-        elif isinstance(message, PictureUpdate):
-            self.generations = {**self.generations, **message.resources}
+        if isinstance(message, SessionState | PictureUpdate):
+            # A state may arrive after news of a picture that is newer than the state's.
+            newest = self.generations | {
+                name: max(generation, self.generations.get(name, generation))
+                for name, generation in message.resources.items()
+            }
+            self.generations = newest
 
 
 async def _wait_all(waits: list[Coroutine[Any, Any, None]]) -> None:
