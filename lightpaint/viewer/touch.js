@@ -1,16 +1,16 @@
-/** Sliders under a finger, in lists that scroll: a finger that comes down on one may be about to do
- * either. */
+/** Sliders in scrolling lists on touch screens: a finger that comes down on one may scroll or
+ * slide. */
 
-/** Pixels that a finger goes before it is known where to. */
+/** Pixels that a finger moves before its direction is known. */
 const SURE = 6;
 
-/** Of the mark on a slider, about: its middle does not come nearer to an end than half of this. */
+/** Approximate width of a slider's thumb: its centre stays half of it away from the ends. */
 const MARK = 18;
 
 /**
- * A slider that a touch moves only once it goes sideways, or where it taps: one that becomes a
- * scroll changes nothing. What the browser makes of a touch by itself, which begins at once, is not
- * heard; mouse, pen and keys are left to it.
+ * A slider that a touch moves only by a sideways drag or a tap; a scroll changes nothing. The
+ * browser's own handling of touch, which begins at once, is suppressed; it keeps mouse, pen and
+ * keys.
  * @param {HTMLInputElement} input
  * @param {(value: number, done: boolean) => void} move done: false while the finger is down
  * @param {() => void} restore have it show its value again
@@ -19,7 +19,7 @@ const MARK = 18;
 export function slideByTouch(input, move, restore, signal) {
   /** @type {{id: number, x: number, y: number, isSure: boolean} | null} */
   let finger = null;
-  // Of a touch comes more when it is over: a change, and what is like a mouse.
+  // After a touch the browser also sends a change event and emulated mouse events.
   let isTouched = false;
   const moveTo = (/** @type {PointerEvent} */ event, /** @type {boolean} */ done) => {
     const { left, width } = input.getBoundingClientRect();
@@ -44,12 +44,12 @@ export function slideByTouch(input, move, restore, signal) {
   listen('pointerup', (/** @type {PointerEvent} */ event) => {
     if (finger?.id !== event.pointerId) return;
     finger = null;
-    input.focus({ preventScroll: true }); // what is typed elsewhere is taken first
+    input.focus({ preventScroll: true }); // text typed elsewhere is committed first
     moveTo(event, true);
   });
   listen('pointercancel', (/** @type {PointerEvent} */ event) => {
     if (finger?.id !== event.pointerId) return;
-    // What it has moved by then stays where it is.
+    // The movement so far stays.
     if (finger.isSure) move(Number(input.value), true);
     else restore();
     finger = null;

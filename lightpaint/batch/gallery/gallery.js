@@ -1,8 +1,8 @@
 /**
- * The gallery of a batch: a page from a disk that contains all that it shows.
+ * The gallery of a batch: a self-contained page that opens from a disk.
  *
  * It has cards that can be filtered and ordered, a comparison of any two of them, the table of all
- * lights, and a mixer for each basis, which begins from any of its looks.
+ * lights, and a mixer for each basis, which can start from any of its looks.
  */
 import { elementOf, inputOf, looks, titleOf } from './gallery_data.js';
 import { createCards } from './look_cards.js';
@@ -12,10 +12,10 @@ import { LookMixers } from './look_mixers.js';
 
 /** @typedef {import("./gallery_data.js").Look} Look */
 
-/** Sorts 10 behind 9. */
+/** Sorts 10 after 9. */
 const NUMERIC = { numeric: true };
 
-/** The looks that the filter leaves, in their order. @type {Look[]} */
+/** The filtered looks, in their order. @type {Look[]} */
 let shown = [];
 
 const comparison = new LookComparison(() => shown);
@@ -40,7 +40,7 @@ const searchTexts = new Map(
   ]),
 );
 
-/** Show the cards that the filter leaves, in the chosen order. */
+/** Show the filtered cards, in the chosen order. */
 function arrange() {
   const words = inputOf('filter').value.toLowerCase().split(/\s+/).filter(Boolean);
   const state = inputOf('state').value;
@@ -67,7 +67,7 @@ elementOf('unit').addEventListener('input', () => {
 
 // -------------------------------------------------------------------------------------- mixer
 
-/** Show the mixer that begins from a look. @param {Look} look */
+/** Show the mixer, starting from a look. @param {Look} look */
 function mix(look) {
   if (!mixers.has(look)) return;
   mixers.begin(look);

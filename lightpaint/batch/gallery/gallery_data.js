@@ -1,4 +1,4 @@
-/** The looks of a gallery, which stand in the page as JSON, and how their numbers are written. */
+/** The looks of a gallery, from JSON in the page, and the formats of their numbers. */
 import { createElement } from '../../viewer/mixer/page_elements.js';
 
 /** @typedef {import("../../viewer/drawing/colour.js").RGB} RGB */

@@ -8,7 +8,7 @@ import { aspectOf, looks, titleOf } from './gallery_data.js';
  * @typedef {{enlarge: (look: Look) => void, choose: (side: Side, look: Look) => void,
  *   mixerOf: (look: Look) => (() => void) | null}} CardActions */
 
-/** Names of files on a card; other files go by their own. @type {Record<string, string>} */
+/** Labels of files on a card; other files are labelled by name. @type {Record<string, string>} */
 const LINKS = {
   'report.html': 'report',
   'comparison.png': 'comparison',
@@ -20,7 +20,7 @@ const LINKS = {
 /** The text in place of a picture. */
 const BLANK = { failed: 'failed', waiting: 'not done yet', done: 'no picture' };
 
-/** A fact that all looks share is on no card. @param {'sensor' | 'scene'} key */
+/** Cards omit facts that all looks share. @param {'sensor' | 'scene'} key */
 const varies = (key) => new Set(looks.map((look) => look[key]).filter(Boolean)).size > 1;
 const VARYING = /** @type {const} */ (['sensor', 'scene']).filter(varies);
 

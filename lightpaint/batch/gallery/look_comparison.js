@@ -1,4 +1,4 @@
-/** Two looks under one border, A and B, with the lights of both beside them. */
+/** Two looks, A and B, separated by a wipe, with the lights of both beside them. */
 import { createElement } from '../../viewer/mixer/page_elements.js';
 import {
   aspectOf,
@@ -54,7 +54,7 @@ export class LookComparison {
     dialog.addEventListener('click', (event) => {
       if (event.target === dialog) dialog.close();
     });
-    // A look that was only enlarged is not half of a pair.
+    // An enlarged look is not part of a pair.
     dialog.addEventListener('close', () => {
       if (!this.chosen.b) this.choose('a', null);
     });
@@ -142,7 +142,7 @@ export class LookComparison {
     inputOf('slide').value = String(percent);
   }
 
-  /** Go to a look before or after this one, among those that are shown. @param {number} by */
+  /** Go to the look before or after this one, among the visible ones. @param {number} by */
   step(by) {
     const side = this.chosen.b ? 'b' : 'a';
     const looks = this.shownLooks().filter((look) => look.picture);

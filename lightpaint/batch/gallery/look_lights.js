@@ -13,7 +13,7 @@ import {
 
 /** @typedef {import("./gallery_data.js").Look} Look */
 
-/** Stops below its brightest at which the bar of a light has no length. */
+/** Stops below its brightest value at which a light's bar has no length. */
 const BAR_STOPS = 10;
 
 export class LightsTable {
@@ -35,7 +35,7 @@ export class LightsTable {
     elementOf('lights-body').replaceChildren(...rows);
   }
 
-  /** Forget the rows, which are of another unit. */
+  /** Delete the rows, which have another unit. */
   clear() {
     this.rows.clear();
   }

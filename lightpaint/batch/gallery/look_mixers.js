@@ -1,4 +1,4 @@
-/** The mixers of a gallery, one for each basis, and the looks that they can begin from. */
+/** The mixers of a gallery, one for each basis, and the looks that they can start from. */
 import { begin } from '../../viewer/mixer/mixer.js';
 import { createElement } from '../../viewer/mixer/page_elements.js';
 import { elementOf, inputOf, looks, titleOf, transforms } from './gallery_data.js';
@@ -33,7 +33,7 @@ export class LookMixers {
     return look.basis !== undefined && this.roots.has(look.basis);
   }
 
-  /** Show the mixer that begins from a look. @param {Look} look */
+  /** Show the mixer, starting from a look. @param {Look} look */
   begin(look) {
     const root = this.roots.get(look.basis ?? '');
     if (!root) return;

@@ -7,7 +7,7 @@ const element = document.getElementById('lightpaint');
 if (element) {
   const host = openHost();
   const engine = openEngine(host);
-  // For whoever measures it, and for the console.
+  // For measurements, and for the console.
   Object.assign(element, { painter: { host, engine } });
   void mount(element, host, { global: true, engine });
 }

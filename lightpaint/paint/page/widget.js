@@ -3,7 +3,7 @@ import { mount } from './app.js';
 import { openEngine } from './engine/picture_engine.js';
 import { ModelHost } from './engine/notebook_host.js';
 
-/** What anywidget calls for each place where the painter is shown; what it returns ends it.
+/** Called by anywidget for each view of the model; returns a function that closes the view.
  * @param {{model: import("./engine/notebook_host.js").Model, el: HTMLElement}} notebook */
 async function render({ model, el }) {
   const style = document.createElement('style');
@@ -12,7 +12,7 @@ async function render({ model, el }) {
   const size = () => (frame.style.height = `${Number(model.get('height'))}px`);
   size();
   model.on('change:height', size);
-  // Inside the element, since some notebooks show it in a shadow root.
+  // Styles go inside the element, since some notebooks render it in a shadow root.
   el.append(style, frame);
   const host = new ModelHost(model);
   const engine = openEngine(host);

@@ -1,8 +1,8 @@
 /**
- * Which view a page gets: by what is there, and by a timed frame.
+ * Chooses a page's renderer by availability and by a timed frame.
  *
- * WebGL2 on a GPU takes a millisecond. Without one a browser may still have WebGL2, in software,
- * and slower than plain JavaScript; or none. So a frame of black planes is timed.
+ * WebGL2 on a GPU takes a millisecond. Without a GPU a browser has no WebGL2, or one in software,
+ * which may be slower than plain JavaScript. So a frame of black planes is timed.
  */
 import { CpuView } from './cpu.js';
 import { GlView } from './gl.js';
@@ -10,14 +10,14 @@ import { DEFAULTS } from './view.js';
 
 /** @typedef {import("./view.js").PictureView} PictureView */
 
-/** Milliseconds of a frame that need no comparison. */
+/** Frame time in milliseconds below which no comparison is needed. */
 const QUICK = 12;
 
-/** And of one that needs no third. */
+/** Frame time in milliseconds below which no third frame is needed. */
 const SLOW = 100;
 
 /**
- * A view in an element, on a canvas of its own.
+ * Create a view in an element, on a canvas of its own.
  * @param {HTMLElement} element @param {[height: number, width: number]} size
  * @param {number} count of lights
  * @param {{view?: 'gl' | 'cpu' | null, onRestored?: () => void}} [options] view: which one, whatever is
@@ -54,7 +54,7 @@ function glView(size, count, { view, onRestored }) {
   }
 }
 
-/** Milliseconds of the second frame; the first one compiles.
+/** Return the milliseconds of the second frame; the first one compiles.
  * @param {PictureView} view @param {number} count */
 function frameTime(view, count) {
   [view.canvas.width, view.canvas.height] = [640, 360];
@@ -63,14 +63,14 @@ function frameTime(view, count) {
     const start = performance.now();
     view.setWeights(new Float64Array(3 * count).fill(1 + frame));
     view.draw({ ...DEFAULTS, layout: 'blink', blink: 'right' });
-    if (view.name === 'gl') view.read(0, 0, 1, 1); // Only then is it done.
+    if (view.name === 'gl') view.read(0, 0, 1, 1); // Reading a pixel waits for the GPU.
     time = performance.now() - start;
     if (frame > 0 && time > SLOW) break;
   }
   return time;
 }
 
-/** What a frame without a GPU takes, from one of a few rows.
+/** Estimate the time of a frame without a GPU from one of a few rows.
  * @param {[number, number]} size @param {number} count */
 function cpuTime([height, width], count) {
   const rows = Math.min(height, 64);

@@ -13,7 +13,7 @@ export { decodeSrgb as decode, encodeSrgb as encode };
 /** Temperatures for which the locus below is good, in kelvin. */
 export const KELVIN = { low: 1000, high: 15000 };
 
-/** Temperature that is neither warmer nor cooler, for gains of light. */
+/** Neutral temperature of warmer and cooler gains. */
 const NEUTRAL_MIRED = 200;
 
 /** Relative luminance (ITU-R BT.709-6, item 3.2). @param {ArrayLike<number>} rgb linear */
@@ -21,14 +21,15 @@ export function luminance(rgb) {
   return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
 }
 
-/** Display colour; what is brighter than 1 is scaled down. @param {ArrayLike<number>} rgb linear */
+/** Return the display colour; light brighter than 1 is scaled down.
+ * @param {ArrayLike<number>} rgb linear */
 export function toHex(rgb) {
   const most = Math.max(1, rgb[0], rgb[1], rgb[2]);
   const codes = [0, 1, 2].map((c) => Math.round(255 * encodeSrgb(rgb[c] / most)));
   return `#${codes.map((code) => code.toString(16).padStart(2, '0')).join('')}`;
 }
 
-/** Linear light of `#ffaa66` or `#fa6`; null for what is no colour.
+/** Return the linear light of `#ffaa66` or `#fa6`; null for other text.
  * @param {string} text @returns {RGB | null} */
 export function ofHex(text) {
   const match = /^#?([0-9a-f]{3}|[0-9a-f]{6})$/i.exec(text.trim());
@@ -37,7 +38,7 @@ export function ofHex(text) {
   return three((c) => decodeSrgb(parseInt(digits.slice(2 * c, 2 * c + 2), 16) / 255));
 }
 
-/** Hue in degrees, saturation and value in [0, 1] of the display colour.
+/** Return hue in degrees, saturation and value in [0, 1] of the display colour.
  * @param {ArrayLike<number>} rgb linear @returns {RGB} */
 export function toHsv(rgb) {
   const [r, g, b] = three((c) => encodeSrgb(rgb[c]));
@@ -49,7 +50,7 @@ export function toHsv(rgb) {
   return [(60 * sixths + 360) % 360, range / most, most];
 }
 
-/** Linear light of hue, saturation and value. @param {RGB} hsv @returns {RGB} */
+/** Return the linear light of hue, saturation and value. @param {RGB} hsv @returns {RGB} */
 export function ofHsv([hue, saturation, value]) {
   return three((c) => {
     const k = ([5, 3, 1][c] + hue / 60) % 6;
@@ -57,7 +58,7 @@ export function ofHsv([hue, saturation, value]) {
   });
 }
 
-/** Linear light of a temperature, its largest channel 1 and none below 0.
+/** Return the linear light of a temperature, its largest channel 1 and none below 0.
  * @param {number} kelvin @param {number} [green] @returns {RGB} */
 export function ofKelvin(kelvin, green = 0) {
   const { at, along } = locus(kelvin);
@@ -69,8 +70,8 @@ export function ofKelvin(kelvin, green = 0) {
   return three((c) => rgb[c] / most);
 }
 
-/** Correlated temperature (Ohno 2013) and green of a colour; null for black, for what is further
- * than 0.05 from the locus, and beyond its ends.
+/** Return the correlated temperature (Ohno 2013) and green of a colour; null for black, for colours
+ * farther than 0.05 from the locus, and beyond its ends.
  * @param {ArrayLike<number>} rgb linear @returns {{kelvin: number, green: number} | null} */
 export function toKelvin(rgb) {
   const [X, Y, Z] = three((c) => TO_XYZ[c].reduce((sum, part, i) => sum + part * rgb[i], 0));
@@ -97,8 +98,8 @@ export function toKelvin(rgb) {
   return { kelvin: 1e6 / mired, green };
 }
 
-/** What light is multiplied with to be warmer by some mireds (cooler: below 0), along Planck's
- * locus and about 5000 K; luminance 1. @param {number} mired @returns {RGB} */
+/** Return the factor of luminance 1 that makes light warmer by some mireds (below 0: cooler), along
+ * Planck's locus around 5000 K. @param {number} mired @returns {RGB} */
 export function warmer(mired) {
   const least = 1e6 / KELVIN.high - NEUTRAL_MIRED;
   const most = 500 - NEUTRAL_MIRED; // Below 2000 K hardly any blue is left.

@@ -1,9 +1,9 @@
 /**
  * The view without a GPU: plain JavaScript over typed arrays.
  *
- * Planes stay the halves that came, decoded by table: 6 bytes for each pixel and light. Where a
- * frame takes longer than the budget, every second row and column is mixed while the brush is
- * down, and all of them when it rests.
+ * Planes stay halves, decoded by table: 6 bytes per pixel and light. If a frame takes longer than
+ * the budget, only every second row and column is mixed while the brush is down, and all when it
+ * rests.
  */
 import { VALUES, finite, toFloats } from './half.js';
 import { Layer } from './layer.js';
@@ -16,8 +16,8 @@ import { GROUND, SQUARES, panes } from './view.js';
 /** @typedef {import("./view.js").Params} Params */
 /** @typedef {import("./view.js").Region} Region */
 
-/** Milliseconds of a live frame above which it is mixed at a part of its size, and values of pixels
- * and lights that take about as long where nothing was timed yet. */
+/** Milliseconds of a live frame above which it is mixed at reduced size, and the number of values
+ * (pixels times lights) that take about as long, for use before any timing. */
 export const BUDGET = 14;
 const MANY = 3e6;
 
@@ -28,7 +28,7 @@ export class CpuView {
     this.name = /** @type {const} */ ('cpu');
     this.canvas = canvas;
     this.size = size;
-    // Pixels come from the processor: a canvas of the GPU, or of one in software, would be slower.
+    // Pixels come from the CPU, so a canvas on the GPU, real or in software, would be slower.
     const context = canvas.getContext('2d', { alpha: false, willReadFrequently: true });
     if (!context) throw new Error('no canvas to draw on');
     this.context = context;
@@ -43,7 +43,7 @@ export class CpuView {
     this.importance = new Float32Array(0);
     /** @type {Uint8Array | null} */
     this.beyond = null;
-    /** Milliseconds of a whole mix, as the last one says. */
+    /** Milliseconds of the last whole mix. */
     this.pace = 0;
     this.step = 1;
     this.wasLive = false;
@@ -121,14 +121,14 @@ export class CpuView {
     }
   }
 
-  /** Of which each so manieth pixel of so manieth row is mixed while the brush is down. */
+  /** Return the step between the rows and columns that are mixed while the brush is down. */
   liveStep() {
     const work = (this.planes.length * this.size[0] * this.size[1]) / MANY;
     const frames = Math.max(work, this.pace / BUDGET);
     return frames <= 1 ? 1 : frames <= 5 ? 2 : frames <= 9 ? 3 : 4;
   }
 
-  /** The picture of a kind with its codes up to date; null where there is none.
+  /** Return the picture of a kind with current codes, or null.
    * @param {Kind} kind @param {Params} params @returns {Layer | null} */
   layerOf(kind, params) {
     if (kind === 'solution' || kind === 'other') return this.mixedLayer(kind, params);
@@ -153,7 +153,7 @@ export class CpuView {
     const layer = this.layer(kind, this.step);
     if (isOther) layer.setLight(mix.light);
     const overlay = kind === 'solution' ? params.overlay : falseOnly(params);
-    // What is missed depends on the painting, too.
+    // The difference depends on the painting, too.
     if (overlay === 'missed') layer.forget();
     const painting = overlay === 'missed' ? this.codesOfPainting(params) : null;
     const { beyond } = this;
@@ -231,7 +231,7 @@ export class CpuView {
   }
 }
 
-/** Light of a pixel whose planes are known.
+/** Return the light of a pixel with known planes.
  * @param {Float32Array} planes (n, 3) @param {ArrayLike<number>} weights (n, 3)
  * @returns {[number, number, number]} */
 export function mixedAt(planes, weights) {

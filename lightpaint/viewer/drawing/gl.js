@@ -1,8 +1,8 @@
 /**
  * The view on a GPU: WebGL2, planes as halves in array textures.
  *
- * The mix is a picture of its own, made when weights change; exposure, zoom and overlays are only
- * the last step. A lost context takes all that was set with it.
+ * The mix is rendered to a texture when weights change; exposure, zoom and overlays are only the
+ * last pass. A lost context loses everything that was set.
  */
 import { mixedAt } from './cpu.js';
 import { Planes } from './gpu.js';
@@ -16,20 +16,20 @@ import { GROUND, SQUARES, panes } from './view.js';
 
 const OVERLAYS = { falsecolor: 1, missed: 2, importance: 3, beyond: 4 };
 
-/** Names of renderers that draw with the processor: of these no frame has to be timed. */
+/** Names of software renderers, which need no timed frame. */
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 
 /** @param {WebGL2RenderingContext} gl */
 function isSoftware(gl) {
   const renderer = String(gl.getParameter(gl.RENDERER));
-  // Some browsers hide the name behind an extension, of which others say that it is old.
+  // Some browsers need an extension for the name, which others call deprecated.
   const info = renderer.startsWith('WebKit') ? gl.getExtension('WEBGL_debug_renderer_info') : null;
   return SOFTWARE.test(info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : renderer);
 }
 
 /** @implements {PictureView} @typedef {import("./view.js").PictureView} PictureView */
 export class GlView {
-  /** Throws where there is no WebGL2 that renders to halves.
+  /** Throws if WebGL2 cannot render to halves.
    * @param {HTMLCanvasElement} canvas @param {[height: number, width: number]} size
    * @param {{isSlowRefused?: boolean, onRestored?: () => void}} [options] isSlowRefused: whether
    * a context without a GPU is none */
@@ -77,7 +77,7 @@ export class GlView {
     this.last = null;
   }
 
-  /** What a lost context took. */
+  /** State to restore after a lost context. */
   forget() {
     this.lut = SRGB;
     this.lattice = null;
@@ -204,7 +204,7 @@ export class GlView {
   /** @param {number} x @param {number} y @param {number} width @param {number} height */
   read(x, y, width, height) {
     const { gl, canvas } = this;
-    // What was drawn is only there until the browser has shown it.
+    // The drawing buffer is valid only until the browser has shown it.
     if (this.last) this.draw(this.last);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     const pixels = new Uint8Array(width * height * 4);
@@ -247,7 +247,7 @@ export class GlView {
   }
 }
 
-/** Number of what lies over a picture of a kind. @param {Kind} kind @param {Params} params */
+/** Return the number of the overlay of a picture. @param {Kind} kind @param {Params} params */
 function overlayOf(kind, { overlay }) {
   if (!overlay) return 0;
   const isHere =

@@ -1,4 +1,4 @@
-/** What gl.js runs on the GPU. Numbers come from overlay.js, so that there is one of each. */
+/** Shaders of gl.js. They take their constants from overlay.js, so that each is defined once. */
 import { LARGEST } from './half.js';
 import { BANDS, FULL, GREY, HATCH, INKS, LUMA } from './overlay.js';
 import { GROUND } from './view.js';
@@ -9,14 +9,14 @@ precision highp sampler2DArray;
 precision highp sampler3D;
 `;
 
-/** One triangle over all there is. */
+/** One triangle over the whole viewport. */
 export const VERTEX = `${HEAD}
 void main() {
   vec2 corner = vec2(gl_VertexID == 1, gl_VertexID == 2);
   gl_Position = vec4(corner * 4.0 - 1.0, 0.0, 1.0);
 }`;
 
-/** Σ weights[k] · plane[k] of the planes in one texture, added to what is there. */
+/** Σ weights[k] · plane[k] of the planes in one texture, added to the target. */
 export const MIX = `${HEAD}
 uniform sampler2DArray planes;
 uniform sampler2D weights;
@@ -45,7 +45,7 @@ void main() {
 /** @param {number[]} codes */
 const vec3 = (codes) => `vec3(${codes.map((code) => (code / 255).toFixed(6)).join(', ')})`;
 
-/** A pane: light through the view transform, and what is laid over it. */
+/** A pane: light through the view transform, with its overlay. */
 export const SHOW = `${HEAD}
 uniform sampler2D picture;
 uniform sampler2D painting;
@@ -105,7 +105,7 @@ vec3 missed(vec3 display, ivec2 at) {
 vec3 lightAt(vec2 where, ivec2 at) {
   if (isSharp) return texelFetch(picture, at, 0).rgb;
   if (!isSmall) return texture(picture, where / size).rgb;
-  // A pixel of the display covers several: the middles of its four quarters.
+  // A display pixel that covers several picture pixels averages the centres of its four quarters.
   vec2 near = 0.25 / scale / size;
   vec3 sum = vec3(0.0);
   for (int k = 0; k < 4; k++) {

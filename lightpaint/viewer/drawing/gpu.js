@@ -1,4 +1,4 @@
-/** Planes and mixes on a GPU: what one life of a WebGL2 context holds of the lights. */
+/** Planes and mixes on a GPU: the state of the lights in one WebGL2 context. */
 import { MIX, PROBE, SHOW, VERTEX } from './glsl.js';
 import { Textures, program } from './textures.js';
 
@@ -8,7 +8,7 @@ import { Textures, program } from './textures.js';
 const LARGEST_TEXTURE = 512 * 2 ** 20;
 
 export class Planes {
-  /** Throws where the context does not render to halves, or holds no picture of that size.
+  /** Throws if the context cannot render to halves, or cannot hold a picture of that size.
    * @param {WebGL2RenderingContext} gl @param {[height: number, width: number]} size */
   constructor(gl, size) {
     this.gl = gl;
@@ -41,7 +41,7 @@ export class Planes {
     const layer = this.size[0] * this.size[1] * 8;
     const most = Math.min(
       gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS),
-      gl.getParameter(gl.MAX_TEXTURE_SIZE), // of weights and probes, which lie in a row
+      gl.getParameter(gl.MAX_TEXTURE_SIZE), // weights and probes, which are in one row
       Math.max(1, Math.floor(LARGEST_TEXTURE / layer)),
     );
     this.count = count;
@@ -100,7 +100,7 @@ export class Planes {
     mix.isStale = false;
   }
 
-  /** Draw to a texture from here on. @param {WebGLTexture} texture @param {number} width
+  /** Direct drawing to a texture. @param {WebGLTexture} texture @param {number} width
    * @param {number} height */
   onto(texture, width, height) {
     const { gl } = this;
@@ -110,7 +110,7 @@ export class Planes {
     gl.viewport(0, 0, width, height);
   }
 
-  /** (n, 3) light of each plane at a pixel, at unit emission.
+  /** Return the light of each plane at a pixel, at unit emission, (n, 3).
    * @param {number} x @param {number} y */
   at(x, y) {
     const { gl, count, perSlice } = this;

@@ -1,6 +1,6 @@
 /** Halves (IEC 60559 binary16): JavaScript has no array of them in all browsers yet. */
 
-/** The largest half; Inf and NaN of a picture would spread from it, and are not let in. */
+/** The largest half. Inf and NaN are replaced, since they would spread through the sums. */
 export const LARGEST = 65504;
 
 /** Values of all halves by their bits, (65536,). Inf is the largest half, NaN is 0. */

@@ -20,7 +20,7 @@ export class Layer {
     if (!context) throw new Error('no canvas to draw on');
     this.context = context;
     this.encoder = new Encoder(SRGB, 0);
-    /** What of the codes is to be made anew. @type {Region | null} */
+    /** Region whose codes are out of date. @type {Region | null} */
     this.stale = null;
     /** @type {string | null} */
     this.laid = null;
@@ -33,7 +33,7 @@ export class Layer {
     this.stale = union(this.stale, region);
   }
 
-  /** All codes are to be made anew. */
+  /** Mark all codes as out of date. */
   forget() {
     this.stale = this.whole();
   }
@@ -67,13 +67,13 @@ export class Layer {
     return [0, this.height, 0, this.width];
   }
 
-  /** Bytes of codes and canvas. */
+  /** Return the bytes of codes and canvas. */
   memory() {
     return 2 * this.image.data.byteLength;
   }
 }
 
-/** The smallest region that holds two. @param {Region | null} a @param {Region | null} b
+/** Return the smallest region that contains two. @param {Region | null} a @param {Region | null} b
  * @returns {Region | null} */
 export function union(a, b) {
   if (!a || !b) return a ?? b;

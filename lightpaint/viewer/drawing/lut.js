@@ -2,21 +2,21 @@
  * View transforms for display: light × 2^stops → display values.
  *
  * A lattice (side³) over log2 of light, from `low` to `high` on each axis; its first point stands
- * for all light below 2^low. In between it is trilinear. sRGB (IEC 61966-2-1) is computed exactly.
- * Where no display value depends on another channel, one curve stands for the lattice.
+ * for all light below 2^low. Interpolation is trilinear. sRGB (IEC 61966-2-1) is computed exactly.
+ * If each display value depends on its own channel only, one curve replaces the lattice.
  */
 import { VALUES } from './half.js';
 
 /** @typedef {Uint8Array | Int16Array | Uint16Array | Float32Array | Float64Array} Data */
-/** An array; float16 is the bits of halves in a Uint16Array (see half.js).
+/** An array. float16: bits of halves in a Uint16Array (see half.js).
  * @typedef {{data: Data, shape: number[]}} Picture */
 /** @typedef {{side: number, low: number, high: number}} Shaper */
 
-/** lattice: (side, side, side, 3) display values, axes r, g, b; of sRGB null.
- * curve: (side,) where it is one for all channels, else null.
+/** lattice: (side, side, side, 3) display values, axes r, g, b; null for sRGB. curve: (side,) if it
+ * is the same for all channels, else null.
  * @typedef {{shaper: Shaper, lattice: Float32Array | null, curve: Float32Array | null}} Lut */
 
-/** Exact, and what is shown until another one is there. @type {Readonly<Lut>} */
+/** Exact sRGB, used until another transform arrives. @type {Readonly<Lut>} */
 export const SRGB = Object.freeze({
   shaper: { side: 2, low: -16, high: 0 },
   lattice: null,
@@ -34,25 +34,27 @@ export function lutOf(name, picture, shaper) {
   return { shaper, lattice, curve: curveOf(lattice, shaper.side) };
 }
 
-/** Display value in [0, 1] of light in [0, 1], by IEC 61966-2-1. @param {number} light */
+/** Return the display value in [0, 1] of light in [0, 1], by IEC 61966-2-1.
+ * @param {number} light */
 export function encodeSrgb(light) {
   const x = Math.min(1, Math.max(0, light));
   return x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055;
 }
 
-/** Light of a display value in [0, 1]: undoes encodeSrgb. @param {number} display */
+/** Return the light of a display value in [0, 1]: the inverse of encodeSrgb.
+ * @param {number} display */
 export function decodeSrgb(display) {
   return display <= 0.04045 ? display / 12.92 : ((display + 0.055) / 1.055) ** 2.4;
 }
 
-/** Steps of a table for each doubling of light: 2^9, so that none is wrong by a sixth of a code. */
+/** Steps of the table per doubling of light: 2^9 keep the error below a sixth of a code. */
 const BITS = 9;
 const SHIFT = 23 - BITS;
 
 /**
- * Codes of many pixels. The upper bits of a float are its logarithm, piece by piece: they are the
- * place in a table of codes where there is a curve, else of coordinates in the lattice. The
- * exposure is in the table.
+ * Computes codes of many pixels. The upper bits of a float are a piecewise linear logarithm. They
+ * index a table of codes if there is a curve, else of coordinates in the lattice. The table
+ * includes the exposure.
  */
 export class Encoder {
   /** @param {Lut} lut @param {number} stops */
@@ -67,7 +69,7 @@ export class Encoder {
     float[0] = 2 ** Math.min(127, Math.ceil(high - stops));
     const length = (bits[0] >> SHIFT) - this.first + 1;
     this.isCurve = !lut.lattice || !!lut.curve;
-    /** The lattice as codes, where it is needed. */
+    /** The lattice as codes, if needed. */
     this.codes = !this.isCurve && lut.lattice ? lut.lattice.map((value) => 255 * value) : null;
     this.table = this.isCurve ? new Uint8ClampedArray(length) : new Float32Array(length);
     for (let i = 0; i < length; i++) {
@@ -76,7 +78,7 @@ export class Encoder {
     }
   }
 
-  /** What the table holds for a logarithm of light. @param {number} log */
+  /** Return the table's value for a logarithm of light. @param {number} log */
   at(log) {
     const { shaper, lattice, curve } = this.lut;
     if (!lattice) return 255 * encodeSrgb(2 ** log);
@@ -88,7 +90,7 @@ export class Encoder {
     return 255 * (curve[i] + (kept - i) * (curve[i + 1] - curve[i]));
   }
 
-  /** Codes of pixels (…, 3) from one to another, into RGBA.
+  /** Write the codes of a range of pixels (…, 3) into RGBA.
    * @param {Float32Array} light @param {Uint8ClampedArray} rgba @param {number} from
    * @param {number} to */
   pixels(light, rgba, from, to) {
@@ -155,7 +157,7 @@ export class Encoder {
   }
 }
 
-/** The curve of all channels, (side,), where the lattice is nothing else, to half a code.
+/** Return the common curve of all channels, (side,), if the lattice equals it to half a code.
  * @param {Float32Array} lattice @param {number} side */
 function curveOf(lattice, side) {
   const curve = Float32Array.from(

@@ -1,19 +1,19 @@
-/** Pictures that lights make together: Σ weights[k] · plane[k], without a GPU. */
+/** Sums of weighted planes, Σ weights[k] · plane[k], without a GPU. */
 import { VALUES } from './half.js';
 
 /** @typedef {{halves: Uint16Array | null, scale: number}} Plane (h, w, 3), light at unit emission
  *   over scale */
 
 /**
- * The mix of planes with some weights, at every pixel or at every second of every second row.
- * While nothing else is asked, only planes whose weights have changed are added.
+ * The mix of planes with weights, at every pixel or at every second pixel of every second row. If
+ * possible, an update adds only planes whose weights have changed.
  */
 export class Mix {
   /** @param {[height: number, width: number]} size */
   constructor(size) {
     this.size = size;
     this.weights = new Float64Array();
-    /** What `light` holds. @type {Float64Array | null} */
+    /** Weights that `light` holds. @type {Float64Array | null} */
     this.mixed = null;
     this.step = 1;
     this.isExact = true;
@@ -21,7 +21,7 @@ export class Mix {
     this.half = new Float32Array(0);
   }
 
-  /** Height and width of what is mixed. @param {number} step */
+  /** Height and width of the mix. @param {number} step */
   sizeAt(step) {
     return this.size.map((n) => Math.ceil(n / step));
   }
@@ -31,12 +31,12 @@ export class Mix {
     return this.step === 1 ? this.full : this.half;
   }
 
-  /** Planes have changed. */
+  /** Note that planes have changed. */
   forget() {
     this.mixed = null;
   }
 
-  /** Mix what has changed. live: whether sums may be carried on, which rounds.
+  /** Update the mix. live: whether to update sums incrementally, which accumulates round-off.
    * @param {Plane[]} planes @param {number} step 1 or 2 @param {boolean} live
    * @returns {boolean} whether `light` is another one */
   update(planes, step, live) {

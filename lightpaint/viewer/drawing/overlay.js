@@ -1,11 +1,11 @@
 /**
- * What is laid over a picture to say something of it. The arithmetic of cpu.js; glsl.js says the
- * same in the shader's language, and a test holds the two together.
+ * Overlays on pictures, as cpu.js computes them. glsl.js has the same in the shader's language, and
+ * a test compares the two.
  *
- * Nothing is said by colour alone: too dark and too bright are hatched in two directions, too.
+ * No overlay relies on colour alone: too dark and too bright are also hatched in two directions.
  */
 
-/** Light at the middle of false colour. */
+/** Light at the centre of the false-colour scale. */
 export const GREY = 0.18;
 
 /** Codes of false colour: from six stops below grey to six above, in whole stops. */
@@ -25,7 +25,7 @@ export const BANDS = [
   [255, 220, 228],
 ];
 
-/** Codes of: too dark, too bright, beyond reach, importance. */
+/** Colour codes of too dark, too bright, beyond reach, and importance. */
 export const INKS = {
   dark: [64, 132, 255],
   bright: [255, 148, 40],
@@ -33,29 +33,29 @@ export const INKS = {
   importance: [72, 208, 140],
 };
 
-/** Difference of codes at which ink covers what it lies on. */
+/** Difference of codes at which ink is opaque. */
 export const FULL = 64;
 
-/** Luma of codes, for what stays under ink. */
+/** Luma of codes, for the picture under ink. */
 export const LUMA = [0.2126, 0.7152, 0.0722];
 
-/** Device pixels from one line of a hatch to the next, and of them, how many have less ink. */
+/** Period of a hatch in device pixels, and how many of these have less ink. */
 export const HATCH = { period: 8, thin: 4, strength: 0.55 };
 
-/** Band of false colour of a luminance, exposure included. @param {number} luminance */
+/** Return the false-colour band of a luminance, exposure included. @param {number} luminance */
 export function band(luminance) {
   const stops = Math.log2(Math.max(luminance, 1e-9) / GREY);
   return Math.min(BANDS.length - 1, Math.max(0, Math.floor(stops + 0.5) + 6));
 }
 
-/** How much ink a hatch lets through at a pixel of the picture; slope ±1.
+/** Return the share of ink that a hatch lets through at a pixel of the picture; slope ±1.
  * @param {number} x @param {number} y @param {number} slope */
 export function hatch(x, y, slope) {
   const along = (((x + slope * y) % HATCH.period) + HATCH.period) % HATCH.period;
   return along < HATCH.thin ? HATCH.strength : 1;
 }
 
-/** Lay ink over a pixel of RGBA: what is below loses its colour and half its light.
+/** Lay ink over a pixel of RGBA: the pixel below loses its colour and half its light.
  * @param {Uint8ClampedArray} rgba @param {number} at @param {number[]} ink
  * @param {number} amount 0 to 1 */
 export function lay(rgba, at, ink, amount) {
@@ -63,10 +63,10 @@ export function lay(rgba, at, ink, amount) {
   for (let c = 0; c < 3; c++) rgba[at + c] = grey + (ink[c] - grey) * amount;
 }
 
-/** Which pixels a picture shows: of (height, width), each `step`th of each `step`th row.
+/** Pixels of a picture that are shown: every `step`th of every `step`th row.
  * @typedef {{height: number, width: number, step: number}} Grid */
 
-/** For each pixel shown: its place in RGBA, and its column, row and place in the whole picture.
+/** Visit each pixel shown: its index in RGBA, and its column, row and index in the whole picture.
  * @param {Grid} grid @param {(at: number, x: number, y: number, p: number) => void} visit */
 function visitPixels({ height, width, step }, visit) {
   let at = 0;
@@ -74,7 +74,7 @@ function visitPixels({ height, width, step }, visit) {
     for (let x = 0; x < width; x += step, at += 4) visit(at, x, y, y * width + x);
 }
 
-/** Missed: solution beside painting, both as codes, where something is painted.
+/** Draw the difference of solution and painting, both as codes, where something is painted.
  * @param {Uint8ClampedArray} rgba of the solution, changed @param {Uint8ClampedArray} painting
  * @param {Float32Array} importance @param {Grid} grid of the solution */
 export function missed(rgba, painting, importance, grid) {
@@ -89,15 +89,17 @@ export function missed(rgba, painting, importance, grid) {
   });
 }
 
-/** Importance that is shown as all: the greatest, and 1 at least. @param {Float32Array} importance */
+/** Return the importance with full ink: the greatest, at least 1.
+ * @param {Float32Array} importance */
 export function fullOf(importance) {
   let full = 1;
   for (const x of importance) if (x > full) full = x;
   return full;
 }
 
-/** Part of all ink for an importance, by ratios: beside an accent that counts ten times as much, the
- * rest is to be seen, too. @param {number} x @param {number} most that is all */
+/** Return the share of full ink for an importance, on a scale of ratios, so that the rest stays
+ * visible beside an accent ten times as important. @param {number} x
+ * @param {number} most that is all */
 export const inkOf = (x, most) => Math.log1p(Math.max(0, x)) / Math.log1p(most);
 
 /** @param {Uint8ClampedArray} rgba changed @param {(p: number) => number} amount of ink at a pixel

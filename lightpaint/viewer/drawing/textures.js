@@ -1,4 +1,4 @@
-/** Textures and programs of WebGL2, with what is known of them. */
+/** Textures and programs of WebGL2, with their properties. */
 import { LARGEST } from './half.js';
 import { SRGB } from './lut.js';
 
@@ -50,7 +50,7 @@ export class Textures {
     this.size = size;
     /** @type {Map<WebGLTexture, number>} bytes */
     this.sizes = new Map();
-    /** Some rows on their way to the GPU. */
+    /** Upload some rows to the GPU. */
     this.rows = Math.max(1, Math.floor(2 ** 18 / size[1]));
     this.rgba = new Uint16Array(4 * this.rows * size[1]).fill(ONE);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
@@ -96,7 +96,7 @@ export class Textures {
     return [...this.sizes.values()].reduce((a, b) => a + b, this.rgba.byteLength);
   }
 
-  /** Black planes of some lights. @param {number} count */
+  /** Create black planes for some lights. @param {number} count */
   planes(count) {
     const { gl } = this;
     const [height, width] = this.size;
@@ -117,7 +117,7 @@ export class Textures {
       );
   }
 
-  /** A picture of halves, RGBA, that can be drawn to. */
+  /** Create a render target of halves, RGBA. */
   halves() {
     const { gl } = this;
     const [height, width] = this.size;
@@ -135,7 +135,7 @@ export class Textures {
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, top, width, rows, gl.RGBA, gl.HALF_FLOAT, rgba);
   }
 
-  /** Halves with a fourth channel, without Inf and NaN, some rows after the other.
+  /** Add a fourth channel to halves and remove Inf and NaN, some rows at a time.
    * @param {Uint16Array} halves (h, w, 3) */
   *bands(halves) {
     const [height, width] = this.size;
@@ -172,7 +172,7 @@ export class Textures {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, left, top, width, height, gl.RGBA, gl.FLOAT, rgba);
   }
 
-  /** (h, w) of 0 to 255; null for none. @param {Uint8Array | null} data */
+  /** Create a texture of (h, w) bytes; null for none. @param {Uint8Array | null} data */
   bytes(data) {
     const { gl } = this;
     const [height, width] = data ? this.size : [1, 1];
@@ -200,7 +200,7 @@ export class Textures {
     );
   }
 
-  /** Weights in a row. @param {Float32Array} rgba (n, 4) */
+  /** Create a row of weights. @param {Float32Array} rgba (n, 4) */
   weights(rgba) {
     const { gl } = this;
     this.row ??= this.createTexture(gl.TEXTURE_2D, rgba.byteLength, gl.NEAREST, () => {});
@@ -212,7 +212,7 @@ export class Textures {
     return this.row;
   }
 
-  /** To draw one pixel of some planes to. @param {number} count */
+  /** Create a render target for one pixel of each plane. @param {number} count */
   probe(count) {
     const { gl } = this;
     if (this.probed?.count !== count) {

@@ -1,9 +1,8 @@
 /**
- * How pictures are shown: what a view can do, and where on its canvas which picture lies.
+ * The interface of a view, and the layout of pictures on its canvas.
  *
- * There are two views, gl.js and cpu.js, which show the same to one display code; choose.js says
- * which one a page gets. A view holds one plane for each light: clean or raw ones, whatever was
- * set last.
+ * There are two views, gl.js and cpu.js, which agree to one display code; choose.js chooses one for
+ * a page. A view holds one plane per light, denoised or raw, as set last.
  */
 
 /** Rows and columns of the picture, ends not included.
@@ -13,16 +12,14 @@
 /** The painting; the mix of the planes with the weights; the mix with other weights (another
  * look); a picture that was set by name.
  * @typedef {'painting' | 'solution' | 'other' | 'verified' | 'present'} Kind */
-/** missed: where the solution is not what was painted; beyond: what no lighting reaches.
+/** missed: where the solution differs from the painting; beyond: what no lighting reaches.
  * @typedef {null | 'missed' | 'beyond' | 'falsecolor' | 'importance'} Overlay */
 
 /**
- * What is drawn.
- *
- * left, right: which pictures. layout: beside each other (or one over the other, where there is
- * more room so), the left one in front up to the wipe, or one of them alone (blink: 'left' or
- * 'right'). zoom: 1 fits. pan: what lies in the middle, in picture pixels from its middle. stops:
- * exposure. live: whether the next one comes soon, so that quick is better than sharp.
+ * What is drawn. * left, right: the pictures. layout: side by side (or stacked, if they are larger
+ * so), the left one in front up to the wipe, or one alone (blink: 'left' or 'right'). zoom: 1 fits.
+ * pan: offset of the centre, in picture pixels. stops: exposure. live: whether more frames follow
+ * soon, so that speed matters more than sharpness.
  * @typedef {{left: Kind, right: Kind, layout: 'side' | 'wipe' | 'blink', wipe: number,
  *   blink: 'left' | 'right', zoom: number, pan: [number, number], stops: number,
  *   overlay: Overlay, live: boolean}} Params
@@ -70,8 +67,8 @@ export const DEFAULTS = Object.freeze({
  * @property {() => void} close
  */
 
-/** Where a picture lies: device pixels of the pane, device pixels for each of the picture, and
- * the device position of its top left corner.
+/** Place of a picture: the pane in device pixels, device pixels per picture pixel, and the device
+ * position of the picture's top left corner.
  * @typedef {{kind: Kind, x: number, y: number, width: number, height: number, scale: number,
  *   left: number, top: number, middle: [number, number]}} Pane
  * middle: of what the picture was fitted into */
@@ -79,13 +76,13 @@ export const DEFAULTS = Object.freeze({
 /** Device pixels between two panes. */
 export const GAP = 4;
 
-/** Device pixels for each of the picture from which on single pixels are shown as squares. */
+/** Device pixels per picture pixel from which pixels are shown as squares. */
 export const SQUARES = 2;
 
-/** Shown where no picture is. */
+/** Background without a picture. */
 export const GROUND = [24, 24, 26];
 
-/** What is drawn where. Of a wipe the second pane is in front, cut at the wipe.
+/** Return the panes to draw. In a wipe the second pane is in front, cut at the wipe.
  * @param {Params} params @param {{width: number, height: number}} canvas
  * @param {[height: number, width: number]} size of the picture @returns {Pane[]} */
 export function panes(params, canvas, size) {
@@ -112,7 +109,7 @@ export function panes(params, canvas, size) {
   ];
 }
 
-/** Which pixel of which picture lies at a place of the canvas, both not rounded; null between.
+/** Return the picture and its pixel, not rounded, at a place of the canvas; null between pictures.
  * @param {Pane[]} shown @param {number} x @param {number} y */
 export function at(shown, x, y) {
   for (const pane of [...shown].reverse()) {
@@ -122,13 +119,13 @@ export function at(shown, x, y) {
   return null;
 }
 
-/** A place of the canvas in pixels of the picture of a pane, also beyond it.
+/** Return a place of the canvas in picture pixels of a pane, also outside it.
  * @param {Pane} pane @param {number} x @param {number} y */
 export function inPicture(pane, x, y) {
   return { x: (x - pane.left) / pane.scale, y: (y - pane.top) / pane.scale };
 }
 
-/** Zoom by a factor so that what lies under a place of a pane stays there.
+/** Zoom by a factor around a place of a pane.
  * @param {Params} params @param {Pane} pane @param {number} x @param {number} y
  * @param {number} factor @returns {{zoom: number, pan: [number, number]}} */
 export function zoomed(params, pane, x, y, factor) {
@@ -144,8 +141,8 @@ export function zoomed(params, pane, x, y, factor) {
 
 /** @typedef {{x: number, y: number, width: number, height: number}} Box */
 
-/** A pane whose picture is fitted into an area that may be larger, by zoom and pan. Its corner
- * lies on a whole device pixel, so that pixels that are as large as those of the device meet them.
+/** Return a pane with its picture fitted into an area, then zoomed and panned. The corner is at a
+ * whole device pixel, so that at 100 % the pixels coincide.
  * @param {Kind} kind @param {Box} box @param {Box} area @param {Params} params
  * @param {[number, number]} size @returns {Pane} */
 function placed(kind, box, area, params, [height, width]) {
@@ -157,7 +154,7 @@ function placed(kind, box, area, params, [height, width]) {
   return { kind, ...box, scale, left, top, middle };
 }
 
-/** Device pixels for each of the picture where all of it is seen.
+/** Return device pixels per picture pixel when the whole picture fits.
  * @param {[width: number, height: number]} area @param {[height: number, width: number]} size */
 function fit([across, down], [height, width]) {
   return Math.max(1e-6, Math.min(across / width, down / height));

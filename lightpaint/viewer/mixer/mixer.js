@@ -1,7 +1,7 @@
 /**
- * The light mixer of a report: no session, no server, only planes that stand in the page.
+ * The light mixer of a report: without session or server, from planes in the page.
  *
- * Each `.mixer` of the document is filled from the JSON in it; without scripts it stays hidden.
+ * Fills each `.mixer` element from the JSON in it; without scripts the element stays hidden.
  */
 import { Encoder, SRGB } from '../drawing/lut.js';
 import { Mix } from '../drawing/mix.js';
@@ -17,7 +17,7 @@ import { createElement, createSlider, followDrag } from './page_elements.js';
  * @typedef {{name: string, emission: Map<string, RGB>, kelvin: Map<string, number | null>,
  *   transform: Data['transform']}} Look */
 
-/** Width of the picture of a light in its row, and the share of its pixels up to white. */
+/** Width of a light's picture in its row, and the share of its pixels that are at most white. */
 const [THUMBNAIL_WIDTH, WHITE_SHARE] = [88, 0.98];
 
 class Mixer {
@@ -64,7 +64,7 @@ class Mixer {
     this.reset('answer');
   }
 
-  /** Painting and mix, one over the other. */
+  /** Painting and mix, separated by a wipe. */
   stage() {
     const [height, width] = this.data.size;
     const { painting } = this.data;
@@ -85,7 +85,7 @@ class Mixer {
     edge.append(createElement('i'));
     stage.append(image, edge, createElement('span', 'mixer-tag', 'painting'));
     stage.append(createElement('span', 'mixer-tag is-right', 'mix'));
-    // The mix is whole until somebody compares: a light may do something in one half alone.
+    // The whole mix is visible until the wipe moves, since a light may affect only one half.
     const wipe = createSlider('Wipe: how much of the painting', 0, 100);
     wipe.value = '0';
     const move = () => {
@@ -132,7 +132,7 @@ class Mixer {
   /** @param {'answer' | 'present'} look */
   reset(look) {
     this.look = look;
-    if (this.status) this.status.textContent = ''; // of an earlier look
+    if (this.status) this.status.textContent = ''; // from an earlier look
     for (const row of this.rows) row.reset(look);
     this.draw();
   }
@@ -144,14 +144,14 @@ class Mixer {
     if (!isSolo) for (const k of this.hiddenLights()) weights.set(this.data.lights[k][this.look], 3 * k);
     for (const row of this.rows) {
       const isOn = isSolo ? row.isSolo : !row.isMute;
-      // The rest has a plane for each look: that of the last reset.
+      // The rest has a plane per look; the last reset chose it.
       const plane = row.light.isRest && this.look === 'present' ? row.plane + 1 : row.plane;
       if (isOn) weights.set(row.rgb, 3 * plane);
     }
     return weights;
   }
 
-  /** Lights that have a plane and no sliders. @returns {number[]} */
+  /** Lights with a plane but without sliders. @returns {number[]} */
   hiddenLights() {
     const { shown, lights } = this.data;
     return shown ? lights.map((_, k) => k).filter((k) => !shown.includes(k)) : [];
@@ -188,7 +188,7 @@ class Mixer {
     context.drawImage(whole, 0, 0, thumb.width, thumb.height);
   }
 
-  /** The mix as a file that lightpaint reads. */
+  /** Return the mix as a lighting file. */
   lighting() {
     const file = structuredClone(this.data.lighting);
     /** @param {string} name @param {RGB} rgb */
@@ -219,7 +219,7 @@ class Mixer {
       await navigator.clipboard.writeText(text);
       status.textContent = `${subject} is on the clipboard.`;
     } catch {
-      // A page from a disk may not have the clipboard: then people copy by hand.
+      // A page opened from a disk may have no clipboard access; then users copy by hand.
       field.hidden = false;
       field.select();
       status.textContent = document.execCommand('copy')
@@ -238,7 +238,7 @@ function button(text, title, act) {
   return element;
 }
 
-/** Show a mixer as its answer has it, or as a look has its lights; or say why there is none.
+/** Start a mixer from its answer or a look, or say why there is none.
  * @param {HTMLElement} root @param {Look} [look]
  * @param {() => boolean} [isWanted] whether it is still wanted once it is unpacked */
 export async function begin(root, look, isWanted = () => true) {

@@ -1,4 +1,4 @@
-/** The data of a mixer, which stand in the page as JSON, and their unpacked planes. */
+/** The data of a mixer, from JSON in the page, and their unpacked planes. */
 import { VALUES } from '../drawing/half.js';
 import { SRGB } from '../drawing/lut.js';
 import { unpacked } from './unpack.js';
@@ -7,9 +7,9 @@ import { unpacked } from './unpack.js';
 /** @typedef {import("./mixer_light.js").Light} Light */
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
 
-/** lights: those with a plane of their own, in the order of the planes. shown: of these, which have
- * sliders; the others are as they are in the look. rest: the others together,
- * as they are in the answer and at present: two more planes. lighting: the answer's file.
+/** lights: those with their own plane, in the order of the planes. shown: indices of those with
+ * sliders; the others stay as in the look. rest: all other lights together, as in the answer and as
+ * at present: two more planes. lighting: the answer's file.
  * @typedef {{size: [number, number], planes: Compact[], lights: Light[], shown?: number[],
  *   rest: {label: string, answer: Record<string, RGB>, present: Record<string, RGB>} | null,
  *   kelvins: [number, RGB][], transform: {stops: number, low: number, high: number,
@@ -38,7 +38,7 @@ export function unpackMixer(root) {
 /** @param {Data['transform']} transform @returns {Promise<import("../drawing/lut.js").Lut>} */
 export async function lutOf({ low, high, curve, lattice }) {
   if (curve) {
-    // A curve alone needs no lattice.
+    // With a curve no lattice is needed.
     const shaper = { side: curve.length, low, high };
     return { shaper, lattice: new Float32Array(1), curve: Float32Array.from(curve) };
   }

@@ -4,7 +4,7 @@ import { slideByTouch } from '../touch.js';
 import { createElement, createSlider } from './page_elements.js';
 
 /** @typedef {import("../drawing/colour.js").RGB} RGB */
-/** kelvin: where a look has it white, else null.
+/** kelvin: if the look's colour is white, else null.
  * @typedef {{name: string, unit: string, isFixed: boolean, isScalar: boolean, isRest?: boolean,
  *   present: RGB, answer: RGB, kelvin: {present: number | null, answer: number | null}}} Light */
 
@@ -16,7 +16,7 @@ export function luminance(rgb) {
   return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
 }
 
-/** Colours of luminance 1 by temperature, in between by mired.
+/** Colours of luminance 1 by temperature, interpolated in mireds.
  * @param {[number, RGB][]} table from cool to warm @typedef {ReturnType<typeof kelvinTable>} Kelvins */
 export function kelvinTable(table) {
   const mireds = table.map(([kelvin]) => 1e6 / kelvin);
@@ -34,7 +34,7 @@ export function kelvinTable(table) {
   return { rgb, coolest: mireds[0], warmest: mireds[last] };
 }
 
-/** A light that can be moved. */
+/** A light with sliders. */
 export class Row {
   /** @param {Light} light @param {Kelvins} kelvins @param {() => void} onChange */
   constructor(light, kelvins, onChange) {
@@ -175,7 +175,7 @@ export class Row {
   }
 }
 
-/** The colour of a light as a display has it, its brightest channel at full. @param {RGB} rgb */
+/** Return the display colour of a light, its brightest channel at full. @param {RGB} rgb */
 function hexOf(rgb) {
   const top = Math.max(...rgb) || 1;
   const codes = rgb.map((x) => {

@@ -1,4 +1,4 @@
-/** Elements of a page: how the mixer and the gallery make theirs. */
+/** Functions with which the mixer and the gallery create page elements. */
 
 /** @template {keyof HTMLElementTagNameMap} T
  * @param {T} tag @param {string} [className] @param {string} [text] */

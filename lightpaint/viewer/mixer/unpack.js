@@ -1,10 +1,10 @@
-/** Pictures that images/packed_picture.py packs. */
+/** Unpacks the pictures that images/packed_picture.py packs. */
 import { finite } from '../drawing/half.js';
 
 /** data: base64, deflated. @typedef {{data: string, scale: number, dropped: number,
  *   size: [height: number, width: number]}} Compact */
 
-/** The picture as halves (h, w, 3), over its scale.
+/** Return the picture as halves (h, w, 3), divided by its scale.
  * @param {Compact} picture @returns {Promise<Uint16Array>} */
 export async function unpacked({ data, dropped, size: [height, width] }) {
   const bytes = await inflated(data.slice(data.indexOf(',') + 1));
@@ -20,7 +20,8 @@ export async function unpacked({ data, dropped, size: [height, width] }) {
   return finite(halves);
 }
 
-/** The numbers of one channel: each is predicted by its neighbours, and stored as the difference.
+/** Return the numbers of one channel. Each is stored as the difference from a prediction by its
+ * neighbours.
  * @param {Uint8Array} bytes @param {number} first @param {number} all @param {number} height
  * @param {number} width @returns {Int32Array} */
 function unpackPlane(bytes, first, all, height, width) {

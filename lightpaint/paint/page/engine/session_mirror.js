@@ -84,7 +84,7 @@ export class SessionMirror {
   showView(view) {
     const { latestState } = this;
     if (!latestState?.views?.[view] || view === this.view) return;
-    // The next state is complete again, whatever changed since the last one.
+    // This is not the first state: later changes have to be requested.
     this.open({ ...latestState, first: false }, view);
     this.weigh();
     this.want();

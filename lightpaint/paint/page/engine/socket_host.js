@@ -14,9 +14,9 @@ import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
 /** @typedef {import("./message_frames.js").Picture} Picture */
 
 /**
- * What the page knows of its session. `on` hears messages of a kind, asked for or not, and
- * `connection` with {state: 'open' | 'lost' | 'stale'}; stale: it is there, and does not know this
- * page; and `silence` with {isSilent} where an answer is long in coming. `send` is answered by the reply, which may be
+ * The page's link to its session. `on` hears messages of a kind, asked for or not, and `connection`
+ * with {state: 'open' | 'lost' | 'stale'}; stale: the server runs, but does not know this page; and
+ * `silence` with {isSilent} when an answer is late. `send` is answered by the reply, which may be
  * `failed`, and rejects where there is no connection. `fetch` is the newest picture of a name.
  * @typedef {object} Host
  * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K], arrays?: Arrays) =>
@@ -27,17 +27,17 @@ import { VERSION, frame, pictureOf, unframe } from './message_frames.js';
  * @property {() => Promise<void>} [gate] is waited for by what is said after strokes
  */
 
-/** What a page hears: what the session tells, and what its host knows of the connection.
+/** Messages to a page: from the session, and from its host about the connection.
  * @typedef {Events & {connection: {kind: 'connection', state: 'open' | 'lost' | 'stale'},
  *   silence: {kind: 'silence', isSilent: boolean}}} HostEvents */
 
-/** What does not wait for strokes that are on their way. */
+/** Requests that do not wait for pending strokes. */
 export const UNQUEUED = ['paint', 'drop', 'hello', 'take_over', 'fetch'];
 
-/** Who hears what: the part that all hosts share. */
+/** Listeners by message kind: the part that all hosts share. */
 export class Emitter {
   constructor() {
-    /** Until strokes that are done have been answered: what else is said comes after them.
+    /** Resolves once finished strokes have been answered; other requests follow them.
      * @type {() => Promise<void>} */
     this.gate = async () => {};
     /** @type {Map<string, ((message: any) => void)[]>} */
@@ -49,7 +49,8 @@ export class Emitter {
     this.listeners.set(kind, [...(this.listeners.get(kind) ?? []), listener]);
   }
 
-  /** One who fails does not keep it from the others. @param {string} kind @param {any} message */
+  /** An error in one listener does not keep the message from the others. @param {string} kind
+   * @param {any} message */
   emit(kind, message) {
     for (const listener of this.listeners.get(kind) ?? [])
       try {
@@ -60,20 +61,20 @@ export class Emitter {
   }
 }
 
-/** Milliseconds before a lost connection is tried again: at first, and at most. */
+/** Milliseconds before a lost connection is retried: the first and the longest delay. */
 const WAITS = { first: 250, most: 5000 };
 
 /** @implements {Host} */
 export class SocketHost extends Emitter {
-  /** Where the page came from, and what knows the key to it.
+  /** The page's origin, and the holder of the server's key.
    * @param {string | URL} [base] @param {{key: () => Promise<string | null>}} [entry] */
   constructor(base = document.baseURI, entry = new AccessKey(base)) {
     super();
     this.base = new URL('.', base);
     this.entry = entry;
-    /** Without which nothing is answered. @type {string | null} */
+    /** Without the key the server answers nothing. @type {string | null} */
     this.key = null;
-    /** By which the session knows this page when it is back. */
+    /** Identifies this page to the session after a reconnection. */
     this.page = crypto.randomUUID?.() ?? String(Math.random());
     this.seq = 0;
     /** @type {Map<number, {resolve: (message: Message) => void, reject: (error: Error) => void}>} */
@@ -93,7 +94,7 @@ export class SocketHost extends Emitter {
     try {
       this.key ??= await this.entry.key();
     } catch {
-      return this.retry(); // It is not there.
+      return this.retry(); // The server is not running.
     }
     if (this.isOver) return;
     if (this.key === null) this.refuse();
@@ -115,7 +116,7 @@ export class SocketHost extends Emitter {
     socket.onmessage = ({ data }) => this.receive(unframe(data));
     socket.onclose = () => {
       this.dropped(socket);
-      // Of a socket that was refused a page is not told why.
+      // Browsers do not tell a page why a socket was refused.
       if (!wasOpen && !this.isOver) void this.askWhy();
     };
   }
@@ -130,7 +131,7 @@ export class SocketHost extends Emitter {
     this.retry();
   }
 
-  /** Connect again, after a while. */
+  /** Reconnect after a delay. */
   retry() {
     if (this.isOver) return;
     this.emit('connection', { kind: 'connection', state: 'lost' });
@@ -138,14 +139,14 @@ export class SocketHost extends Emitter {
     this.wait = Math.min(WAITS.most, 2 * this.wait);
   }
 
-  /** Say that the server does not know this page, and ask it no more. */
+  /** Report that the server does not know this page, and stop asking. */
   refuse() {
     this.close();
     this.emit('connection', { kind: 'connection', state: 'stale' });
   }
 
-  /** Whether a server is there that does not know this page; then it is not asked again, since the
-   * page of the new address would find the session taken. */
+  /** Return whether a server runs that does not know this page. Asking it again would take the
+   * session from the page at the new address. */
   async askWhy() {
     try {
       const options = /** @type {RequestInit} */ ({ method: 'HEAD', cache: 'no-store' });
@@ -154,7 +155,7 @@ export class SocketHost extends Emitter {
       if (!REFUSALS.includes(status) || this.socket?.readyState === WebSocket.OPEN) return;
       this.refuse();
     } catch {
-      // It is not there.
+      // The server is not running.
     }
   }
 
@@ -166,7 +167,7 @@ export class SocketHost extends Emitter {
     const isThere = kind === 'state' || kind === 'waiting';
     if (isThere) this.wait = WAITS.first;
     if (kind === 'state') this.generations = { ...message.resources };
-    // Who is of another version, or has been told to leave, does not come back by itself.
+    // A page of another version, or one that was dismissed, does not reconnect by itself.
     if (kind === 'closed' && message.reason === 'version') this.isOver = true;
     this.emit(kind, message);
     if (isThere) this.emit('connection', { kind: 'connection', state: 'open' });

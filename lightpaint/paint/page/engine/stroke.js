@@ -11,16 +11,16 @@ import { wholeAdjustment } from './whole_adjustment.js';
 /** @typedef {'brush' | 'eraser' | 'weight' | 'pick' | 'fill' | 'line' | 'adjust'} Tool */
 
 /**
- * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: how many
- * times as much as before counts what the importance brush goes over. about: whether a drag asks at
- * a soft spot of that size, or of the object under it; a spot, where that is not said.
+ * rgb: linear light of the paint. size: diameter in pixels of the picture. importance: factor of
+ * the importance brush. about: whether a drag adjusts a soft spot of that size (the default) or the
+ * object under it.
  * @typedef {{tool: Tool, rgb: RGB, as: 'light' | 'colour', size: number, hardness: number,
  *   flow: number, importance: number, about?: 'spot' | 'object'}} ToolSettings */
 
-/** Pixels of the screen that a drag goes for one stop, and for one mired. */
+/** Screen pixels of a drag per stop and per mired. */
 export const DRAG = { stop: 80, mired: 1 };
 
-/** Stops that a drag asks for at most. */
+/** Largest change of a drag, in stops. */
 const MAX_STOPS = 8;
 
 /** @type {ToolSettings} */
@@ -34,7 +34,7 @@ export const DEFAULT_TOOL = {
   importance: 1,
 };
 
-/** What undo calls a stroke. @type {Record<Tool, string>} */
+/** Name of a stroke in the undo history. @type {Record<Tool, string>} */
 export const LABELS = {
   brush: 'brush',
   eraser: 'eraser',
@@ -45,13 +45,14 @@ export const LABELS = {
   adjust: 'adjust',
 };
 
-/** What brighter and warmer light is. @param {number} stops @param {number} mired
+/** Return the effect that changes brightness and warmth. @param {number} stops
+ * @param {number} mired
  * @returns {Effect} */
 export function adjustment(stops, mired) {
   return { kind: 'adjust', gain: 2 ** stops, tint: warmer(mired) };
 }
 
-/** One stroke. Its methods say what they have changed. */
+/** One stroke. Its methods return the changed regions. */
 export class Stroke {
   /** @param {PaintCanvas} canvas @param {ToolSettings} settings @param {Point} point where it begins
    * @param {number} scale pixels of the screen for each of the picture */
@@ -63,7 +64,7 @@ export class Stroke {
     canvas.begin();
     this.effect = effectOf(canvas, settings);
     this.path = new Path(canvas, settings);
-    /** What a drag asks for. */
+    /** The change that the drag asks for. */
     this.asked = { stops: 0, mired: 0 };
   }
 
@@ -92,13 +93,13 @@ export class Stroke {
     return this.applied(points.flatMap((point) => this.path.moveTo(point)));
   }
 
-  /** A straight line from where it began. @param {Point} to @returns {Region[]} */
+  /** Draw a straight line from the start. @param {Point} to @returns {Region[]} */
   line(to) {
     const { canvas, settings, start } = this;
     const before = canvas.uncover();
     canvas.region = null;
     const path = new Path(canvas, settings);
-    // Its last stamp is at its end.
+    // The last stamp is at the end of the line.
     const length = Math.hypot(to.x - start.x, to.y - start.y);
     path.step = length / Math.max(1, Math.ceil(length / path.step)) || path.step;
     const ends = [start, to].map((point) => path.moveTo({ ...point, pressure: 1 }));
@@ -123,7 +124,7 @@ export class Stroke {
   }
 }
 
-/** Brighter and warmer in an object, or for null everywhere, as a stroke of its own.
+/** Make an object, or for null everything, brighter and warmer, as one stroke.
  * @param {PaintCanvas} canvas @param {{stops: number, mired: number, object: number | null}} asked
  * @returns {Region} */
 export function adjustArea(canvas, { stops, mired, object }) {
@@ -141,8 +142,8 @@ function effectOf(canvas, settings) {
   return { kind: 'paint', rgb: settings.rgb, as: settings.as };
 }
 
-/** Regions in a few, of which none lies within another: stamps overlap, and each of them would
- * be worked out again. @param {Region[]} regions @returns {Region[]} */
+/** Merge regions into a few that do not contain each other: stamps overlap, and shared pixels would
+ * be computed several times. @param {Region[]} regions @returns {Region[]} */
 function merged(regions) {
   /** @type {Region[]} */
   const made = [];

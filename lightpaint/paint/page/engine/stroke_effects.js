@@ -8,8 +8,8 @@ import { VALUES } from '../../../viewer/drawing/half.js';
 /** @typedef {import("./message_frames.js").RGB} RGB */
 
 /**
- * What a stroke does. paint: the pixel becomes a colour, or light of that colour on its albedo; of
- * light on what reflects none, as a flame, nothing can be said, and it stays as it is.
+ * The effect of a stroke. paint: the pixel becomes a colour, or light of that colour on its albedo;
+ * of light on what reflects none, as a flame, nothing can be said, and it stays as it is.
  * erase: it is the present look again, and not painted; of a picture that was asked for as a whole
  * it is what was asked of that. weigh: it counts so many times as much
  * as it did; what is not painted is kept as it is, and counts as a stroke would. ask: its light is
@@ -18,18 +18,18 @@ import { VALUES } from '../../../viewer/drawing/half.js';
  *   {kind: 'weigh', times: number} | {kind: 'adjust', gain: number, tint: RGB}} Effect
  */
 
-/** Importance that is left, or reached, however often it is made less or more. */
+/** Lower and upper bound of importance under repeated changes. */
 const [MIN, MAX] = [0.01, 1000];
 
-/** So many times as much, within these; what lies beyond them already does not come nearer.
+/** Multiply importance within these bounds. A value beyond them already stays.
  * @param {number} importance @param {number} times */
 function scaledImportance(importance, times) {
   const least = Math.min(MIN, importance);
   return Math.min(Math.max(MAX, importance), Math.max(least, importance * times));
 }
 
-/** Make light brighter, and warmer. Its luminance is what the gain makes of it, whatever its colour
- * was. @param {Float64Array} light changed @param {WholeAdjustment} by */
+/** Make light brighter and warmer. The gain alone decides the luminance, whatever the colour.
+ * @param {Float64Array} light changed @param {WholeAdjustment} by */
 function adjust(light, { gain, tint }) {
   const before = luminance(light);
   for (let c = 0; c < 3; c++) light[c] *= tint[c];
@@ -38,7 +38,7 @@ function adjust(light, { gain, tint }) {
   for (let c = 0; c < 3; c++) light[c] *= level;
 }
 
-/** What a stroke does to one pixel, by how that was before and how far it is covered.
+/** Apply a stroke to one pixel, given its earlier value and its coverage.
  * @param {PaintCanvas} canvas @param {Effect} effect
  * @returns {(tile: Tile, q: number, p: number, covered: number) => void} */
 export function pixelChange(canvas, effect) {
@@ -51,7 +51,7 @@ export function pixelChange(canvas, effect) {
     }
   };
   const { full, lift } = canvas;
-  const pixel = new Float64Array(3); // one for all pixels: they are many
+  const pixel = new Float64Array(3); // reused for all pixels, for speed
   /** @type {(tile: Tile, q: number, p: number, covered: number) => void} */
   const count = (tile, q, p, covered) => {
     const before = scaledImportance(tile.importance[q], lift);

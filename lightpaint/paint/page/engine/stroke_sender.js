@@ -1,8 +1,8 @@
 /**
  * Sends the changed pixels of strokes to the session, one message at a time.
  *
- * What changes in the meantime is sent together with the next one. A stroke that is done is kept
- * until the session has said that it has it, and sent again, whole, after a lost connection.
+ * Changes in the meantime go with the next message. A finished stroke is kept until the session
+ * confirms it, and sent again as a whole after a lost connection.
  */
 import { union } from '../../../viewer/drawing/layer.js';
 
@@ -11,10 +11,10 @@ import { union } from '../../../viewer/drawing/layer.js';
 /** @typedef {import("./message_frames.js").Message} Message */
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 
-/** The stroke in progress. dirty: what is not sent. whole: where it has been.
+/** The stroke in progress. dirty: region not sent yet. whole: region of the stroke.
  * @typedef {{stroke: number, view: number, dirty: Region | null, whole: Region | null,
  *   isKnown: boolean}} CurrentStroke */
-/** A stroke that is done, or dropped, and not yet answered. cut: what of it has to be sent.
+/** A finished or cancelled stroke without an answer yet. cut: region to send.
  * @typedef {{stroke: number, view: number, cut: Region, whole: Region, arrays: Arrays,
  *   label: string} | {stroke: number, isDropped: true}} PendingStroke */
 
@@ -38,11 +38,11 @@ export class StrokeSender {
     this.isBusy = false;
     this.isOpen = true;
     this.isOver = false;
-    /** Whether nothing can be painted: another page has the session, or it is there no more. */
+    /** Whether painting is impossible: another page has the session, or it has ended. */
     this.isTaken = false;
     /** @type {(() => void)[]} */
     this.waiting = [];
-    /** Whether the next patch is of a stroke that the canvas has dropped already. */
+    /** Whether the next patch belongs to a stroke that the canvas has cancelled already. */
     this.isDropping = false;
     this.leave = () => this.hurry();
     addEventListener('pagehide', this.leave);
@@ -54,7 +54,7 @@ export class StrokeSender {
         this.forget(true);
       }
     });
-    // Another page has the session: nothing is said to it.
+    // Pause: another page has the session.
     host.on('closed', () => {
       this.isTaken = true;
       this.connected(false);
@@ -74,8 +74,8 @@ export class StrokeSender {
     this.view = view;
   }
 
-  /** Another page has painted meanwhile, and what the session has not heard would lie over that;
-   * or nobody is there who would hear it. */
+  /** Drop unsent strokes: they would overwrite what another page has painted meanwhile, or nobody
+   * would receive them. */
   forget(isStale = false) {
     const count =
       this.left.filter((one) => !('isDropped' in one)).length + (this.live?.whole ? 1 : 0);
@@ -85,7 +85,7 @@ export class StrokeSender {
     if (count) this.lost(count, isStale);
   }
 
-  /** Say nothing any more. */
+  /** Stop sending. */
   close() {
     this.isOver = true;
     this.left = [];
@@ -93,24 +93,24 @@ export class StrokeSender {
     this.resolveWaiting();
   }
 
-  /** The page goes away: what is done is said now, and nobody waits for the answers. */
+  /** The page closes: send finished strokes now, without waiting for answers. */
   hurry() {
     if (!this.isOpen || this.isOver) return;
     for (const one of this.left) {
       if ('isDropped' in one) continue;
       const { stroke, view, cut, label } = one;
       const fields = { stroke, view, region: cut, done: true, label };
-      // What has been said already is there already.
+      // Earlier messages have arrived already.
       this.host.send('paint', fields, cutOf(one)).catch(() => {});
     }
   }
 
-  /** Whether anything of a stroke is on its way, or will be. */
+  /** Return whether parts of a stroke are pending. */
   get isPending() {
     return this.isBusy || this.left.length > 0 || this.live !== null;
   }
 
-  /** Once all strokes that are done are answered. @returns {Promise<void>} */
+  /** Resolve once all finished strokes are answered. @returns {Promise<void>} */
   settled() {
     return new Promise((resolve) => {
       this.waiting.push(resolve);
@@ -127,7 +127,7 @@ export class StrokeSender {
     this.live = { stroke: ++this.count, view, dirty: null, whole: null, isKnown: false };
   }
 
-  /** Pixels of the stroke have changed. @param {Region} region */
+  /** Queue changed pixels of the stroke. @param {Region} region */
   touch(region) {
     if (!this.live || region[0] >= region[1] || region[2] >= region[3]) return;
     this.live.dirty = union(this.live.dirty, region);
@@ -135,7 +135,7 @@ export class StrokeSender {
     this.pump();
   }
 
-  /** The stroke is done. @param {string} label what undo calls it */
+  /** Finish the stroke. @param {string} label what undo calls it */
   end(label) {
     const { live } = this;
     this.live = null;
@@ -147,7 +147,7 @@ export class StrokeSender {
     this.pump();
   }
 
-  /** The stroke has never been; the canvas knows already. */
+  /** Cancel the stroke; the canvas has done so already. */
   drop() {
     const { live } = this;
     this.live = null;
@@ -159,14 +159,14 @@ export class StrokeSender {
   connected(isOpen) {
     this.isOpen = isOpen;
     if (!isOpen) {
-      // What of them was heard nobody knows.
+      // It is unknown which of them arrived.
       for (const one of this.left) if (!('isDropped' in one)) one.cut = one.whole;
       if (this.live) this.live.dirty = this.live.whole;
     }
     this.pump();
   }
 
-  /** Send the next thing, if nothing is on its way. */
+  /** Send the next message, unless one is pending. */
   pump() {
     if (this.isBusy || !this.isOpen || this.isOver) return;
     const [next] = this.left;
@@ -194,7 +194,7 @@ export class StrokeSender {
       if (left && reply.kind !== 'closed') this.left = this.left.filter((one) => one !== left);
       if (left && reply.kind === 'failed') this.refused();
     } catch {
-      // The connection is lost; `connected` says when it is there again.
+      // Pause after a lost connection, until `connected` is called.
       this.isOpen = false;
     }
     this.isBusy = false;
@@ -204,7 +204,7 @@ export class StrokeSender {
   }
 }
 
-/** Of a stroke that is done, the pixels that have to be sent.
+/** Return the pixels of a finished stroke that have to be sent.
  * @param {{cut: Region, whole: Region, arrays: Arrays}} left @returns {Arrays} */
 function cutOf({ cut, whole, arrays }) {
   const [height, width] = [cut[1] - cut[0], cut[3] - cut[2]];

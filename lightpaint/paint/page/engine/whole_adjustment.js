@@ -4,27 +4,26 @@ import { VALUES } from '../../../viewer/drawing/half.js';
 
 /** @typedef {import("./paint_canvas.js").PaintCanvas} PaintCanvas */
 /** @typedef {import("./message_frames.js").RGB} RGB */
-/** Luminance times `gain`, colour by `tint`, as an ask has it.
+/** Factors on luminance (`gain`) and colour (`tint`).
  * @typedef {{gain: number, tint: RGB}} WholeAdjustment */
 
-/** Pixels that are looked at, and that are enough. */
+/** Number of sampled pixels, and the smallest number that suffices. */
 const LOOKED_AT = 4096;
 const ENOUGH = 32;
 
-/** Stops by which one half of them may lie beside the middle. */
+/** Largest deviation from the median, in stops, of half of them. */
 const ALIKE = 0.1;
 
-/** Luminance that says something of a ratio, beside that of the picture's mean. */
+/** Smallest luminance with a meaningful ratio, relative to the picture's mean. */
 const DARK = 0.01;
 
 /**
- * Of a picture of which all is painted, by how much it was asked to be brighter and warmer where
- * nothing else was painted; null where that was not the same all over.
+ * Return the adjustment under the strokes of a fully painted picture, or null if it is not uniform.
  * @param {PaintCanvas} canvas @returns {WholeAdjustment | null}
  */
 export function wholeAdjustment({ isAll, importance, image, present }) {
   if (!isAll) return null;
-  /** Stops of luminance, and of red and blue over green. @type {[number[], number[], number[]]} */
+  /** Luminance, and red and blue over green, in stops. @type {[number[], number[], number[]]} */
   const ratios = [[], [], []];
   const step = Math.max(1, Math.floor(importance.length / LOOKED_AT));
   const at = (/** @type {number} */ p, /** @type {boolean} */ isNow) =>

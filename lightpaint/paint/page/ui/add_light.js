@@ -1,4 +1,4 @@
-/** Adds a light: where somebody clicks, or where a search finds that the painting wants it. */
+/** Adds a light where the user clicks, or where a search finds that the painting needs it. */
 
 import { html } from '../vendor/preact.js';
 import { Button, NumberField, Select } from './controls.js';
@@ -17,7 +17,7 @@ const KINDS = [
 const CLICK = 'click';
 const ANYWHERE = 'anywhere';
 
-/** The most lights that one search adds, here. */
+/** Largest number of lights that one search on the page adds. */
 const MOST_FOUND = 4;
 
 /** @param {{ui: Ui, app: App}} props */

@@ -11,7 +11,7 @@ import { drawPicture } from './thumbnail.js';
 /** @typedef {import("./ui_state.js").Change} Change */
 /** @typedef {import("./shortcuts.js").App} App */
 
-/** Keys of a light that each kind of wish has. @type {Record<string, string[]>} */
+/** Constraint keys of a light that each kind of advice removes. @type {Record<string, string[]>} */
 const KEYS = {
   off: ['off'],
   lock: ['lock'],
@@ -19,7 +19,7 @@ const KEYS = {
   colour: ['color', 'kelvin', 'primaries', 'duv'],
 };
 
-/** What a button does, of one light and of several. @type {Record<string, [string, string]>} */
+/** Button text for one light and for several. @type {Record<string, [string, string]>} */
 const BUTTON_WORDS = {
   off: ['Turn on', 'Turn on'],
   lock: ['Unlock', 'Unlock'],
@@ -28,7 +28,7 @@ const BUTTON_WORDS = {
   tie: ['Untie', 'Untie'],
 };
 
-/** The same of all lights. @type {Record<string, string>} */
+/** Button text for advice on all lights. @type {Record<string, string>} */
 const OF_ALL = {
   hold: 'Loosen',
   colors: 'Any colour',
@@ -36,24 +36,26 @@ const OF_ALL = {
   prefer_current: 'Let lights change',
 };
 
-/** Characters of a light's name on a button, beside which a sentence stands. */
+/** Characters of a light's name on a button, which shares its line with a sentence. */
 const BUTTON_CHARACTERS = 14;
 
-/** What is called so, with its lights. @param {Cause} cause @param {number} [most] characters of a
- * light's name */
+/** Return the button text with the names of its lights. @param {Cause} cause
+ * @param {number} [most] characters of a light's name
+ * */
 function nameOf({ kind, names }, most = Infinity) {
   if (kind in OF_ALL) return OF_ALL[kind];
   const lights = names.length === 1 ? shortened(names[0], most) : `${names.length} lights`;
   return `${BUTTON_WORDS[kind][names.length === 1 ? 0 : 1]} ${lights}`;
 }
 
-/** The same at length. @param {Cause} cause @param {string} name */
+/** Return the title of the preview. @param {Cause} cause @param {string} name */
 function titleOf({ kind, hold }, name) {
   if (kind !== 'hold') return name;
   return hold ? `Loosen the hold to ${number(hold, 2)}` : 'Ignore unpainted parts';
 }
 
-/** The message that lets go of it; null of what was not asked on this page, or is let go already.
+/** Return the request that removes the obstacle; null if this page did not set it, or it is gone
+ * already.
  * @param {Cause} cause @param {Ui} ui @param {App["session"]} session @returns {Change | null} */
 function changeOf({ kind, names, hold }, ui, session) {
   /** @param {string} key @param {any} value @returns {Change} */
@@ -72,7 +74,7 @@ function changeOf({ kind, names, hold }, ui, session) {
   return { kind: 'ask_all', fields: { asked: Object.fromEntries(asked) } };
 }
 
-/** What stays asked of a light: what a hand had held has before it.
+/** Return the remaining constraints of a light; for one locked by hand, those from before.
  * @param {string} name @param {string[]} keys @param {Ui} ui @param {App["session"]} session */
 function without(name, keys, ui, session) {
   const light = ui.lights.findIndex((one) => one.name === name);
@@ -94,7 +96,8 @@ export function AdviceButton({ ui, app }) {
     act=${() => app.session.preview(titleOf(help, name), change)} />`;
 }
 
-/** Let lights move, where lights as they hang come no closer. @param {{ui: Ui, app: App}} props */
+/** The button that lets lights move, where their present places come no closer.
+ * @param {{ui: Ui, app: App}} props */
 export function MoveButton({ ui, app }) {
   if (!ui.state?.can_render || ui.placing) return null;
   return html`<${Button} label="Let lights move" class="help"
@@ -102,8 +105,9 @@ export function MoveButton({ ui, app }) {
     act=${() => app.session.placeLights()} />`;
 }
 
-/** The answer as it is and as it would be, before anything is done. @param {{ui: Ui, app: App}}
- * props */
+/** The answer before and after a change, for the user to apply or cancel.
+ * @param {{ui: Ui, app: App}} props
+ * */
 export function PreviewDialog({ ui, app }) {
   const { preview } = ui;
   if (!preview) return null;

@@ -22,7 +22,7 @@ const OVERLAYS = [
 
 const PAINTED = 'painted';
 
-/** What colours of an overlay mean; hatches say the same. @type {Record<string, string[]>} */
+/** Legends of the overlays: colours and hatches. @type {Record<string, string[]>} */
 const MEANINGS = {
   missed: ['too dark', 'matches', 'too bright'],
   beyond: ['in reach', 'out of reach'],
@@ -35,13 +35,13 @@ export function AnalysisPanel({ ui, app }) {
   const { session, store } = app;
   const choose = (/** @type {any} */ overlay) => updateShow(store, { overlay });
   const frame = useRef(/** @type {HTMLElement | null} */ (null));
-  // Reasons take more room than what was there before them.
+  // The reasons need more room than the text before them.
   useLayoutEffect(() => {
     const panel = /** @type {HTMLElement | null | undefined} */ (frame.current?.closest('.fold'));
     if (panel && ui.explained.length && isInSight(panel))
       panel.scrollIntoView({ block: 'nearest' });
   }, [ui.explained]);
-  // The first of them stands below the pictures, too.
+  // The first reason is also below the pictures.
   const sentences = (ui.explained.length ? ui.explained : ui.sentences).filter(
     (text) => text !== ui.headline,
   );
@@ -60,7 +60,7 @@ export function AnalysisPanel({ ui, app }) {
   </div>`;
 }
 
-/** Whether somebody sees some of a panel among those at the side. @param {HTMLElement} panel */
+/** Return whether part of a panel is visible in the side bar. @param {HTMLElement} panel */
 function isInSight(panel) {
   const [its, room] = [panel, /** @type {HTMLElement} */ (panel.parentElement)].map((one) =>
     one.getBoundingClientRect(),
@@ -68,11 +68,12 @@ function isInSight(panel) {
   return its.top < room.bottom - 60 && its.bottom > room.top + 60;
 }
 
-/** CSS pixels of a legend, of one on a single line, and between it and its picture. */
+/** CSS pixels: height of a legend, of one on a single line, and the gap to its picture. */
 const LEGEND = { width: 210, height: 60, low: 22, gap: 8 };
 
-/** Where it covers nothing: below the picture, else beside it; where its pane has no room for that,
- * on it, on a low line. @param {Pane} pane @param {[height: number, width: number]} size */
+/** Place it where it covers nothing: below the picture, else beside it; without room for either, on
+ * the picture, as a single line. @param {Pane} pane
+ * @param {[height: number, width: number]} size */
 function placed(pane, [rows, columns]) {
   const { width, height, low, gap } = LEGEND;
   const left = Math.max(pane.x, pane.left);
@@ -89,8 +90,8 @@ function placed(pane, [rows, columns]) {
   return { left: left + inside, top: bottom - low - gap, isLow: true };
 }
 
-/** What the colours over a picture mean, at that picture. What is out of reach is found anew when it
- * is looked at and the answer is another one.
+/** The legend at a picture with an overlay. The overlay of what is out of reach is requested again
+ * when it is visible and the answer has changed.
  * @param {{ui: Ui, app: App, panes: Pane[]}} props */
 export function Legend({ ui, app, panes }) {
   const overlay = overlayOf(ui);
@@ -125,7 +126,7 @@ export function Legend({ ui, app, panes }) {
 function Verify({ ui, app }) {
   const { session } = app;
   if (!ui.verifying) {
-    // Not by the second click of a double click on "Analysis", under which it comes to lie.
+    // Ignore the second click of a double click on "Analysis", under which the button appears.
     const begin = (/** @type {MouseEvent} */ { detail }) => detail < 2 && session.verify();
     return html`<${Button} label="Verify" icon="camera" act=${begin}
       tip="Render the scene with this lighting, and compare" />`;
@@ -139,7 +140,7 @@ function Verify({ ui, app }) {
 function Verified({ ui, app }) {
   const { verified, show } = ui;
   const frame = useRef(/** @type {HTMLElement | null} */ (null));
-  // It may have come below what there is room for.
+  // Scroll to it: it may be outside the visible part.
   useLayoutEffect(() => frame.current?.scrollIntoView?.({ block: 'nearest' }), [verified]);
   if (!verified) return null;
   const isShown = show.left === 'solution' && show.right === 'verified';

@@ -21,7 +21,7 @@ const STATES = {
   'answer not shown': 'The sentence describes the answer, which is neither of the looks compared.',
 };
 
-/** Below the pictures, in one sentence: how close the answer comes.
+/** One sentence below the pictures: how close the answer is.
  * @param {{ui: Ui, app: App}} props */
 export function AnswerLine({ ui, app }) {
   const { store } = app;
@@ -40,7 +40,7 @@ export function AnswerLine({ ui, app }) {
     <p class=${`headline ${isOld || isApart ? 'is-old' : ''}`} role="status">
       <${TruncatedText} class="said" text=${text} most=${100} />
       ${
-        // In one place, so that the sentence keeps its lines.
+        // Always in the same place, so that the sentence does not rewrap.
         state && html`<span class="live" data-tip=${STATES[state]}><b>${state}</b></span>`
       }
       ${
@@ -59,13 +59,13 @@ export function AnswerLine({ ui, app }) {
       act=${() => saveLook(app)} />`
     }
     ${
-      // It stays where it is when it is pressed: nothing else slides under the pointer.
+      // The button keeps its place when pressed, so that nothing else slides under the pointer.
       ui.ready && html`<${Button} label="Analysis" on=${isOpen} act=${turn} />`
     }
   </div>`;
 }
 
-/** What light is under the pointer, and which lights make it up; else what the tool does.
+/** The light under the pointer and the lights that contribute to it, or else the tool's hint.
  * @param {{ui: Ui}} props */
 export function PointerStatus({ ui }) {
   if (ui.pointing) {

@@ -7,7 +7,7 @@ import { MIN_BRUSH_SIZE, MAX_BRUSH_SIZE, distinctPaints } from './tools.js';
 /** @typedef {import("./tools.js").Paint} Paint */
 /** @typedef {import("./engine_interface.js").RGB} RGB */
 
-/** Where it lies. What was kept by an older page, or by somebody else, is looked at before it counts. */
+/** Storage key. Values of an older page, or of other code, are validated before use. */
 const [FOLDS_KEY, TOOL_KEY] = ['lightpaint.open', 'lightpaint.hand'];
 
 /** @param {string} key @returns {Record<string, unknown>} */
@@ -25,17 +25,17 @@ function write(key, value) {
   try {
     localStorage.setItem(key, JSON.stringify(value));
   } catch {
-    // Private windows, and frames of some notebooks, keep nothing.
+    // Private windows and frames of some notebooks store nothing.
   }
 }
 
-/** What was unfolded the last time. @returns {Record<string, boolean>} */
+/** Return the panels that were open last time. @returns {Record<string, boolean>} */
 export function storedFolds() {
   const folds = Object.entries(read(FOLDS_KEY)).filter(([, value]) => typeof value === 'boolean');
   return /** @type {Record<string, boolean>} */ (Object.fromEntries(folds));
 }
 
-/** What the hand had the last time, of that what is sound.
+/** Return the valid tool settings of the last time.
  * @returns {Partial<Ui>} the size as it is kept: as a part of the picture's height, in `share` */
 export function storedTool() {
   const stored = read(TOOL_KEY);
@@ -51,13 +51,13 @@ export function storedTool() {
   };
 }
 
-/** Colours that were used lately. @param {Record<string, unknown>} kept @returns {Paint[]} */
+/** Return the recent colours. @param {Record<string, unknown>} kept @returns {Paint[]} */
 function recentPaints({ recent }) {
   const all = Array.isArray(recent) ? recent.map(validPaint) : [];
   return distinctPaints(/** @type {Paint[]} */ (all.filter((one) => one !== null)));
 }
 
-/** The size of the brush in a picture of a height: what it was in another one, else a seventh.
+/** Return the brush size for a picture of a height: scaled from the last one, else a seventh.
  * @param {number} height in pixels */
 export function storedBrushSize(height) {
   const { share } = read(TOOL_KEY);
@@ -78,20 +78,20 @@ function validPaint(kept) {
 /** @param {unknown} x @param {number} least @param {number} most */
 const isWithin = (x, least, most) => typeof x === 'number' && x >= least && x <= most;
 
-/** Keep it from now on. @param {UiStore} store @returns {() => void} what ends it */
+/** Store the state from now on. @param {UiStore} store @returns {() => void} what ends it */
 export function storeChanges(store) {
   let last = store.value;
   return store.listen(() => {
     const before = last;
     last = store.value;
     if (last.open !== before.open) write(FOLDS_KEY, last.open);
-    // The hand that a page begins with is what was read, maybe long before there is a scene.
+    // A page starts with the tool that was read, maybe long before the scene is loaded.
     if (!last.state || !before.state) return;
     if (STORED_FIELDS.some((key) => last[key] !== before[key])) write(TOOL_KEY, storedFields(last));
   });
 }
 
-/** What the hand has. @type {(keyof Ui)[]} */
+/** Tool settings that are stored. @type {(keyof Ui)[]} */
 const STORED_FIELDS = [
   'colour',
   'stops',
@@ -103,7 +103,7 @@ const STORED_FIELDS = [
   'size',
 ];
 
-/** What is in the hand; and what was used lately, also in a painter that is open beside this one.
+/** Store the tool settings and the recent colours, merged with those of other open painters.
  * @param {Ui} ui */
 function storedFields({
   colour,

@@ -7,8 +7,8 @@ import { paneAt } from './pointer_input.js';
 /** @typedef {import('./ui_state.js').UiStore} UiStore */
 
 /**
- * The brush at a place, or where it was: one ring under the pointer, a fainter one at the same place
- * of the other picture.
+ * Draw the brush at a place, or at its last one: a ring under the pointer, and a fainter one at the
+ * same place in the other picture.
  * @param {HTMLElement | null} rings @param {Engine} engine @param {Ui} ui
  * @param {number} [x] @param {number} [y]
  */
@@ -20,7 +20,7 @@ export function ring(
   y = Number(rings?.dataset.y),
 ) {
   if (!rings || !Number.isFinite(x)) return;
-  // What changes while no pointer is there brings no brush back.
+  // Changes while no pointer is there do not show the brush again.
   if (rings.hidden && x === Number(rings.dataset.x) && y === Number(rings.dataset.y)) return;
   rings.dataset.x = String(x);
   rings.dataset.y = String(y);
@@ -46,14 +46,14 @@ function place(element, x, y, size, hardness) {
   element.style.setProperty('--hard', String(hardness));
 }
 
-/** Where a pointer is, of which is said in the next frame what lies there.
+/** Pointer places to report in the next frame.
  * @type {WeakMap<UiStore, {x: number, y: number, frame: number}>} */
 const waiting = new WeakMap();
 
-/** Where pointers rest. @type {WeakMap<UiStore, {x: number, y: number}>} */
+/** Last place of the pointer. @type {WeakMap<UiStore, {x: number, y: number}>} */
 const last = new WeakMap();
 
-/** Say what is under the pointer, once a frame. @param {Engine} engine @param {UiStore} store
+/** Report what is under the pointer, once per frame. @param {Engine} engine @param {UiStore} store
  * @param {number} x @param {number} y */
 export function point(engine, store, x, y) {
   last.set(store, { x, y });
@@ -69,7 +69,7 @@ export function point(engine, store, x, y) {
   });
 }
 
-/** The pointer is not over the pictures any more. @param {UiStore} store */
+/** The pointer has left the pictures. @param {UiStore} store */
 export function pointAway(store) {
   cancelAnimationFrame(waiting.get(store)?.frame ?? 0);
   waiting.delete(store);
@@ -77,7 +77,7 @@ export function pointAway(store) {
   store.set({ pointed: null });
 }
 
-/** The pictures have changed below a pointer that rests. @param {Engine} engine
+/** The pictures have changed under a resting pointer. @param {Engine} engine
  * @param {UiStore} store */
 export function pointAgain(engine, store) {
   const place = last.get(store);

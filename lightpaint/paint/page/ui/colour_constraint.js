@@ -14,7 +14,7 @@ const COLOURS = [
   { value: 'primaries', label: 'LED mix' },
 ];
 
-/** What is asked of a light's colour. @param {Constraints} asked */
+/** Return the kind of colour constraint of a light. @param {Constraints} asked */
 export const colourOf = (asked) =>
   ['color', 'kelvin', 'primaries'].find((key) => asked[key] !== undefined) ?? 'any';
 

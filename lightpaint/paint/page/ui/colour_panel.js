@@ -11,7 +11,7 @@ import { paintOf } from './ui_state.js';
 /** @typedef {import("./ui_state.js").RGB} RGB */
 /** @typedef {import("./shortcuts.js").App} App */
 
-/** Warm is right: as on the sliders, and where somebody asks by a drag. */
+/** Warm is right, as on the sliders and in an adjusting drag. */
 const WHITES = [9000, 6500, 5600, 4300, 3200, 2700, 1900];
 const GELS = [
   ['Red', '#ff2a1a'],
@@ -49,7 +49,7 @@ export function ColourPanel({ ui, app }) {
   </div>`;
 }
 
-/** What the pictures show of the paint in the hand, on white. @param {Ui} ui @param {App} app */
+/** Return the display colour of the current paint on white. @param {Ui} ui @param {App} app */
 export function shownAs(ui, { engine }) {
   return `rgb(${engine.codes(paintOf(ui), ui.show.stops).join(' ')})`;
 }
@@ -76,7 +76,7 @@ function Hex({ colour, set }) {
 
 /** @param {{colour: RGB, set: (colour: RGB) => void}} props */
 function White({ colour, set }) {
-  // Of what is no white, the last one stays on the dials; black keeps them, too.
+  // For colours that are not white, and for black, the dials keep the last white.
   const [last, setLast] = useState({ kelvin: 3200, green: 0 });
   const found = toKelvin(colour);
   const isLast = same(ofKelvin(last.kelvin, last.green), colour);
@@ -100,7 +100,7 @@ function White({ colour, set }) {
       change=${(/** @type {number} */ made) => dial({ green: made })} /></div>`;
 }
 
-/** Up to how bright they are. @param {RGB} a @param {RGB} b */
+/** Return whether two colours differ at most in brightness. @param {RGB} a @param {RGB} b */
 function same(a, b) {
   const [m, n] = [Math.max(...a), Math.max(...b)];
   return n > 0 && a.every((x, c) => Math.abs(x / m - b[c] / n) < 1e-4);
@@ -110,7 +110,7 @@ function same(a, b) {
 function Hsv({ colour, set }) {
   const now = toHsv(colour);
   const [kept, keep] = useState(now);
-  // Grey has no hue, and black no saturation: those on the sliders stay.
+  // Grey has no hue and black no saturation; the sliders keep theirs.
   const hue = now[1] > 0.004 && now[2] > 0 ? now[0] : kept[0];
   const hsv = /** @type {RGB} */ ([hue, now[2] > 0 ? now[1] : kept[1], now[2]]);
   const to = (/** @type {number} */ at, /** @type {number} */ value) => {
@@ -164,7 +164,7 @@ function Swatches({ ui, app }) {
   </div>`;
 }
 
-/** A colour, and its brightness where that goes along.
+/** A colour, with its brightness if that is part of it.
  * @param {{rgb: RGB, tip: string, stops?: string, act: () => void}} props */
 function Swatch({ rgb, tip, stops, act }) {
   return html`<button type="button" class="swatch" aria-label=${tip} data-tip=${tip}

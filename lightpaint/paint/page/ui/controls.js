@@ -1,12 +1,13 @@
-/** The controls that panels are made of. All are labelled, and work by keyboard and by touch. */
+/** The controls that panels are made of. All have labels and work by keyboard and touch. */
 
 import { slideByTouch } from '../../../viewer/touch.js';
 import { html, useLayoutEffect, useRef, useState } from '../vendor/preact.js';
 import { asTyped } from './format.js';
 import { Icon } from './icons.js';
 
-/** What is being typed in a field, null for nothing; and how it is now, for whoever hears of the
- * field before it is drawn anew: what is given up by Escape is not taken when the field goes.
+/** The text being typed in a field, null if none, as state and as a ref. Event handlers read the
+ * ref before the next render, so that text cancelled by Escape is not taken when the field loses
+ * focus.
  * @returns {[string | null, (text: string | null) => void, {current: string | null}]} */
 export function useTyped() {
   const [typed, set] = useState(/** @type {string | null} */ (null));
@@ -44,7 +45,7 @@ export function Button({ icon, label, tip, keys, on, disabled, primary, act, cla
 }
 
 /**
- * One of a few, all of them seen.
+ * A choice of one among a few visible options.
  * @param {{label: string, value: any, choices: {value: any, label: string, icon?: string,
  *   tip?: string, keys?: string, disabled?: boolean}[], change: (value: any) => void,
  *   icons?: boolean}} props
@@ -60,11 +61,11 @@ export function Choice({ label, value, choices, change, icons }) {
   </div>`;
 }
 
-/** Characters that a field or a list has room for in any panel. */
+/** Characters that fit into a field or a list in any panel. */
 const FITS = 12;
 
 /**
- * One of many. What may have no room in it is in its tip as well.
+ * A choice of one among many. Its tip repeats text that may not fit.
  * @param {{label: string, value: string, choices: {value: string, label: string}[],
  *   change: (value: string) => void, hidden?: boolean, tip?: string}} props
  */
@@ -94,9 +95,9 @@ export function Check({ label, on, change, tip, disabled }) {
 }
 
 /**
- * A number that is typed: taken on Enter or when it is left, given up by Escape, stepped by the
- * arrow keys. digits: after the point; figures: of the number, instead. start: from where the keys
- * go up where it is empty.
+ * A typed number: taken on Enter or when the field loses focus, cancelled by Escape, stepped by the
+ * arrow keys. digits: after the point; figures: significant digits, instead. start: value from
+ * which the keys step in an empty field.
  * @param {{label: string, value: number | null, change: (value: number | null) => void,
  *   least?: number, most?: number, step?: number, digits?: number, figures?: number, unit?: string,
  *   start?: number, hidden?: boolean, empty?: string, disabled?: boolean, tip?: string}} props
@@ -108,7 +109,7 @@ export function NumberField(props) {
   const round = (/** @type {number} */ x) =>
     Number(figures ? x.toPrecision(figures) : x.toFixed(digits));
   const shown = typed ?? (value === null ? '' : String(round(value)));
-  // What is shown is what is taken.
+  // Take the number as shown.
   const within = (/** @type {number} */ x) => Math.min(most, Math.max(least, round(x)));
   const take = (/** @type {string} */ text) => {
     setTyped(null);
@@ -124,7 +125,7 @@ export function NumberField(props) {
     if (!way) return;
     event.preventDefault();
     setTyped(null);
-    if (!shown && way < 0) return; // less than nothing there is not
+    if (!shown && way < 0) return; // no negative amounts
     const from = shown ? Number(asTyped(shown)) || 0 : start;
     change(within(from + way * step * (event.shiftKey ? 10 : 1)));
   };
@@ -139,9 +140,8 @@ export function NumberField(props) {
 }
 
 /**
- * A slider with its number beside it. `change(value, done)`: done is false while it moves.
- * `curve` bends the way between the ends: a value to a place and back. Where it falls, the greatest
- * value is left.
+ * A slider with its number beside it. `change(value, done)`: done is false while it moves. `curve`
+ * maps a value to a place and back; if it decreases, the greatest value is left.
  * @param {{label: string, value: number, least: number, most: number, step?: number, unit?: string,
  *   digits?: number, change: (value: number, done: boolean) => void, track?: string, rest?: number,
  *   curve?: {to: (x: number) => number, of: (t: number) => number}, text?: string, plain?: boolean,
@@ -193,8 +193,8 @@ export function Slider(props) {
 }
 
 /**
- * Text that may have no room where it stands: where it is longer than so many characters all of it
- * is in its tip, which the keyboard reaches.
+ * Text that may be truncated: if it is longer than a number of characters, its tip has all of it,
+ * also for the keyboard.
  * @param {{text: string, most: number, class?: string, tag?: string}} props
  */
 export function TruncatedText({ text, most, class: name, tag: Tag = 'span' }) {
@@ -204,7 +204,7 @@ export function TruncatedText({ text, most, class: name, tag: Tag = 'span' }) {
 }
 
 /**
- * A part of the side that folds. Whether it is open is kept by the caller.
+ * A collapsible section of the side bar. The caller keeps whether it is open.
  * @param {{title: string, open: boolean, toggle: () => void, children?: any, extra?: any,
  *   class?: string}} props
  */
@@ -221,7 +221,7 @@ export function Fold({ title, open, toggle, children, extra, class: name }) {
 }
 
 /**
- * Have a part of the painter seen, once it is there; maybe with the focus.
+ * Scroll a part of the painter into view once it exists, and optionally focus it.
  * @param {HTMLElement} beside whatever in the same painter @param {string} name @param {boolean} [isFocused]
  */
 export function reveal(beside, name, isFocused = false) {
@@ -233,12 +233,12 @@ export function reveal(beside, name, isFocused = false) {
   });
 }
 
-/** Pixels below which what is seen of a painter is too low for a window. */
+/** Height in pixels below which the visible part of a painter is too low for a dialog. */
 const LOW = 300;
 
 /**
- * Have a window lie over what is seen of the painter. The middle of the frame may be nowhere near:
- * VS Code shows all outputs of a notebook in one that is as high as all of them together.
+ * Place a dialog over the visible part of the painter. The centre of the frame may be far away: VS
+ * Code shows all outputs of a notebook in one frame, as high as all of them together.
  * @param {HTMLElement} element
  */
 function placeOver(element) {
@@ -255,13 +255,13 @@ function placeOver(element) {
 }
 
 /**
- * A window over the painter that keeps the focus until it is closed; Escape closes it.
+ * A dialog over the painter that keeps the focus until it is closed; Escape closes it.
  * @param {{title: string, close: () => void, children?: any, class?: string}} props
  */
 export function Dialog({ title, close, children, class: name }) {
   const ref = useRef(/** @type {HTMLDialogElement | null} */ (null));
   const id = useId();
-  // At once: the next key is Escape, maybe.
+  // At once, since the next key may be Escape.
   useLayoutEffect(() => {
     const element = ref.current;
     const before = /** @type {HTMLElement | null} */ (

@@ -99,7 +99,7 @@ function CommandLine({ text, app }) {
   </div>`;
 }
 
-/** Says by itself that it has copied.
+/** A button that copies, and confirms it in its label.
  * @param {{text: string, app: App, label?: string, tip?: string}} props */
 function CopyButton({ text, app, label, tip }) {
   const [isDone, setDone] = useState(false);
@@ -108,7 +108,7 @@ function CopyButton({ text, app, label, tip }) {
       await navigator.clipboard.writeText(text);
       setDone(true);
     } catch {
-      // Browsers let pages copy that come from this machine, or by https.
+      // Browsers allow copying only to pages from this machine or over https.
       app.session.toast('This browser does not let the page copy. Select the text instead.');
     }
   };

@@ -11,9 +11,9 @@
 /** @typedef {{kind: string, reply?: number, arrays?: Record<string, Picture>, [field: string]: any}} Message */
 
 /**
- * The session, wherever it is: behind a socket, or a notebook's model.
- * `on` hears messages of a kind, asked for or not, and "connection" with
- * {state: "open" | "lost" | "stale"}, and "silence" with {isSilent}. `send` is answered by the reply.
+ * The link to the session, through a socket or a notebook's model. `on` hears messages of a kind,
+ * asked for or not, and "connection" with {state: "open" | "lost" | "stale"}, and "silence" with
+ * {isSilent}. `send` is answered by the reply.
  * @typedef {object} Host
  * @property {<K extends keyof Requests>(kind: K, fields?: Requests[K],
  *   arrays?: Record<string, Picture>) => Promise<Message>} send
@@ -25,8 +25,8 @@
 /** @typedef {"painting" | "solution" | "other" | "verified" | "present"} Kind */
 
 /**
- * What is drawn, and how. `gains`: which lights are heard, by solo and mute; null for all.
- * `instead`, `other`: weights that "solution" and "other" are shown with; null for the answer's.
+ * What is drawn, and how. `gains`: factors of the lights by solo and mute; null for all. `instead`,
+ * `other`: weights for "solution" and "other"; null for the answer's.
  * @typedef {object} Show
  * @property {Kind} left
  * @property {Kind} right
@@ -47,9 +47,8 @@
 /** @typedef {"brush" | "eraser" | "weight" | "pick" | "fill" | "line" | "adjust"} Tool */
 
 /**
- * The tool in the hand. `rgb`: linear light of the colour, its stops included. `size`: diameter in
- * pixels of the picture. `importance`: how many times as much as before counts what the importance
- * brush goes over.
+ * The tool in the hand. `rgb`: linear light of the colour, including its stops. `size`: diameter in
+ * pixels of the picture. `importance`: factor of the importance brush.
  * @typedef {object} ToolSettings
  * @property {Tool} tool
  * @property {RGB} rgb
@@ -66,8 +65,8 @@
  *   height: number, left: number, top: number, scale: number}} Pane */
 
 /**
- * What is under the pointer. `object`: its name, `index`: its number, -1 for none. `shares`: of
- * each light in the answer's light there. `light`: that of the picture that is pointed at.
+ * What is under the pointer. `object`: its name; `index`: its number, -1 for none. `shares`: each
+ * light's share of the answer there. `light`: light of the picture under the pointer.
  * @typedef {{object: string | null, index: number, shares: number[], light: RGB,
  *   paint: RGB}} Pointed paint: what to paint with, as the hand does, to have that light there */
 /** Numbers of objects, (height, width).

@@ -15,7 +15,7 @@ export function number(value, digits = 3) {
   return text.replace('-', MINUS);
 }
 
-/** A number as it is typed, with the minus and the comma that people may write.
+/** Parse a typed number, which may have a true minus sign and a decimal comma.
  * @param {string} text */
 export const asTyped = (text) => text.trim().replace(MINUS, '-').replace(',', '.');
 
@@ -32,7 +32,7 @@ export function stopsText(stops) {
   return Math.abs(stops) < 0.05 ? 'as now' : `${signed(stops)} st`;
 }
 
-/** How far something is, and how long it still takes: of all that goes on it is said so.
+/** Return progress and remaining time as text, in one form for all tasks.
  * @param {{done: number, total: number, left_s?: number}} progress */
 export function progressText({ done, total, left_s: left }) {
   if (!total) return '';
@@ -40,7 +40,7 @@ export function progressText({ done, total, left_s: left }) {
   return left === undefined ? share : `${share}, ${timeText(left)} left`;
 }
 
-/** No finer than it can be foretold. @param {number} seconds */
+/** Rounded to the precision of the estimate. @param {number} seconds */
 function timeText(seconds) {
   if (seconds < 60)
     return `${Math.max(1, seconds < 10 ? Math.round(seconds) : 5 * Math.round(seconds / 5))} s`;
@@ -55,30 +55,30 @@ export function percent(share) {
   return `${Math.round(value)} %`;
 }
 
-/** No finer than an eye tells them apart. @param {number} kelvin @returns {string} */
+/** Rounded to what an eye can distinguish. @param {number} kelvin @returns {string} */
 const kelvinText = (kelvin) => {
   const step = kelvin < 4000 ? 10 : kelvin < 8000 ? 50 : 500;
   return `${Math.round(kelvin / step) * step} K`;
 };
 
-/** How far from that line, in the same thousandths, a white is seen to be green or pink: what lamps
- * are sold as white is nearer. */
+/** Distance from Planck's locus, in thousandths, beyond which a white looks green or pink. Lamps
+ * that are sold as white are nearer. */
 const TINTED = 6;
 
-/** A white by its kelvin, and its tint where it has one. @param {number} kelvin
+/** Return a white as kelvin, with its tint if it has one. @param {number} kelvin
  * @param {number} green as of `toKelvin` */
 export const whiteText = (kelvin, green) =>
   kelvinText(kelvin) + (Math.abs(green) < TINTED ? '' : green > 0 ? ' green' : ' pink');
 
-/** How far from a white's line, in thousandths of (u, v), light is called by its kelvin. */
+/** Distance from Planck's locus, in thousandths of (u, v), up to which light has a colour
+ * temperature. */
 const WHITE = 20;
 
-/** Light as it is spoken of: stops from what is shown as white, and kelvin where it is a white;
- * nothing where there is none.
+/** Return light as text: stops from display white, and kelvin if it is a white; empty for no light.
  * @param {number[]} rgb linear, the exposure included @returns {string} */
 export const lightText = (rgb) => spoken(rgb, luminance(rgb));
 
-/** Paint, as its panel speaks of it: its stops are those of its largest channel.
+/** Return paint as text, as in its panel: its stops are those of its largest channel.
  * @param {number[]} rgb linear, the exposure included @returns {string} */
 export const paintText = (rgb) => spoken(rgb, Math.max(...rgb));
 
@@ -90,8 +90,8 @@ function spoken(rgb, level) {
   return `${signed(Math.log2(level))} st${isWhite ? ` · ${whiteText(found.kelvin, found.green)}` : ''}`;
 }
 
-/** A name of at most so many characters, without its middle: names of many lights differ at their
- * ends. @param {string} name @param {number} most */
+/** Return a name shortened in the middle, since names of many lights differ at their ends.
+ * @param {string} name @param {number} most */
 export function shortened(name, most) {
   if (name.length <= most) return name;
   const end = Math.ceil((most - 1) / 2);
@@ -101,10 +101,10 @@ export function shortened(name, most) {
 /** @param {number} count @param {string} one @param {string} [many] @returns {string} */
 export const counted = (count, one, many = `${one}s`) => `${count} ${count === 1 ? one : many}`;
 
-/** A file as it is called in its folder. @param {string} file @param {string} folder */
+/** Return the name of a file without its folder. @param {string} file @param {string} folder */
 export function within(file, folder) {
   return file.startsWith(folder) ? file.slice(folder.length).replace(/^[/\\]+/, '') : file;
 }
 
-/** A sentence whose numbers stay on the lines of their units. @param {string} text */
+/** Return a sentence with no-break spaces between numbers and units. @param {string} text */
 export const unbroken = (text) => text.replace(/(\d) (?=%)|(ΔE) (?=\d)/g, '$1$2\u00a0');

@@ -14,7 +14,7 @@ const MIRED = {
   of: (/** @type {number} */ t) => Math.round(1e6 / t / 50) * 50,
 };
 
-/** What a track is painted with. @param {RGB[]} colours */
+/** Return the CSS gradient of the track. @param {RGB[]} colours */
 export const gradient = (colours) => `linear-gradient(to right, ${colours.map(toHex).join(', ')})`;
 
 const TRACK = gradient(

@@ -32,24 +32,24 @@ export function isTyping(event) {
   return ['TEXTAREA', 'SELECT'].includes(tagName) || element.isContentEditable;
 }
 
-/** Whether a key is pressed among numbers that are being put in: on a button between them, too, it
- * is none of the pictures'. @param {KeyboardEvent} event */
+/** Return whether a key is pressed in a group of number fields; there, even a button between them,
+ * it is no shortcut of the pictures. @param {KeyboardEvent} event */
 function isAmongNumbers(event) {
   const element = /** @type {HTMLElement} */ (event.composedPath()[0]);
   return event.key.length === 1 && !isMod(event) && Boolean(element.closest?.('[data-numbers]'));
 }
 
-/** What takes back steps of the session, also from a field in which nothing is typed any more. */
+/** Keys of undo and redo, which also work in a field without uncommitted text. */
 const HISTORY_KEYS = ['mod+z', 'mod+shift+z'];
 
-/** Whether a field has taken what was typed in it: there is no text to take back, but what that has
- * changed. @param {KeyboardEvent} event in that field */
+/** Return whether a field's text is committed. Then undo applies to the session, not to the text.
+ * @param {KeyboardEvent} event in that field */
 function isTaken(event) {
   const field = /** @type {HTMLElement} */ (event.composedPath()[0]);
   return field.dataset?.typed === 'no';
 }
 
-/** Have what is typed in a field taken, before something is done with it.
+/** Commit the text of the focused field before an action uses it.
  * @param {KeyboardEvent} event in that field */
 function commit(event) {
   const field = /** @type {HTMLElement} */ (event.composedPath()[0]);
@@ -58,7 +58,7 @@ function commit(event) {
 }
 
 /**
- * What a key does, if it does anything here.
+ * Return the shortcut of a key, if there is one here.
  * @param {KeyboardEvent} event @param {App} app
  */
 export function handleKey(event, app) {
@@ -66,7 +66,7 @@ export function handleKey(event, app) {
   if (event.defaultPrevented || isAlt) return;
   const name = shortcutOf(event);
   const isIn = isTyping(event) || isAmongNumbers(event);
-  // A page is no file that anybody keeps, and nothing of it but fields has text to be marked.
+  // Suppress saving the page and selecting all, except in text fields.
   if (name === 'mod+s' || (name === 'mod+a' && !isIn)) event.preventDefault();
   if (app.store.value.dialog) return;
   if (name === 'mod+s' && isIn) commit(event);
@@ -79,13 +79,12 @@ export function handleKey(event, app) {
   if (name !== 'escape') event.preventDefault();
 }
 
-/** With Ctrl or ⌘, what changes the cells of a notebook: cut, paste, redo, run. */
+/** Keys that change a notebook's cells with Ctrl or ⌘: cut, paste, redo, run. */
 const CELL_KEYS = ['x', 'v', 'y', 'enter'];
 
 /**
- * Whether a key is the painter's alone, where it is one thing among others. By a letter or by
- * Delete a notebook makes and deletes cells; what opens something around the painter, function keys
- * and most of what has Ctrl or ⌘, does so from here, too.
+ * Return whether to keep a key from the notebook. Letters and Delete would create and delete cells.
+ * Function keys and most keys with Ctrl or ⌘ pass through.
  * @param {KeyboardEvent} event that `press` has seen
  */
 function belongsToPainter(event) {
@@ -95,7 +94,7 @@ function belongsToPainter(event) {
 }
 
 /**
- * The keys of a painter that is one thing among others: nobody else hears them.
+ * Handle the keys of a painter in a notebook, and keep them from the notebook.
  * @param {HTMLElement} root @param {App} app @param {AbortSignal} signal ends it
  */
 export function listenWithin(root, app, signal) {
@@ -103,9 +102,9 @@ export function listenWithin(root, app, signal) {
     handleKey(event, app);
     if (belongsToPainter(event)) event.stopPropagation();
   };
-  root.tabIndex = -1; // wherever in it somebody clicks
+  root.tabIndex = -1; // after a click anywhere in it
   root.addEventListener('keydown', handle, { signal });
-  // What had the focus may be gone, a window or a button with nothing left to do; then nothing has.
+  // If the focused element disappears (a dialog, a disabled button), nothing has the focus.
   let isHere = false;
   const noteFocus = (/** @type {Event} */ event) => {
     isHere = event.composedPath().includes(root);

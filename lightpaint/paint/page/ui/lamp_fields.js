@@ -7,7 +7,7 @@ import { placeOf } from './lamp_marks.js';
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-/** What a click does to a light, by name. */
+/** Labels of what the next click does to a light. */
 const WAYS = /** @type {const} */ ({
   aim: { label: 'Aim here', tip: 'Click a surface: the light points there' },
   highlight: {
@@ -20,7 +20,7 @@ const WAYS = /** @type {const} */ ({
   },
 });
 
-/** What is to be clicked next. @param {import("./ui_state.js").Pointing} pointing
+/** Hint on what to click next. @param {import("./ui_state.js").Pointing} pointing
  * @param {Ui["lights"]} lights */
 export function pointingHint(pointing, lights) {
   if (pointing.how === 'hang')
@@ -34,7 +34,7 @@ export function pointingHint(pointing, lights) {
     : `Click the edge of what casts the shadow of ${name}. Esc cancels.`;
 }
 
-/** A click on a picture while a light is pointed. @param {App} app
+/** Handle a click on a picture in a pointing mode. @param {App} app
  * @param {{x: number, y: number} | null} point in pixels of the picture */
 export function pointLamp(app, point) {
   const { pointing, view } = app.store.value;

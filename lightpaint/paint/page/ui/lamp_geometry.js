@@ -1,9 +1,9 @@
-/** Where points of the scene are seen, and which points a pointer means: rays of a camera. */
+/** Projection of scene points to the picture, and from a pointer back to the scene. */
 
 /** @typedef {import("../engine/messages.js").Camera} Camera */
 /** @typedef {[number, number, number]} Vector */
 
-/** Rays that come this near to a plane's own directions (sine of the angle) do not meet it well. */
+/** Sine of the angle between ray and plane below which their intersection is too uncertain. */
 const GRAZING = 0.04;
 
 /** @param {number[]} a @param {number[]} b */
@@ -28,7 +28,8 @@ export function unit(a) {
   return [a[0] / length, a[1] / length, a[2] / length];
 }
 
-/** How much of each of three vectors makes up a fourth. @param {number[]} a @param {number[]} b
+/** Return the coefficients of a vector in a basis of three others. @param {number[]} a
+ * @param {number[]} b
  * @param {number[]} c @param {number[]} v @returns {Vector} */
 function parts(a, b, c, v) {
   const whole = dot(a, cross(b, c));
@@ -40,8 +41,8 @@ function parts(a, b, c, v) {
 }
 
 /**
- * Return where a point is seen, in pixels of the picture, and whether it is before the camera. Of
- * one behind it the place is that of the opposite direction.
+ * Return a point's place in pixels of the picture, and whether it is in front of the camera. For a
+ * point behind it, the place is that of the opposite direction.
  * @param {Camera} camera @param {number[]} point @returns {{x: number, y: number, isAhead: boolean}}
  */
 export function seenAt(camera, point) {
@@ -62,7 +63,7 @@ export function seenTowards(camera, direction) {
   return seenAt(camera, plus(camera.origin, unit(direction), far));
 }
 
-/** The ray of a pixel. @param {Camera} camera @param {number} x @param {number} y
+/** Return the camera ray of a pixel. @param {Camera} camera @param {number} x @param {number} y
  * @returns {{origin: Vector, way: Vector}} */
 export function rayAt({ origin, across, down, ahead, is_parallel: isParallel }, x, y) {
   const shifted = plus(plus([0, 0, 0], across, x), down, y);
@@ -72,8 +73,8 @@ export function rayAt({ origin, across, down, ahead, is_parallel: isParallel }, 
 }
 
 /**
- * Return the place to which a pointer drags a light in its horizontal plane. Where the plane is seen
- * from its side, the light moves along the picture instead, at its distance.
+ * Return the place to which a pointer drags a light in its horizontal plane. If the plane is seen
+ * edge-on, the light moves parallel to the picture instead, at its distance.
  * @param {Camera} camera @param {number[]} place of the light @param {number} up axis
  * @param {number} x @param {number} y in pixels of the picture @returns {Vector}
  */
@@ -115,8 +116,7 @@ export function onRail(camera, [start, end], x, y) {
 }
 
 /**
- * Return a place within a rectangle, for one that may be outside: on the edge, in its direction from
- * the middle.
+ * Return a place clamped to a rectangle, along the line to its centre.
  * @param {{x: number, y: number, isAhead: boolean}} seen
  * @param {{left: number, top: number, right: number, bottom: number}} box
  * @returns {{x: number, y: number, isInside: boolean, angle: number}} angle: in radians, outwards

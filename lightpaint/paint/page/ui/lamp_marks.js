@@ -21,10 +21,10 @@ import { atFull, luminance } from './paint_colour.js';
 /** @typedef {import("../engine/messages.js").Camera} Camera */
 /** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
 
-/** CSS pixels between a mark at the edge and the edge. */
+/** CSS pixels between the edge and a mark of a light outside the picture. */
 const MARGIN = 14;
 
-/** Length of the arrow of a place on trial, as a part of the room. */
+/** Length of the arrow at a trial place, relative to the room. */
 const ARROW = 0.06;
 
 /** @param {{ui: Ui, app: App, panes: Pane[]}} props */
@@ -38,14 +38,14 @@ export function LampMarks({ ui, app, panes }) {
     )}</div>`;
 }
 
-/** Panes that lie beside each other; of those over each other the first. @param {Pane[]} panes */
+/** Return the panes side by side; of overlapping ones the first. @param {Pane[]} panes */
 function apart(panes) {
   return panes.filter(
     (pane, k) => panes.findIndex((x) => x.left === pane.left && x.top === pane.top) === k,
   );
 }
 
-/** The part of a pane in which its picture is seen. @param {Pane} pane @param {[number, number]} size
+/** Return the visible part of a pane's picture. @param {Pane} pane @param {[number, number]} size
  * @returns {Box} */
 function boxOf(pane, [height, width]) {
   return {
@@ -88,15 +88,15 @@ function PaneMarks({ ui, app, pane, camera, isTwin }) {
       onPage=${onPage} isTwin=${isTwin} />`}`;
 }
 
-/** Where a light is; while it is dragged, where the pointer has it. @param {Ui} ui @param {number} k
+/** Return the place of a light; during a drag, the pointer's. @param {Ui} ui @param {number} k
  * @returns {LightPlace} */
 export function placeOf({ rig, dragged }, k) {
   const place = /** @type {LightPlace} */ (rig?.lights[k]);
   return dragged?.light === k ? { ...place, ...dragged.place } : place;
 }
 
-/** Where the mark of a light belongs; that of one that is infinitely far away where its light comes
- * from. @param {Camera} camera @param {LightPlace} place */
+/** Return the place of a light's mark; for an infinitely distant light, the direction that its
+ * light comes from. @param {Camera} camera @param {LightPlace} place */
 function markAt(camera, { position, direction }) {
   if (position) return seenAt(camera, position);
   if (!direction) return null;
@@ -143,7 +143,7 @@ function Mark({ ui, app, light, place, pane, camera, at, isTwin }) {
   }} aria-label=${label} aria-pressed=${String(ui.lamp === light)} tabindex=${isTwin ? -1 : 0}
     aria-hidden=${isTwin ? 'true' : undefined} data-tip=${tip} data-lamp=${label} onClick=${choose}
     onPointerDown=${(/** @type {PointerEvent} */ event) => {
-      if (ui.pointing) return; // the click is on what is seen behind
+      if (ui.pointing) return; // the click goes to the picture behind it
       choose();
       drag.down(event, light, place);
     }} onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
@@ -176,7 +176,7 @@ function AimHandle({ ui, app, light, pane, camera, inner, onPage, isTwin }) {
     onPointerMove=${drag.move} onPointerUp=${drag.up} onPointerCancel=${drag.up}></button>`;
 }
 
-/** Places that a search tries at present. @param {{ui: Ui, camera: Camera, box: Box,
+/** The places that a search is trying. @param {{ui: Ui, camera: Camera, box: Box,
  *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
 function Trials({ ui, camera, box, onPage }) {
   if (!ui.trial) return null;
@@ -202,7 +202,7 @@ function sizeOf({ rig }) {
   return rig ? Math.hypot(...minus(rig.high, rig.low)) : 1;
 }
 
-/** Where lights hung before a search moved them. @param {{ui: Ui, camera: Camera, box: Box,
+/** The places of lights before a search moved them. @param {{ui: Ui, camera: Camera, box: Box,
  *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
 function Ghosts({ ui, camera, box, onPage }) {
   const { left, top, right, bottom } = box;
@@ -222,7 +222,7 @@ function Ghosts({ ui, camera, box, onPage }) {
     )}</svg>`;
 }
 
-/** The line from a light to what it points at. @param {{place: LightPlace, camera: Camera, box: Box,
+/** The line from a light to its target. @param {{place: LightPlace, camera: Camera, box: Box,
  *   onPage: (seen: any) => {x: number, y: number, isAhead: boolean}}} props */
 function Beam({ place, camera, box, onPage }) {
   if (!place.position || !place.target) return null;
@@ -236,7 +236,7 @@ function Beam({ place, camera, box, onPage }) {
 }
 
 /**
- * A drag of a mark, which asks for a place with every move and keeps the last one.
+ * A drag of a mark: it requests a place at every move, and keeps the last.
  * @param {App} app @param {Pane} pane
  * @param {(x: number, y: number, isShift: boolean, start: {place: LightPlace}) =>
  *   {place: Partial<LightPlace>, at?: [number, number],
@@ -264,7 +264,7 @@ function useDrag(app, pane, of) {
     const button = /** @type {HTMLElement} */ (event.currentTarget);
     button.setPointerCapture(event.pointerId);
     const { left, top, width, height } = button.getBoundingClientRect();
-    // A mark follows the pointer from where it was grasped.
+    // The mark keeps its offset from the pointer.
     const grasp = { dx: event.clientX - left - width / 2, dy: event.clientY - top - height / 2 };
     start.current = { light, place, ...grasp, isMoved: false, last: null };
   };

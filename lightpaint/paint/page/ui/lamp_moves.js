@@ -2,7 +2,7 @@
 
 /** @typedef {import("./session_controller.js").SessionController} SessionController */
 /** @typedef {Record<string, any>} Pose */
-/** What is asked of a light: a pose, or a place to point it by.
+/** A requested pose of a light, or a place to aim it by.
  * @typedef {{kind: "move", pose: Pose} | {kind: "point", how: "aim" | "highlight" | "shadow",
  *   at: [number, number], edge?: [number, number], view: number}} Asked */
 

@@ -12,24 +12,26 @@ import { asTyped, stopsText } from './format.js';
 export const DARKEST = -8;
 export const BRIGHTEST = 6;
 
-/** What a level is compared with; of a light that is off now, one unit. @param {Light} light */
+/** Return the reference of a level: the present luminance, or one unit for a light that is off.
+ * @param {Light} light */
 export const nowOf = (light) => luminance(light.present) || 1;
 
-/** Whether there is anything to be some percent of. @param {Light} light */
+/** Return whether percentages make sense, since the light is on at present. @param {Light} light */
 export const isOnNow = (light) => luminance(light.present) > 0;
 
-/** Stops from now; null for what is off. @param {RGB} rgb @param {Light} light
+/** Return stops from the present; null for off. @param {RGB} rgb @param {Light} light
  * @returns {number | null} */
 export function stopsOf(rgb, light) {
   const level = luminance(rgb);
   return level > 0 ? Math.log2(level / nowOf(light)) : null;
 }
 
-/** Stops from now below which nobody sees what colour a light has. */
+/** Stops from the present below which the colour of a light is invisible. */
 const UNSEEN = -6;
 
-/** The same colour at another level; of a light that hardly shines its own colour, which the scene
- * has: what is nearly dark may be solved to be any. @param {RGB} rgb @param {Light} light @param {number} level
+/** Return the same colour at another level. For a nearly dark light, whose solved colour is
+ * arbitrary, use its colour from the scene. @param {RGB} rgb @param {Light} light
+ * @param {number} level
  * @returns {RGB} */
 export function atLevel(rgb, light, level) {
   const isSeen = luminance(rgb) > (isOnNow(light) ? nowOf(light) * 2 ** UNSEEN : 0);
@@ -38,8 +40,8 @@ export function atLevel(rgb, light, level) {
   return /** @type {RGB} */ (base.map((x) => x * factor));
 }
 
-/** What somebody has typed: stops (`+1.5`, `-2 st`), percent of now (`80 %`), `as now`, `off`. A
- * number alone is stops where nobody can mean anything else.
+/** Parse typed text: stops (`+1.5`, `-2 st`), percent of the present (`80 %`), `as now`, `off`. A
+ * plain number means stops if it is unambiguous.
  * @param {string} text @param {Light} light @returns {number | null} a level; null for what is none */
 function levelOf(text, light) {
   const plain = asTyped(text).toLowerCase();
@@ -53,11 +55,11 @@ function levelOf(text, light) {
   return isOnNow(light) && amount >= 0 ? (nowOf(light) * amount) / 100 : null;
 }
 
-/** Stops that can be typed, up or down: with their unit, and without it, where 12 or 80 would be
- * percent as well. */
+/** Largest typed change in stops: with the unit, and without it, where 12 or 80 could also mean
+ * percent. */
 const [MOST, MOST_ALONE] = [20, 8];
 
-/** Why something is no level, and what is. @param {string} text @param {Light} light */
+/** Return why text is not a level, and what would be. @param {string} text @param {Light} light */
 function refused(text, light) {
   const plain = text.trim();
   if (!isOnNow(light))
@@ -88,7 +90,7 @@ export function Level({ light, rgb, disabled, change, say }) {
     if (event.key === 'Escape') setTyped(null);
     if (!way) return;
     event.preventDefault();
-    if (stops === null && way < 0) return; // less than off there is not
+    if (stops === null && way < 0) return; // nothing is below off
     const to = (stops ?? DARKEST) + way * (event.shiftKey ? 10 : 1);
     take(`${Math.min(MOST, Math.max(-MOST, Number(to.toFixed(1))))} st`);
   };

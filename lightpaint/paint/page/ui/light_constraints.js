@@ -92,20 +92,22 @@ function LockedLevel({ k, light, app, rgb }) {
   </div>`;
 }
 
-/** Of levels that are shown and taken: lamps are anything from 1e-5 to 1e9 units. */
+/** Significant digits of levels, which range from 1e-5 to 1e9 units. */
 const FIGURES = 6;
 
-/** What levels of a light are given in. @param {import("./ui_state.js").Light} light */
+/** Return the units that a light's level can be given in.
+ * @param {import("./ui_state.js").Light} light */
 const unitsOf = (light) => [
   { value: 'share', label: '% of now' },
   { value: 'value', label: light.unit || 'value' },
 ];
 
-/** The white that a light is held at, as bright as it is. @param {import("./light_row.js").Props} props */
+/** The white that a light is locked to, at its present brightness.
+ * @param {import("./light_row.js").Props} props */
 function LockedColour({ k, app, rgb }) {
   const level = luminance(rgb);
   const [last, setLast] = useState(/** @type {number | null} */ (null));
-  // Where it is no white, or off, what was chosen last stays on the slider.
+  // If the light is off or not white, the slider keeps the last choice.
   const kelvin = (level > 0 ? toKelvin(rgb)?.kelvin : null) ?? last ?? 3200;
   const change = (/** @type {number} */ made, /** @type {boolean} */ done) => {
     setLast(made);
@@ -123,7 +125,7 @@ function LevelLimits({ k, light, app, asked = {} }) {
   const levels = Object.values(limits);
   const canShare = isOnNow(light);
   const [chosen, setUnit] = useState(canShare ? 'share' : 'value');
-  // A lights file may have luminances, shares and colours: what is no share is shown as luminance.
+  // A lights file may have luminances, shares and colours; all but shares are shown as luminance.
   const areShares = levels.every((x) => typeof x === 'string');
   const unit = levels.length ? (areShares ? 'share' : 'value') : chosen;
   const shown = (/** @type {any} */ level) => amount(level, light, unit);
@@ -167,7 +169,7 @@ function LevelLimits({ k, light, app, asked = {} }) {
   </div>`;
 }
 
-/** A limit, as of a lights file: a luminance, a share of the present as '40%', or a colour.
+/** A limit as in a lights file: a luminance, a share of the present like '40%', or a colour.
  * @param {any} level @param {import("./ui_state.js").Light} light @param {string} unit
  * @returns {any} a number, in percent where `unit` is 'share'; null for none */
 function amount(level, light, unit) {

@@ -21,7 +21,7 @@ const SORTS = [
   { value: 'change', label: 'Most changed' },
 ];
 
-/** With more lights than these, only rows that are unfolded have their slider. */
+/** Number of lights above which only unfolded rows have a slider. */
 const MANY = 16;
 
 /** @param {{ui: Ui, app: App}} props */
@@ -52,8 +52,8 @@ export function LightList({ ui, app }) {
   </div>`;
 }
 
-/** Beside the title, where it moves no row: some lights are not shown; or of which of two looks
- * they are; or several are held. @param {{ui: Ui, app: App}} props */
+/** A note beside the title, where it moves no row: that lights are hidden, which of two looks they
+ * belong to, or that several are locked. @param {{ui: Ui, app: App}} props */
 export function LightListActions({ ui, app }) {
   const isPart = ui.solo.length > 0 || ui.mute.length > 0;
   if (ui.mix && !isPart) {
@@ -136,7 +136,7 @@ function sorted(ui, found) {
   return made;
 }
 
-/** Lights that belong together come under one name, at the place of the first of them.
+/** Group lights that belong together under one name, at the place of the first.
  * @param {Ui} ui @param {number[]} found @returns {{name: string | null, members: number[]}[]} */
 function grouped(ui, found) {
   const names = ui.lights.map((_, k) => groupOf(ui, k));
@@ -152,10 +152,10 @@ function grouped(ui, found) {
   return made;
 }
 
-/** Lights whose names begin alike that are folded together, at least. */
+/** Smallest number of lights with a common prefix that are folded together. */
 const FEWEST = 3;
 
-/** On one dimmer; of one group; or, of many lights, of names that begin alike.
+/** Return the group of a light: its dimmer, its group or, with many lights, its name's prefix.
  * @param {Ui} ui @param {number} k @returns {string | null} */
 function groupOf(ui, k) {
   const { name, group } = ui.lights[k];

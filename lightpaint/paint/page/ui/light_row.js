@@ -24,11 +24,12 @@ import { Thumbnail } from './thumbnail.js';
 
 /** @extends {Component<Props>} */
 export class LightRow extends Component {
-  /** The light as it was when its dimmer was taken in hand: on the way through the dark it keeps its
-   * colour. @type {RGB | null} */
+  /** The light at the start of a drag of its dimmer, so that it keeps its colour when it passes
+   * through off. @type {RGB | null} */
   grasped = null;
 
-  /** A pointer that moves over the picture changes few of many rows. @param {Props} next */
+  /** Skip rows that do not change: a pointer over the picture changes few of many.
+   * @param {Props} next */
   shouldComponentUpdate(next) {
     const keys = /** @type {(keyof Props)[]} */ (Object.keys({ ...this.props, ...next }));
     return keys.some((key) =>
@@ -36,7 +37,7 @@ export class LightRow extends Component {
     );
   }
 
-  /** A row that goes away under the pointer is not told that the pointer has left. */
+  /** A row removed under the pointer receives no pointerleave event. */
   componentWillUnmount() {
     const { k, app } = this.props;
     if (app.store.value.hovered === k) app.store.set({ hovered: null });
@@ -73,7 +74,7 @@ export class LightRow extends Component {
     </div>`;
   }
 
-  /** Shown or not; then, apart, what is asked of the solve. */
+  /** Buttons for the display; then, apart, those for the solve. */
   marks() {
     const { k, light, app, isSolo, isMute, asked = {} } = this.props;
     const { store, session } = app;
@@ -110,7 +111,7 @@ export class LightRow extends Component {
     const value = [white, number(level)].filter(Boolean).join(' · ');
     const error = lit?.error ?? '';
     const whole = [value, light.unit, isLive ? '' : error].filter(Boolean).join(' ');
-    // The error of the answer before keeps its room while the next one is sought.
+    // The error bar of the previous answer stays until the next one is known.
     return html`<div class=${`light-numbers ${this.props.hasSlider ? '' : 'is-two'}`}>
       <span class=${`dot ${level > 0 ? '' : 'is-off'}`} aria-hidden="true"
         style=${{ background: level > 0 ? toHex(atFull(rgb)) : 'none' }}></span>
@@ -142,12 +143,12 @@ export class LightRow extends Component {
   }
 }
 
-/** The end of a long name that is always seen, since there names of many lights differ: a space or the
- * like, and what comes after it; of names without one there, so many characters. */
+/** Return the end of a long name that always stays visible, since names of many lights differ
+ * there: from its last separator on or, without one near the end, a fixed number of characters. */
 const END = /[^\p{L}\p{N}].{4,8}$/u;
 const END_LENGTH = 9;
 
-/** On two lines, where one has no room for it; what has none on these is left out before the end.
+/** A name on up to two lines, truncated before its end.
  * @param {{name: string}} props */
 function Name({ name }) {
   const line = name.replace(/\s+/g, ' ');
@@ -168,13 +169,13 @@ function Share({ share, here }) {
     <i style=${{ '--share': String(value) }}></i><span>${percent(value)}</span></span>`;
 }
 
-/** What is worth a word, below the picture: the rows keep their height while lights change.
+/** Remarks below the picture, where they do not change the height of the row.
  * @param {{light: Light, lit?: LightAnswer, asked?: Constraints, tied?: string[]}} props */
 function Badge(props) {
   const { lit, asked = {}, tied } = props;
   const remarks = notes(props);
   if (!remarks.length) return null;
-  // What is asked of all lights, as their colours, says nothing of this one.
+  // Constraints on all lights, such as their colours, are no remark on this one.
   const isAsked = Boolean(tied ?? asked.limits ?? colourOf(asked));
   const isBack = Boolean(lit?.held) && isAsked && asked.lock === undefined && !asked.off;
   const words = remarks.map(([, text]) => `${text}.`);
@@ -191,10 +192,11 @@ function unfold(store, k) {
   }));
 }
 
-/** What colour it may have, if that is asked. @param {Constraints} asked */
+/** Return the colour constraint, if there is one. @param {Constraints} asked */
 const colourOf = ({ color, kelvin, primaries }) => color ?? kelvin ?? primaries;
 
-/** In a word, and in words. @param {{light: Light, lit?: LightAnswer, asked?: Constraints, tied?: string[]}} about
+/** Return a short and a long text for each remark.
+ * @param {{light: Light, lit?: LightAnswer, asked?: Constraints, tied?: string[]}} about
  * @returns {string[][]} */
 function notes({ light, lit, asked = {}, tied }) {
   /** @type {[unknown, string, string][]} */
@@ -213,7 +215,7 @@ function notes({ light, lit, asked = {}, tied }) {
 /** @param {number} stops */
 const clamp = (stops) => Math.min(BRIGHTEST, Math.max(DARKEST, stops));
 
-/** The same colour, so many stops from the present; at the left end it is off.
+/** Return the same colour at a number of stops from the present; the left end is off.
  * @param {RGB} rgb @param {Light} light @param {number} stops @returns {RGB} */
 function moved(rgb, light, stops) {
   return atLevel(rgb, light, stops <= DARKEST ? 0 : nowOf(light) * 2 ** stops);

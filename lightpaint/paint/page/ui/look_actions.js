@@ -6,11 +6,11 @@
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 /** @typedef {import("./shortcuts.js").App} App */
 
-/** Difference of lights, of the brightest of them, up to which two answers are the same: round-off
- * of sums in another order. */
+/** Largest difference between equal answers, relative to the brightest light: round-off of sums in
+ * another order. */
 const SAME = 1e-6;
 
-/** Keep painting and answer, as hands have left the lights, under a name that no other look has.
+/** Save painting, answer and locked lights under a new name.
  * @param {App} app */
 export function saveLook(app) {
   const { session } = app;
@@ -24,10 +24,10 @@ async function keep({ session, store }) {
   if (reply?.kind === 'looks') mark(store, Math.max(...reply.looks.map(idOf)));
 }
 
-/** Go on from a look: a step that can be undone. @param {App} app @param {number} look */
+/** Load a look, as a step that can be undone. @param {App} app @param {number} look */
 export async function loadLook({ session, store }, look) {
   const name = store.value.looks.find(({ id }) => id === look)?.name ?? null;
-  // Until it is there, the pictures are of what was there before.
+  // Until it arrives, the pictures show the earlier state.
   store.set({ comingTo: name });
   const reply = await session.send('load_look', { look });
   if (store.value.comingTo === name) store.set({ comingTo: null });
@@ -35,15 +35,15 @@ export async function loadLook({ session, store }, look) {
 }
 
 /**
- * The look that painting and answer are now: the one last kept or gone on from, while nothing has
- * changed since; else one that has the lights of the answer, as after undo.
+ * Return the look that equals the current state: the one last saved or loaded, if nothing has
+ * changed since; else one with the answer's lights, as after undo.
  * @param {Ui} ui @returns {number | null}
  */
 export function currentLook({ looks, lastLook: last, version, history, weights }) {
-  // A page that has just been opened, or is back, knows of no version.
+  // A page that has just opened or reconnected knows no version.
   const isKnown = version >= 0 && last?.version === version;
   if (last && isKnown && looks.some(({ id }) => id === last.look)) return last.look;
-  // Where its lights are held, somebody has painted on, and they are the same.
+  // If its lights are locked, they stay equal while the painting changes.
   const isPaintedOn = (/** @type {number} */ id) =>
     id === last?.look && stepsOf(history) !== last.steps;
   const found = looks.filter((one) => !isPaintedOn(one.id) && isSame(one.weights, weights));
@@ -51,8 +51,8 @@ export function currentLook({ looks, lastLook: last, version, history, weights }
 }
 
 /**
- * Of two looks that are compared the one that the answer is, too: what is said of the answer is said
- * of it. Null where neither is, or none are compared.
+ * Return which of two compared looks equals the answer, so that statements on the answer apply to
+ * it. Null if neither does, or none are compared.
  * @param {Ui} ui @returns {Look | null}
  */
 export function comparedAnswer(ui) {
@@ -62,7 +62,8 @@ export function comparedAnswer(ui) {
   return (isShown && ui.looks.find(({ id }) => id === current)) || null;
 }
 
-/** Whether the answer is not shown, since looks are compared that it is not. @param {Ui} ui */
+/** Return whether two other looks are compared, so that the answer is not visible.
+ * @param {Ui} ui */
 export const isAnswerHidden = (ui) => ui.mix !== null && !comparedAnswer(ui);
 
 /** @param {UiStore} store @param {number} look */

@@ -21,7 +21,7 @@ export function LookStrip({ ui, app }) {
   const { looks } = ui;
   const list = useRef(/** @type {HTMLElement | null} */ (null));
   const count = useRef(Infinity);
-  // What has just been kept is seen, at the end.
+  // Scroll to the look that was just saved, at the end.
   useLayoutEffect(() => {
     if (looks.length > count.current) list.current?.scrollTo({ left: list.current.scrollWidth });
     count.current = ui.ready ? looks.length : Infinity;
@@ -93,7 +93,7 @@ function LookNameField({ one, app, done }) {
     defaultValue=${one.name} value=${one.name} maxlength="60" onBlur=${take} onKeyDown=${press} />`;
 }
 
-/** The look that painting and answer are now, or else the newest, beside the one before it.
+/** Return the current look, or else the newest, and the one before it.
  * @param {Ui} ui */
 function pairOf(ui) {
   const ids = ui.looks.map((one) => one.id);
@@ -102,7 +102,7 @@ function pairOf(ui) {
   return { a: ids[at > 0 ? at - 1 : 1], b };
 }
 
-/** Two looks beside each other, and what lies between them. @param {{ui: Ui, app: App}} props */
+/** Two looks side by side, and a slider to mix them. @param {{ui: Ui, app: App}} props */
 function LookCrossfade({ ui, app }) {
   const { store } = app;
   const now = ui.mix ?? { ...pairOf(ui), share: 1 };

@@ -34,7 +34,7 @@ function stale(unheard) {
   return `This page belongs to a painter that has ended. Open the address that the terminal shows now.${lost}`;
 }
 
-/** Over the pictures; in the middle where there are none. @param {{ui: Ui, app: App}} props */
+/** A banner over the pictures; centred if there are none. @param {{ui: Ui, app: App}} props */
 export function Banner({ ui, app }) {
   const { closed, connection, isSilent } = ui;
   const banner = (/** @type {string} */ text, /** @type {any} */ more = null) =>
@@ -48,7 +48,8 @@ export function Banner({ ui, app }) {
   return null;
 }
 
-/** What can be done where the session is not. @param {{ui: Ui, app: App}} props */
+/** The button that brings the session back, if that is possible.
+ * @param {{ui: Ui, app: App}} props */
 function ReconnectButton({ ui, app }) {
   const reason = ui.closed?.reason;
   if (reason === 'taken') {
@@ -60,8 +61,8 @@ function ReconnectButton({ ui, app }) {
 }
 
 /**
- * What goes on: what somebody asked for, wherever that was; a basis that still renders; pictures that
- * still load. In short while the pointer is on a picture, of which more is said beside it.
+ * Running tasks: those that a user started, a basis that renders, and pictures that load. Short
+ * while the pointer is on a picture, since the line then describes the light there.
  * @param {{ui: Ui, app: App}} props
  */
 export function RunningTasks({ ui, app }) {
@@ -79,7 +80,8 @@ export function RunningTasks({ ui, app }) {
 /** @typedef {{name: string, progress: {done: number, total: number, left_s?: number},
  *   text?: string, stop?: () => void, stopText?: string, stopTip?: string}} Task */
 
-/** Those that are seen nowhere else; of what comes by itself one only. @param {Ui} ui
+/** Return the tasks that no panel shows, and at most one of those that start by themselves.
+ * @param {Ui} ui
  * @param {App} app @returns {Task[]} */
 function worksOf(ui, { session }) {
   const { basis, loading, writing, verifying } = ui;
@@ -117,11 +119,12 @@ function worksOf(ui, { session }) {
   return works;
 }
 
-/** How long a pointer rests before a tip is shown. */
+/** Milliseconds that a pointer rests before a tip appears. */
 const REST_MS = 500;
 
-/** One tip for all that has `data-tip`, with its keys. @param {{root: () => HTMLElement | null}}
- * props */
+/** The tip of all elements with `data-tip`, with their keys.
+ * @param {{root: () => HTMLElement | null}} props
+ * */
 export function Tips({ root }) {
   const [tip, setTip] = useState(/** @type {any} */ (null));
   const ref = useRef(/** @type {HTMLElement | null} */ (null));

@@ -7,20 +7,20 @@ import { html, useLayoutEffect, useRef } from '../vendor/preact.js';
 /** @typedef {import("./engine_interface.js").Pane} Pane */
 /** @typedef {import("./ui_state.js").Ui} Ui */
 
-/** White within the object, and dark around it, so that it is seen on whatever it lies. */
+/** White inside the object and dark around it, so that it is visible on any picture. */
 const [WITHIN, AROUND] = [
   [255, 255, 255, 255],
   [0, 0, 0, 180],
 ];
 
-/** Number of the object that a press would be about, or is; null for none. @param {Ui} ui */
+/** Index of the object that a press affects or would affect; null for none. @param {Ui} ui */
 function objectOf({ tool, about, pointed }) {
   if (!pointed) return null;
   if (tool === 'fill') return pointed.index;
   return tool === 'adjust' && about === 'object' && pointed.index >= 0 ? pointed.index : null;
 }
 
-/** Drawn anew when it is another object, or lies elsewhere, and at no other time.
+/** Redrawn only when the object or its place changes.
  * @param {{ui: Ui, engine: Engine, panes: Pane[]}} props */
 export function ObjectOutline({ ui, engine, panes }) {
   const ref = useRef(/** @type {HTMLCanvasElement | null} */ (null));
@@ -31,12 +31,12 @@ export function ObjectOutline({ ui, engine, panes }) {
   useLayoutEffect(() => {
     if (ref.current && object !== null) draw(ref.current, engine.objects(), object, panes);
   }, [object, ui.view, places.join()]);
-  // Fainter while a drag asks, so that what comes of it is seen.
+  // Fainter during a drag, so that its effect is visible.
   return html`<canvas class=${ui.asking ? 'outline is-asking' : 'outline'} ref=${ref} hidden=${object === null}
     aria-hidden="true"></canvas>`;
 }
 
-/** Nothing where no objects are known.
+/** Draw the outline, or nothing if no objects are known.
  * @param {HTMLCanvasElement} canvas @param {Objects | null} objects @param {number} object
  * @param {Pane[]} panes */
 function draw(canvas, objects, object, panes) {
@@ -61,7 +61,7 @@ function scaled(pane, ratio) {
 
 /** @typedef {[left: number, top: number, right: number, bottom: number]} Box */
 
-/** Where each object is seen, of the pictures that were asked about.
+/** Bounding boxes of objects, by picture.
  * @type {WeakMap<object, Map<number, Box>>} */
 const boxes = new WeakMap();
 
@@ -70,7 +70,7 @@ function boxOf({ data, width, height }, object) {
   let boxByObject = boxes.get(data);
   if (!boxByObject) {
     boxByObject = new Map();
-    // By runs of pixels, of which there are few: pictures have millions of pixels.
+    // As runs of pixels, which are few in a picture of millions of pixels.
     for (let y = 0, row = 0; y < height; y += 1, row += width)
       for (let x = 0, end = 0; x < width; x = end) {
         const value = data[row + x];
@@ -88,7 +88,7 @@ function boxOf({ data, width, height }, object) {
   return boxByObject.get(object);
 }
 
-/** A pane's part of the outline, a line of so many device pixels on both sides of the edge.
+/** Draw the outline in a pane, some device pixels wide on both sides of the edge.
  * @param {Objects} objects @param {number} object @param {Box} box @param {Pane} pane
  * @param {number} line @returns {{image: ImageData, x: number, y: number} | null} */
 function outlined({ data, width, height }, object, box, pane, line) {
@@ -115,7 +115,7 @@ function outlined({ data, width, height }, object, box, pane, line) {
   }
   return { image, x: x0, y: y0 };
 
-  /** Whether a device pixel shows the object, also a line's width around what is drawn. */
+  /** Return whether a device pixel shows the object, up to a line's width outside the drawing. */
   function insideOf() {
     const columns = Int32Array.from({ length: x1 - x0 + 2 * line }, (_, i) =>
       Math.floor((x0 - line + i + 0.5 - left) / scale),

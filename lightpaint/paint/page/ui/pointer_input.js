@@ -10,7 +10,7 @@ import { updateShow, rememberPaint, pickPaint } from './tools.js';
 /** @typedef {import("./engine_interface.js").Point} Point */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 
-/** A second finger makes no stroke of the first within this time, or before it has come so far. */
+/** Within this time and distance a second finger cancels the stroke of the first. */
 const SECOND_FINGER = { ms: 250, px: 24 };
 
 export class Pointer {
@@ -30,7 +30,7 @@ export class Pointer {
     /** @type {Point | null} */
     this.last = null;
     this.isSpace = false;
-    /** Whether a drag asks: what is shown of the place it asks about stays there. */
+    /** Whether a drag adjusts light: its label stays at the place that it started from. */
     this.isAsking = false;
   }
 
@@ -41,7 +41,7 @@ export class Pointer {
   }
 
   /**
-   * The place in pixels of the picture, of the pane in which the stroke began.
+   * Return the place in pixels of the picture, in the pane in which the stroke began.
    * @param {PointerEvent} event @returns {Point & {kind: import("./engine_interface.js").Kind} | null}
    */
   point(event) {
@@ -104,7 +104,7 @@ export class Pointer {
     const before = this.fingers.get(event.pointerId);
     if (this.doing === 'pinch') this.spread(event.pointerId, place);
     if (before) this.fingers.set(event.pointerId, place);
-    this.isAsking &&= this.store.value.asking !== null; // until it is given up
+    this.isAsking &&= this.store.value.asking !== null; // until it is cancelled
     if (!this.isAsking) this.moved(place.x, place.y);
     if (this.doing === 'pan' && before) {
       this.pan(place.x - before.x, place.y - before.y);
@@ -132,7 +132,7 @@ export class Pointer {
     }
   }
 
-  /** Nobody paints on what they do not see. */
+  /** Do not paint on a hidden picture. */
   canPaint() {
     const { mix, show } = this.store.value;
     const { left, right } = show;
@@ -142,7 +142,7 @@ export class Pointer {
     return isShown;
   }
 
-  /** A stroke of one place, by keys; or a line to it, from where the last one was.
+  /** Paint a dab by key, or a line from the last place to this one.
    * @param {number} x @param {number} y in CSS pixels @param {boolean} [isLine] */
   dab(x, y, isLine = false) {
     const pane = paneAt(this.engine, x, y);
@@ -166,7 +166,7 @@ export class Pointer {
     this.last = point;
   }
 
-  /** The second finger: what the first began is forgotten, or ended if it is a stroke by now.
+  /** Handle a second finger: cancel what the first began, or end it if it is a stroke already.
    * @param {PointerEvent} event */
   pinch(event) {
     if (this.doing === 'stroke') {
@@ -223,7 +223,8 @@ export class Pointer {
 /** @param {{x: number, y: number}} place @returns {[number, number]} */
 const xy = ({ x, y }) => [x, y];
 
-/** Whether nobody hears what is painted here. @param {import("./ui_state.js").Ui} ui */
+/** Return whether the session receives no strokes from here.
+ * @param {import("./ui_state.js").Ui} ui */
 const isElsewhere = ({ closed, connection }) => closed !== null || connection === 'stale';
 
 /** @param {Engine} engine @param {number} x @param {number} y */
@@ -242,6 +243,6 @@ function capture(event) {
   try {
     /** @type {HTMLElement} */ (event.currentTarget).setPointerCapture(event.pointerId);
   } catch {
-    // A pointer that has gone already has nothing to be captured.
+    // The pointer may have gone already.
   }
 }

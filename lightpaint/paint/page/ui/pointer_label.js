@@ -23,7 +23,7 @@ export function PointerLabel({ ui, engine, rings }) {
     <i style=${{ background: toHex(exposed) }}></i>${paintText(exposed) || 'no light'}</div>`;
 }
 
-/** Above the brush, where no hand lies; where there is no room, beside it. It stays within the
+/** Above the brush, where no hand covers it, or beside it without room above; always within the
  * picture. @param {HTMLElement} element @param {HTMLElement} rings @param {Engine} engine
  * @param {Ui} ui */
 function place(element, rings, engine, ui) {

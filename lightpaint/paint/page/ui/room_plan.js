@@ -1,4 +1,4 @@
-/** A small plan of the room from above, as the camera looks into it, with the lights to be dragged. */
+/** A small plan of the room from above, camera upwards, in which lights can be dragged. */
 
 import { html, useRef } from '../vendor/preact.js';
 import { AddLight } from './add_light.js';
@@ -11,16 +11,16 @@ import { atFull, luminance, toHex } from './paint_colour.js';
 /** @typedef {import("./shortcuts.js").App} App */
 /** @typedef {import("./lamp_geometry.js").Vector} Vector */
 
-/** Height of the plan, and room around it, in CSS pixels; its width follows from the panel. */
+/** Height of the plan and its margin, in CSS pixels; its width follows from the panel. */
 const [WIDTH, HEIGHT, MARGIN] = [270, 130, 10];
 
-/** Height at which a light hangs that is added in the plan, as a part of the room's. */
+/** Height of a light added in the plan, relative to the room's. */
 const HUNG = 0.85;
 
 /** Length of the arrow of a light's direction, in CSS pixels. */
 const ARROW = 16;
 
-/** Where points are in the plan: to the right and away from the camera, along the floor.
+/** Return the axes of the plan: to the right and away from the camera, along the floor.
  * @param {Ui} ui @returns {{of: (point: number[]) => [number, number],
  *   back: (x: number, y: number, height: number) => Vector, way: (v: number[]) => [number, number]} | null} */
 function planOf({ rig, view, state }) {

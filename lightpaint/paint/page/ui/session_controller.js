@@ -32,8 +32,8 @@ export class SessionController extends SessionLink {
   }
 
   /**
-   * Set a light by move: it is held there, and the others are solved around it. It is shown there
-   * at once; one message is on its way, and the newest place of the move goes with the next.
+   * Set a light by its slider and lock it there; the others are solved around it. The page shows it
+   * at once. One message is pending at a time, and the next carries the newest level.
    * @param {number} light @param {RGB} emission @param {boolean} done
    */
   lockLight(light, emission, done) {
@@ -159,7 +159,7 @@ export class SessionController extends SessionLink {
     return kind === 'tie' ? this.tieAll(fields.ties) : this.sendChange(kind, fields);
   }
 
-  /** Mark the lights in the pictures, or not. Their places are asked for when first marked. */
+  /** Show or hide the marks of lights. Their places are requested the first time. */
   toggleLamps() {
     const { lamps, rig } = this.store.value;
     this.store.set({ lamps: !lamps, pointing: null });
@@ -172,7 +172,7 @@ export class SessionController extends SessionLink {
     this.lampMoves.ask(light, { kind: 'move', pose: change }, done);
   }
 
-  /** Let the painting place the lights, or stop that. @param {boolean} [run] */
+  /** Start or stop the search for places of lights. @param {boolean} [run] */
   placeLights(run = true) {
     const { rig, lights, lamps } = this.store.value;
     if (!run) return this.send('place', { run });
@@ -209,7 +209,7 @@ export class SessionController extends SessionLink {
     return this.send('place', { run: true, new: type, count, on });
   }
 
-  /** Put a light back where the scene has it. @param {number} light */
+  /** Restore a light's place from the scene. @param {number} light */
   putBack(light) {
     this.lampMoves.ask(light, { kind: 'move', pose: {} });
   }

@@ -153,8 +153,8 @@ export class SessionLink {
     });
   }
 
-  /** What lights were before a move held them, of those that are held no more: undo does that, too.
-   * What is said while the session has not heard of the move does not count.
+  /** Forget the earlier constraints of lights that are no longer locked; undo unlocks lights, too.
+   * Messages that precede the session's receipt of the lock do not count.
    * @param {Record<string, Constraints>} asked */
   forgetUnlocked(asked) {
     for (const light of this.unlockedConstraints.keys()) {
@@ -167,7 +167,7 @@ export class SessionLink {
   /** Reset the state of a task that has ended. @param {string} kind of its request */
   taskEnded(kind) {
     this.store.set(TASK_ENDED[kind] ?? {});
-    // The overlay would request it again and again.
+    // Otherwise the overlay would request it again and again.
     const isShown = kind === 'explain' && this.store.value.show.overlay === 'beyond';
     if (isShown) updateShow(this.store, { overlay: null });
   }
@@ -179,7 +179,7 @@ export class SessionLink {
     this.toast(text, tone);
   }
 
-  /** What was written; who has closed the window is changes so. @param {any} message
+  /** Report the exported files, in a toast if the dialog is closed. @param {any} message
    * @returns {Partial<Ui>} */
   exportEnded(message) {
     const { files, is_stopped: isStopped } = message;

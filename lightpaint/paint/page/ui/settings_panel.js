@@ -36,7 +36,7 @@ const MINOR_LIGHTS = [
   { value: true, label: 'Stay', tip: 'As they are now, unless a change helps much' },
 ];
 
-/** What a choice means, in a few words. @type {Record<string, Record<string, string>>} */
+/** Short explanations of the choices. @type {Record<string, Record<string, string>>} */
 const DESCRIPTIONS = {
   space: {
     display: 'differences as the eye sees them on a display',
@@ -49,7 +49,7 @@ const DESCRIPTIONS = {
   },
 };
 
-/** Strengths to begin with; the first is what is automatic, where something is held. */
+/** Initial strengths; the first is the automatic one, if something is held. */
 const HOLD = 4;
 const PREFER_CURRENT = 0.01;
 
@@ -117,7 +117,7 @@ export function SettingsPanel({ ui, app }) {
 }
 
 /**
- * Over the panels at the side. It takes the focus, which goes back to where it was; Escape closes it.
+ * The panel over the side panels. It takes the focus and returns it when closed; Escape closes it.
  * @param {{labelledby: string, close: () => void, children?: any}} props
  */
 function Panel({ labelledby, close, children }) {
@@ -148,13 +148,13 @@ function Row({ title, says, children }) {
     <div class="row">${children}</div><p class="faint">${says}</p></section>`;
 }
 
-/** What is so, and whether that follows from the painting. @param {boolean} isAuto
+/** The present value, and whether it follows from the painting. @param {boolean} isAuto
  * @param {string | undefined} text */
 function withSource(isAuto, text = '') {
   return isAuto && text ? `Now: ${text}` : text.charAt(0).toUpperCase() + text.slice(1);
 }
 
-/** What becomes of what is not painted. @param {number | null | undefined} hold */
+/** The setting for unpainted parts. @param {number | null | undefined} hold */
 function describeHold(hold) {
   if (hold === undefined || hold === null) return '';
   if (!hold) return 'free to change';

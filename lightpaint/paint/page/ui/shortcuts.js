@@ -19,11 +19,11 @@ import {
 /** @typedef {import("./session_controller.js").SessionController} SessionController */
 /** @typedef {import("./ui_state.js").UiStore} UiStore */
 /** @typedef {{store: UiStore, session: SessionController, engine: Engine}} App */
-/** isOnce: a key that is held down does it once.
+/** isOnce: ignores repeats of a held key.
  * @typedef {{keys: string, shown: string[], does: string, act?: (app: App) => void,
  *   isOnce?: boolean}} Key */
 
-/** What Ctrl is called here. */
+/** Name of the Ctrl key on this system. */
 export const MOD = /mac/i.test(navigator.platform) ? '⌘' : 'Ctrl';
 
 const zoomBy =
@@ -34,7 +34,7 @@ const zoomBy =
     updateShow(store, engine.zoomAt(pane.x + pane.width / 2, pane.y + pane.height / 2, factor));
   };
 
-/** One pixel of the picture on one of the page. @param {App} app */
+/** Show one picture pixel per page pixel. @param {App} app */
 export function showPixels({ store, engine }) {
   const scale = engine.panes()[0]?.scale;
   if (scale) updateShow(store, { zoom: store.value.show.zoom / scale });
@@ -46,7 +46,7 @@ const changeExposure =
   (/** @type {App} */ { store }) =>
     updateShow(store, { stops: Math.min(10, Math.max(-10, store.value.show.stops + by)) });
 
-/** Named by what they do; `keys` as the browser says them, Shift and Mod (Ctrl or ⌘) in front. */
+/** All shortcuts, by their effect. `keys`: the browser's names, after Shift and Mod (Ctrl or ⌘). */
 /** @type {{title: string, keys: Key[]}[]} */
 export const SHORTCUTS = [
   {
@@ -127,7 +127,7 @@ export const SHORTCUTS = [
         keys: 'mod+z',
         shown: ['Ctrl', 'Z'],
         does: 'undo',
-        // What is under the brush is the last thing that was done.
+        // Undo first cancels the current stroke, which is the last action.
         act: ({ engine, session, store }) => {
           if (engine.cancel()) store.set({ asking: null });
           else void session.send('undo');

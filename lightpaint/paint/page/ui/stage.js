@@ -1,5 +1,5 @@
 /**
- * The pictures and what lies over them: names, brush cursor, wipe, and a hint for the first stroke.
+ * The pictures with their overlays: names, brush cursor, wipe, and a hint for the first stroke.
  */
 
 import { inView } from '../engine/message_frames.js';
@@ -54,7 +54,7 @@ function nameOf(ui, kind) {
   return NAMES[kind] ?? kind;
 }
 
-/** What a picture does not show yet; null where it is what it is called. @param {Ui} ui
+/** Return what a picture does not show yet; null if it is complete. @param {Ui} ui
  * @param {'solution' | 'painting'} kind */
 function waitingFor({ comingTo, loading }, kind) {
   if (comingTo !== null) return `loading ${comingTo} …`;
@@ -62,12 +62,12 @@ function waitingFor({ comingTo, loading }, kind) {
   return kind === 'solution' && isShort ? 'some lights are still loading …' : null;
 }
 
-/** Whether a picture shows some of the lights only. @param {Ui} ui @param {string} kind */
+/** Return whether a picture shows only some of the lights. @param {Ui} ui @param {string} kind */
 function isPartly(ui, kind) {
   return kind === 'solution' && ui.solo.length + ui.mute.length > 0 && ui.hovered === null;
 }
 
-/** Which lights are shown, of an answer that has them all. @param {Ui} ui */
+/** Return the names of the lights shown, if not all are. @param {Ui} ui */
 function partOf({ solo, mute, lights }) {
   const some = solo.length ? solo : mute;
   const names = some.length > 2 ? `${some.length} lights` : some.map((k) => lights[k]?.label);
@@ -101,13 +101,13 @@ export function Stage({ ui, app }) {
       }),
     [],
   );
-  // At once, so that names lie where the pictures will.
+  // At once, so that the names are at the pictures' places.
   useMemo(
     () => engine.show(shownSettings(ui)),
     [ui.show, ui.tool, ui.solo, ui.mute, ui.hovered, ui.mix, ui.ready, ui.weights, ui.view],
   );
   const hasAlbedo = ui.resources[inView('albedo', ui.view)] !== undefined;
-  // Before the next press of a pointer.
+  // Set before the next press of a pointer.
   useLayoutEffect(
     () =>
       engine.setTool({
@@ -157,10 +157,10 @@ export function Stage({ ui, app }) {
   </div>`;
 }
 
-/** Before there is anything to see. @param {{ui: Ui}} props */
+/** Shown before the first picture. @param {{ui: Ui}} props */
 function Waiting({ ui }) {
   const { basis, closed, connection } = ui;
-  // Nothing comes; why, the banner says.
+  // Nothing will come; the banner says why.
   if (closed || connection === 'stale') return null;
   const text = ui.waiting || (basis ? 'Rendering the first picture …' : 'Opening the scene …');
   return html`<div class="waiting" role="status"><span>${text}</span>

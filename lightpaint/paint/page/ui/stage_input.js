@@ -1,4 +1,4 @@
-/** Events of pointer, wheel and keyboard on the pictures. */
+/** Pointer, wheel and keyboard events on the pictures. */
 
 import { useEffect } from '../vendor/preact.js';
 import { pointAway } from './brush_cursor.js';
@@ -21,7 +21,7 @@ export function useStageInput(frame, pointer, app) {
     const ends = new AbortController();
     const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ listener) =>
       element.addEventListener(name, listener, { signal: ends.signal, passive: false });
-    // Whoever came by a pointer sees where they are; the outline is for the keyboard.
+    // The focus outline is for keyboard users only.
     on('pointerdown', (event) => {
       element.dataset.by = 'pointer';
       if (store.value.pointing && event.button === 0 && !pointer.isSpace) {
@@ -53,17 +53,17 @@ export function useStageInput(frame, pointer, app) {
       pan(event.type === 'keydown' && isHere);
       if (isHere) event.preventDefault();
     };
-    // On its way there, since the painter keeps its keys from what is around it.
+    // In the capture phase, since the painter stops its key events from leaving it.
     const early = { signal: ends.signal, capture: true };
     window.addEventListener('keydown', onSpace, early);
     window.addEventListener('keyup', onSpace, early);
-    // Where the key is let go in another window, this one does not hear of it.
+    // If the key is released in another window, this one gets no event.
     window.addEventListener('blur', () => pan(false), { signal: ends.signal });
     return () => ends.abort();
   }, []);
 }
 
-/** The brush by keys: arrows move it, Enter paints a dab, or with Shift a line; or points a light.
+/** Handle brush keys: arrows move it; Enter paints a dab, with Shift a line, or aims a light.
  * @param {KeyboardEvent} event @param {Pointer} pointer @param {App} app */
 function byKeys(event, pointer, app) {
   const { engine, store } = app;

@@ -8,7 +8,7 @@
 import { stateOfView } from '../engine/message_frames.js';
 import { mixedWeights, withoutMix } from './ui_state.js';
 
-/** What is shown while something that was asked for is under way, as it is when nothing is.
+/** State of requested tasks while none is running.
  * @type {Record<string, Partial<Ui>>} */
 export const TASK_ENDED = {
   export: { isWriting: false, writing: null },
@@ -18,7 +18,7 @@ export const TASK_ENDED = {
   place: { placing: null, trial: null },
 };
 
-/** When nothing is known to be under way. */
+/** State while no task is known to be running. */
 export const IDLE = {
   ...TASK_ENDED.export,
   ...TASK_ENDED.verify,
@@ -55,7 +55,7 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
     hint: Boolean(message.first),
     connection: 'open',
     closed: null,
-    // What came of it meanwhile was not heard; of what still goes on more is said.
+    // Results in the meantime were missed; tasks that still run will report again.
     ...(isBack ? { ...IDLE, explained: [] } : {}),
     basis:
       basis && !basis.done
@@ -63,14 +63,14 @@ export function stateUpdate(message, /** @type {import('./ui_state.js').Ui} */ b
         : null,
     ...(isApart(looks ?? [], before) ? withoutMix(before) : {}),
     ...(message.verified ? rendersUpdate(message.verified, view) : {}),
-    // A scene is first shown as it is painted.
+    // At first a scene is shown at the exposure at which it is painted.
     ...(before.state ? {} : { show: { ...before.show, ...shownAs(message.transform) } }),
     ...answerFields(message.answer ?? {}, { ...before, view, views, lit: [] }),
     ...weightsOf(message),
   };
 }
 
-/** Where lights come or go, the numbers of others change. @param {Ui} before
+/** Added or removed lights change the numbers of others. @param {Ui} before
  * @param {Ui["lights"]} lights @returns {Partial<Ui>} */
 function lightNumbers(before, lights) {
   const { rig } = before;
@@ -88,7 +88,7 @@ function lightNumbers(before, lights) {
     hovered: null,
     pointed: null,
     dragged: null,
-    // Where they hang is told next.
+    // Their places come with the next message.
     rig: rig && { ...rig, lights: lights.flatMap(({ name }) => rig.lights[indexOf(before, name)] ?? []) },
   };
 }
@@ -99,14 +99,15 @@ const indexOf = ({ lights }, name) => lights.findIndex((light) => light.name ===
 /** @param {any} told @returns {NonNullable<Ui['verified']>} */
 const render = ({ is_old: isOld = false, ...about }) => ({ ...about, isOld });
 
-/** Renders that were made before the page began. @param {any[]} verified @param {number} view
+/** Take renders from before the page opened. @param {any[]} verified @param {number} view
  * @returns {Partial<Ui>} */
 function rendersUpdate(verified, view) {
   const verifiedOf = Object.fromEntries(verified.map((one) => [one.view, render(one)]));
   return { verifiedOf, verified: verifiedOf[view] ?? null };
 }
 
-/** Which looks there are. @param {Events["looks"]} message @param {Ui} ui @returns {Partial<Ui>} */
+/** Update the list of looks. @param {Events["looks"]} message @param {Ui} ui
+ * @returns {Partial<Ui>} */
 export function looksUpdate({ looks, resources }, ui) {
   return {
     looks,
@@ -115,7 +116,7 @@ export function looksUpdate({ looks, resources }, ui) {
   };
 }
 
-/** Whether one of the looks that are compared is there no more.
+/** Return whether a compared look no longer exists.
  * @param {import('./ui_state.js').Look[]} looks @param {Ui} ui */
 function isApart(looks, ui) {
   return ui.mix !== null && !mixedWeights({ ...ui, looks }, ui.mix);
@@ -127,8 +128,7 @@ function shownAs(transform) {
 }
 
 /**
- * What an exact answer says. The sentences come after the lights, when they have been found; until
- * then those of the last answer stay.
+ * Take an exact answer. Its sentences follow later; until then those of the last answer stay.
  * @param {any} answer @param {Ui} before @returns {Partial<Ui>}
  */
 function answerFields(answer, before) {
@@ -137,7 +137,7 @@ function answerFields(answer, before) {
   const made = { isLive: false, isJudged: headline !== undefined };
   if (headline !== undefined)
     Object.assign(made, { ofViews }, closenessUpdate({ ...answer, ofViews }, before));
-  // Without paint there is nothing to be sure of, or to be held back from.
+  // Without paint there are no error bars and no reasons.
   const unknown = made.deltaE === null && !ofViews ? UNKNOWN : {};
   if (lights) {
     made.shares = shares;
@@ -151,7 +151,8 @@ function answerFields(answer, before) {
   return made;
 }
 
-/** How close the view is that is shown. @param {any} answer @param {Ui} ui @returns {Partial<Ui>} */
+/** Update how close the current view is. @param {any} answer @param {Ui} ui
+ * @returns {Partial<Ui>} */
 function closenessUpdate(answer, { view, views }) {
   const isOne = views.length < 2;
   const its = isOne || !answer.ofViews ? answer : answer.ofViews[view];
@@ -170,7 +171,7 @@ const UNPAINTED = 'Nothing is painted in this view. It follows the others.';
 
 const UNKNOWN = { error: null, held: false, unreached: false };
 
-/** What changes with the view that is shown. @param {Ui} ui @param {number} view
+/** Return the state that changes with the current view. @param {Ui} ui @param {number} view
  * @returns {Partial<Ui>} */
 export function viewUpdate(ui, view) {
   const verified = ui.verifiedOf[view] ?? null;
@@ -195,7 +196,8 @@ export function viewUpdate(ui, view) {
   };
 }
 
-/** A render of a view has come. @param {Events["verified"]} message @param {Ui} ui @returns {Partial<Ui>} */
+/** Take a verification render of a view. @param {Events["verified"]} message @param {Ui} ui
+ * @returns {Partial<Ui>} */
 export function verifiedOf(message, ui) {
   const { view = 0 } = message;
   const verified = render(message);
@@ -203,14 +205,15 @@ export function verifiedOf(message, ui) {
   return view === ui.view ? { ...made, verified } : made;
 }
 
-/** Why it is not closer, unless somebody has painted on. @param {any} message @param {Ui} ui
+/** Take the reasons why the answer is not closer, unless painting has continued.
+ * @param {any} message @param {Ui} ui
  * @returns {Partial<Ui>} */
 export function explanationUpdate({ view = 0, sentences, is_old: isOld = false }, ui) {
   const isIts = view === ui.view && !isOld && !ui.isLive;
   return { explaining: false, explained: isIts ? sentences : [] };
 }
 
-/** What a change would do, unless another one is looked at by now. @param {any} message
+/** Take the preview of a change, unless another preview has been requested. @param {any} message
  * @param {Ui} ui @returns {Partial<Ui>} */
 export function previewUpdate({ number, text, is_at_cost: isAtCost, arrays }, { preview }) {
   if (!preview || preview.number !== number) return {};
@@ -227,8 +230,8 @@ function weightsOf(message) {
   return { weights };
 }
 
-/** Of an answer, and of a patch, unless it is of before what was said already: an exact answer that
- * was found as somebody undid. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
+/** Take the state in an answer or a patch, unless it is older than an earlier message, like an
+ * exact answer found during an undo. @param {any} message @param {Ui} ui @returns {Partial<Ui>} */
 export function answerUpdate(message, ui) {
   if (message.version < ui.version) return {};
   const made = /** @type {Partial<Ui>} */ (weightsOf(message));
@@ -240,7 +243,7 @@ export function answerUpdate(message, ui) {
   else if (!message.exact) {
     made.isLive = true;
     made.isJudged = false;
-    // What was said before anything was painted is so no more.
+    // Earlier statements no longer hold once something is painted.
     if (ui.deltaE === null) made.headline = '';
   }
   if (made.weights) {
@@ -248,7 +251,7 @@ export function answerUpdate(message, ui) {
     made.verifiedOf = Object.fromEntries(old);
     if (ui.verified) made.verified = { ...ui.verified, isOld: true };
   }
-  // The reasons were those of the answer before.
+  // The reasons belong to the previous answer.
   if (made.isLive && ui.explained.length) made.explained = [];
   return made;
 }
@@ -258,16 +261,17 @@ export function progressUpdate({ what, done, total, unit }, ui) {
   const made = { what, done, total, unit };
   if (what === 'export') return { writing: timed(made, ui.writing), isWriting: true };
   if (what === 'place') return ui.placing ? { placing: timed(made, ui.placing) } : {};
-  // The brush interrupts it, so how long it will take is not known.
+  // The brush interrupts it, so the remaining time is unknown.
   if (what === 'sampling') return { sampling: done < total ? made : null };
   if (/verif/i.test(what)) return { verifying: timed(made, ui.verifying) };
   return { basis: total && done >= total ? null : timed(made, ui.basis) };
 }
 
-/** Seconds of work after which is said how many more there will be. */
+/** Seconds of work before the remaining time is shown. */
 const KNOWN_S = 2;
 
-/** What is left goes on as fast as what was heard of. @param {import('./ui_state.js').Progress} now
+/** Extrapolate from the progress since the first report.
+ * @param {import('./ui_state.js').Progress} now
  * @param {import('./ui_state.js').Progress | null} before @returns {import('./ui_state.js').Progress} */
 function timed(now, before) {
   const ms = performance.now();

@@ -16,7 +16,7 @@ export function Thumbnail({ name, generation, app }) {
     const { session, store } = app;
     let isGone = false;
     let isThere = false;
-    // A picture of something else is not shown for it.
+    // Clear the picture of something else.
     if (ref.current && drawn.current !== null && drawn.current !== name) clear(ref.current);
     drawn.current = null;
     const fetch = () =>
@@ -27,10 +27,10 @@ export function Thumbnail({ name, generation, app }) {
           drawPicture(ref.current, picture);
           drawn.current = name;
         },
-        () => undefined, // A thumbnail is not worth an error.
+        () => undefined, // A missing thumbnail is not reported.
       );
     void fetch();
-    // A place that has just lost the painter is given no picture, until it has it again.
+    // A page that has just lost the session gets no picture until it has the session again.
     let wasClosed = store.value.closed !== null;
     const end = store.listen(() => {
       const isClosed = store.value.closed !== null;

@@ -3,17 +3,18 @@
 /** @typedef {import("./ui_state.js").Constraints} Constraints */
 /** @typedef {import("./ui_state.js").Ui} Ui */
 
-/** Names of the lights on the dimmer of one, if there are others. @param {Ui} ui @param {number} light */
+/** Return the names of all lights on a light's dimmer, if there are others. @param {Ui} ui
+ * @param {number} light */
 export const findTie = (ui, light) => ui.ties.find((tie) => tie.includes(ui.lights[light].name));
 
 /** @param {Ui} ui @param {string} name */
 const isLocked = ({ asked }, name) => asked[name]?.lock !== undefined || Boolean(asked[name]?.off);
 
-/** Lights that are held, or off, as somebody asks it of them. @param {Ui} ui */
+/** Return the lights that constraints lock or switch off. @param {Ui} ui */
 export const lockedLights = (ui) =>
   ui.lights.map((_, k) => k).filter((k) => isLocked(ui, ui.lights[k].name));
 
-/** The light by which this one is held: itself, if none on its dimmer is.
+/** Return the light whose lock holds this one: itself, if none on its dimmer is locked.
  * @param {Ui} ui @param {number} light @returns {number} */
 export function lockingLight(ui, light) {
   const { name } = ui.lights[light];
@@ -21,7 +22,7 @@ export function lockingLight(ui, light) {
   return locking === undefined ? light : ui.lights.findIndex((one) => one.name === locking);
 }
 
-/** What is asked of a light, its level by whichever light of its dimmer.
+/** Return the constraints of a light, with the level constraint of its dimmer.
  * @param {Ui} ui @param {number} light @returns {Constraints | undefined} */
 export function constraintsOf(ui, light) {
   const own = ui.asked[ui.lights[light].name];

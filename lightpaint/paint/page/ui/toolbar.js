@@ -19,13 +19,13 @@ import {
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-/** Sizes are felt as ratios. */
+/** Sizes are perceived as ratios. */
 const RATIO = {
   to: (/** @type {number} */ x) => Math.log2(x),
   of: (/** @type {number} */ t) => Math.round(2 ** t),
 };
 
-/** As much more as less; what is near 1 is 1. */
+/** Symmetric around 1, and snapped to 1 near it. */
 const TIMES = {
   to: (/** @type {number} */ x) => Math.log10(x),
   of: (/** @type {number} */ t) => Number((10 ** (Math.abs(t) < 0.02 ? 0 : t)).toPrecision(2)),
@@ -131,16 +131,16 @@ export function ToolOptions({ ui, app }) {
   </div>`;
 }
 
-/** As a choice: names of objects are not empty. */
+/** The value of this choice; names of objects are not empty. */
 const WHOLE = '';
 
-/** The ask of a drag in numbers, for one object or for the whole picture. Also a panel's content.
+/** The adjustment of a drag in numbers, for one object or the whole picture. Also used in a panel.
  * @param {{ui: Ui, app: App}} props */
 export function Ask({ ui, app }) {
   const { store, engine } = app;
   const { stops, mired, object } = ui.inNumbers;
   const objects = /** @type {string[]} */ (ui.state?.objects ?? []);
-  // By its name: another view numbers its objects in another way, and may not show this one.
+  // By its name, since another view numbers its objects differently and may not show this one.
   const isMissing = object !== null && !objects.includes(object);
   const choices = [
     { value: WHOLE, label: 'Whole picture' },
@@ -154,7 +154,7 @@ export function Ask({ ui, app }) {
   const adjust = (/** @type {MouseEvent} */ event) => {
     store.set({ hint: false });
     engine.adjust({ stops, mired, object: object === null ? null : objects.indexOf(object) });
-    // Who has clicked looks at the pictures next, and has their keys again.
+    // Return the focus to the pictures, for their keys.
     if (event.detail) reveal(/** @type {HTMLElement} */ (event.currentTarget), '.stage', true);
   };
   return html`<div class="ask" data-numbers>

@@ -52,14 +52,14 @@ const HINTS = /** @type {Record<Tool, string>} */ ({
   adjust: 'Drag on a picture: up brighter, down darker, right warmer, left cooler.',
 });
 
-/** Where fingers point. @type {Partial<Record<Tool, string>>} */
+/** Hints on touch screens. @type {Partial<Record<Tool, string>>} */
 const TOUCH_HINTS = {
   brush: 'Drag on the painting with one finger. Two fingers pan and zoom.',
   pick: 'Tap either picture: the light there becomes the paint.',
   fill: 'Tap an object to paint all of it.',
 };
 
-/** What a tool does. @param {Tool} tool */
+/** Return the hint of a tool. @param {Tool} tool */
 export function toolHint(tool) {
   const isTouch = matchMedia('(pointer: coarse)').matches;
   return (isTouch && TOUCH_HINTS[tool]) || HINTS[tool];
@@ -70,7 +70,7 @@ const PAINT = {
   text: 'Choose a colour and drag over this picture. The other one shows what the lights can do.',
 };
 
-/** What is said first, on the painting, where it is not to be painted with a brush.
+/** First hint on the painting, for tools other than brushes.
  * @type {Partial<Record<Tool, {title: string, text: string}>>} */
 const FIRST = {
   weight: { title: 'Mark what matters most', text: 'Drag over it on this picture.' },
@@ -94,10 +94,10 @@ export const firstHint = (tool) => FIRST[tool] ?? PAINT;
 export const MIN_BRUSH_SIZE = 2;
 export const MAX_BRUSH_SIZE = 1000;
 
-/** Of paint, over or under white, that its slider has. */
+/** Range of the paint's slider, in stops from white. */
 export const MAX_STOPS = 8;
 
-/** Colours that were used lately, at most. */
+/** Largest number of recent colours. */
 const MAX_RECENT = 7;
 
 /** @param {UiStore} store @param {Tool} tool */
@@ -114,20 +114,20 @@ export function swapColours(store) {
   }));
 }
 
-/** Take light from a picture as paint. @param {UiStore} store @param {RGB} light */
+/** Use light from a picture as paint. @param {UiStore} store @param {RGB} light */
 export function pickPaint(store, light) {
   const shown = light.map((x) => Math.max(0, x) * 2 ** exposureOf(store.value.state));
   const top = Math.max(...shown);
   if (!(top > 0)) return store.set({ colour: [0, 0, 0], stops: 0 });
   const stops = Math.min(MAX_STOPS, Math.max(-MAX_STOPS, Math.log2(top)));
-  // What is darker than that is a darker colour.
+  // Darker light gives a darker colour instead.
   const scale = Math.max(top, 2 ** stops);
   store.set({ colour: /** @type {RGB} */ (shown.map((x) => x / scale)), stops: Math.log2(scale) });
 }
 
 /** @typedef {{colour: RGB, stops: number}} Paint */
 
-/** Remember what was painted with. @param {UiStore} store */
+/** Remember the paint that was used. @param {UiStore} store */
 export function rememberPaint(store) {
   const { colour, stops, recent, tool } = store.value;
   if (!['brush', 'fill', 'line'].includes(tool)) return;
@@ -135,7 +135,7 @@ export function rememberPaint(store) {
   store.set({ recent: distinctPaints([{ colour, stops }, ...recent]) });
 }
 
-/** Each once, and no more than there is room for. @param {Paint[]} paints the latest first */
+/** Without duplicates, and limited in number. @param {Paint[]} paints the latest first */
 export function distinctPaints(paints) {
   const distinct = paints.filter((one, k) => !paints.slice(0, k).some((other) => isSame(one, other)));
   return distinct.slice(0, MAX_RECENT);
@@ -145,7 +145,7 @@ export function distinctPaints(paints) {
 const isSame = (one, other) =>
   toHex(one.colour) === toHex(other.colour) && Math.abs(one.stops - other.stops) < 0.01;
 
-/** That of the tool in the hand: who fills wants all of it, whatever the brush leaves.
+/** The flow of the current tool: the fill has its own, independent of the brush.
  * @param {import("./ui_state.js").Ui} ui */
 export const flowOf = (ui) => (ui.tool === 'fill' ? ui.fillFlow : ui.flow);
 
@@ -171,12 +171,13 @@ export function updateShow(store, changes) {
   store.set((ui) => ({ show: { ...ui.show, ...changes } }));
 }
 
-/** Panels away, and back. @param {UiStore} store */
+/** Hide or show the panels. @param {UiStore} store */
 export function togglePanels(store) {
   store.set(({ side, panel }) => ({ side: !(side || panel), panel: null }));
 }
 
-/** The next of some values. @template T @param {readonly T[]} values @param {T} now @returns {T} */
+/** Return the value after another one. @template T @param {readonly T[]} values @param {T} now
+ * @returns {T} */
 export const next = (values, now) => values[(values.indexOf(now) + 1) % values.length];
 
 export const LAYOUTS = /** @type {const} */ (['side', 'wipe', 'blink']);

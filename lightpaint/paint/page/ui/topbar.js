@@ -53,7 +53,7 @@ export function TopBar({ ui, app }) {
   </header>`;
 }
 
-/** How large a pixel of the picture is on the page, unless all of it is fitted in.
+/** The size of a picture pixel on the page, or *fit*.
  * @param {{ui: Ui, app: App}} props */
 function Zoom({ ui: { show, fit }, app }) {
   const scale = (fit ?? 1) * show.zoom;
@@ -91,7 +91,7 @@ function spoken(name) {
   return labels[name] ?? name.replace(/^ocio:/, '').replace('/', ' · ');
 }
 
-/** Which two pictures are compared. @param {{ui: Ui, app: App}} props */
+/** The choice of the two pictures to compare. @param {{ui: Ui, app: App}} props */
 function Compare({ ui, app }) {
   const { store } = app;
   const { show } = ui;

@@ -11,22 +11,22 @@ import { ofKelvin } from './paint_colour.js';
 /** @typedef {import("../engine/messages.js").LookInfo} Look */
 /** @typedef {Record<string, any>} Constraints */
 /** @typedef {import("../engine/messages.js").Advice} Advice */
-/** A message that changes what is asked.
+/** A request that changes settings or constraints.
  * @typedef {{[K in "set" | "ask_all" | "tie"]:
  *   {kind: K, fields: import("../engine/messages.js").Requests[K]}}["set" | "ask_all" | "tie"]}
  *   Change */
-/** What a change would do: what it is called, and what is known of it.
+/** A preview of a change: its name and the known part of its effect.
  * @typedef {{number: number, label: string, change: Change, text: string, isAtCost: boolean,
  *   before: import("./engine_interface.js").Picture | null, after: import("./engine_interface.js").Picture | null}}
  *   Preview */
 /** @typedef {import("../engine/messages.js").Closeness} Seen */
-/** What the next click does: it points a light, or hangs a new one. edge: what casts the shadow, once
- * that was clicked.
+/** The effect of the next click: aim a light or hang a new one. edge: the place that casts the
+ * shadow, once clicked.
  * @typedef {{light: number, how: "aim" | "highlight" | "shadow", edge?: [number, number]}
  *   | {how: "hang", type: NewKind}} Pointing */
 /** @typedef {"spot" | "point" | "panel"} NewKind */
-/** since: when it was first heard of, in ms, and how much was done then; left_s: about how many
- * seconds are left, once that can be told.
+/** since: time of the first report, in ms, and the progress then; left_s: estimated seconds left,
+ * once known.
  * @typedef {{what: string, done: number, total: number, unit: string,
  *   since?: {ms: number, done: number}, left_s?: number}} Progress */
 /** @typedef {{id: number, text: string, tone: "info" | "warn"}} Toast */
@@ -242,7 +242,7 @@ export function initialState() {
 }
 
 /**
- * What is drawn: what was chosen, with what is only looked at for a moment.
+ * Return what is drawn: the chosen display with temporary changes.
  * @param {Ui} ui @returns {Show}
  */
 export function shownSettings(ui) {
@@ -264,26 +264,27 @@ export function shownSettings(ui) {
   return show;
 }
 
-/** What lies over the pictures. Whoever paints importance sees it. @param {Ui} ui */
+/** Return the overlay. The importance brush shows the importance by default. @param {Ui} ui */
 export function overlayOf({ show, tool }) {
   return show.overlay ?? (tool === 'weight' ? 'importance' : null);
 }
 
-/** By how much a light alone is shown brighter, so that one of many can be seen: whole stops.
+/** Return the extra exposure of a light shown alone, in whole stops, so that one of many is
+ * visible.
  * @param {Ui} ui @param {number} k @returns {number} */
 export function gainOf(ui, k) {
   const share = ui.lit[k]?.share ?? 1;
   return share > 0 ? 2 ** Math.min(10, Math.max(0, Math.round(Math.log2(0.5 / share)))) : 1;
 }
 
-/** A light that is off is shown as it is now, or else at one unit. @param {RGB} rgb
+/** A light that is off is shown as in the scene, or else at one unit. @param {RGB} rgb
  * @param {Light} light @returns {RGB} */
 function alone(rgb, light) {
   if (Math.max(...rgb) > 0) return rgb;
   return Math.max(...light.present) > 0 ? light.present : [1, 1, 1];
 }
 
-/** Two looks are compared no more. @param {Ui} ui @returns {Partial<Ui>} */
+/** Reset the comparison of two looks. @param {Ui} ui @returns {Partial<Ui>} */
 export function withoutMix({ show }) {
   const pair = /** @type {const} */ ({ left: 'painting', right: 'solution' });
   return { mix: null, show: { ...show, ...pair, instead: null, other: null } };
@@ -298,20 +299,21 @@ export function mixedWeights(ui, { a, b, share }) {
     .map((rgb) => /** @type {RGB} */ (rgb));
 }
 
-/** What lies between two looks is called so. @param {Look[]} looks
+/** Name of a mix of two looks. @param {Look[]} looks
  * @param {{a: number, b: number, share: number}} mix @returns {string} */
 export function mixName(looks, { a, b, share }) {
   const [from, to] = [a, b].map((id) => looks.find((look) => look.id === id)?.name ?? '');
   return `${from} → ${to}, ${Math.round(100 * share)} %`;
 }
 
-/** Linear light of the paint in the hand: at 0 stops it is as bright as what the scene's own
- * exposure shows as white. @param {Ui} ui @returns {RGB} */
+/** Return the linear light of the current paint. At 0 stops it is as bright as white at the scene's
+ * own exposure. @param {Ui} ui @returns {RGB} */
 export function paintOf({ colour, stops, state }) {
   return /** @type {RGB} */ (colour.map((x) => x * 2 ** (stops - exposureOf(state))));
 }
 
-/** Stops at which the scene is painted. @param {any} state @returns {number} */
+/** Return the exposure at which the scene is painted, in stops. @param {any} state
+ * @returns {number} */
 export function exposureOf(state) {
   return state?.transform?.stops ?? 0;
 }

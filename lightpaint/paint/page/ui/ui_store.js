@@ -13,8 +13,8 @@ export class Store {
   }
 
   /**
-   * Change some of it. Listeners hear of it once, before the next frame, however many changes
-   * there were; `value` is new at once.
+   * Change part of the state. `value` changes at once; listeners are notified once, before the next
+   * frame.
    * @param {Partial<T> | ((value: T) => Partial<T>)} changes
    */
   set(changes) {

@@ -9,14 +9,14 @@ import { Thumbnail } from './thumbnail.js';
 /** @typedef {import("./ui_state.js").Ui} Ui */
 /** @typedef {import("./shortcuts.js").App} App */
 
-/** Show another view. @param {App} app @param {number} view */
+/** Switch to another view. @param {App} app @param {number} view */
 export function showView({ store, engine }, view) {
   if (!store.value.ready || view === store.value.view) return;
   engine.showView(view);
   store.set((ui) => viewUpdate(ui, view));
 }
 
-/** The one after it. @param {App} app */
+/** Switch to the next view. @param {App} app */
 export function showNextView(app) {
   const { views, view } = app.store.value;
   if (views.length > 1) showView(app, (view + 1) % views.length);
