@@ -1,4 +1,4 @@
-"""The best turn of a light that is there, suggested where lights as they hang miss the painting."""
+"""Suggestions to turn an existing spot, for lights that miss the painting from where they hang."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ from lightpaint.placement.suggestions.suggestion import MoveSuggestion
 from lightpaint.progress import Listener
 from lightpaint.scene.scene import Scene
 
-#: Degrees that spots are tried to turn by, and that the option adds to what they turn.
+#: Largest turn that is tried, in degrees, and the margin that the suggested option adds to it.
 TURN, MARGIN = 45.0, 10.0
 
 #: Most pixels of the preview, camera samples of all of them, and most of one.

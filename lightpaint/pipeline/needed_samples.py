@@ -1,4 +1,4 @@
-"""Samples added where a painting needs them, until the lights are as sure as was asked for."""
+"""Adds samples where a painting needs them, until the lights are as certain as requested."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -33,14 +33,14 @@ from lightpaint.scene.properties.film import MAX_SPP
 #: Rounds of samples, each of which at most doubles their number.
 MAX_ROUNDS = 20
 
-#: Parts of the samples so far that a round may add, and the part of the squared error that is asked
-#: for to which the one that is taken is expected to lead.
+#: Samples that a round may add, as fractions of those so far. The smallest one is taken that is
+#: expected to bring the squared error below AIM times the requested one.
 ROUND_SIZES, AIM = (1 / 4, 1 / 2, 1), 0.7
 
 
 @dataclass(frozen=True)
 class Certainty:
-    """An answer and its errors. light: the least sure one. errors: (n,), as `picture_errors`."""
+    """An answer and its errors. light: the least certain one. errors: (n,), of `picture_errors`."""
 
     solution: Solution
     light: str
@@ -48,7 +48,7 @@ class Certainty:
 
     @classmethod
     def of(cls, solution: Solution) -> "Certainty":
-        """Return that of a solution whose basis knows its noise."""
+        """Return the certainty of a solution whose basis knows its noise."""
         uncertainty = error_bars(solution)
         assert uncertainty is not None
         errors = picture_errors(solution.basis, uncertainty)
@@ -56,7 +56,7 @@ class Certainty:
 
     @property
     def error(self) -> float:
-        """The error of the least sure light."""
+        """Error of the least certain light."""
         return float(self.errors.max(initial=0))
 
 
@@ -73,7 +73,7 @@ def without_noise(job: Job, solution: Solution) -> Solution:
 
 
 def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[Basis]:
-    """Return the bases of a job with the samples that its error needs.
+    """Return the bases of a job with as many samples as the requested error needs.
 
     Rounds of a solve and of samples where they lower the errors of the lights most, until the
     largest error is as small as was asked for, or the time is over.
@@ -107,7 +107,7 @@ def add_needed_samples(job: Job, bases: list[Basis], listen: Listener) -> list[B
 
 
 def _text(state: Certainty, bases: Sequence[Basis]) -> str:
-    """Return how sure the lights are, after how many samples."""
+    """Return the largest error, and the samples so far, as text."""
     mean = sum(basis.origin.mean_spp for basis in bases) / len(bases)
     extra = sum(basis.origin.extra_spp for basis in bases) / len(bases)
     where = f", {_spoken(extra)} of them where the painting needs them" if extra else ""

@@ -99,7 +99,7 @@ def _reduce_noise(job: Job, solution: Solution, listen: Listener) -> Solution:
 
 
 def _reloaded(look: Look) -> Look:
-    """Return `look` with its relit scene as it is on disk now."""
+    """Return `look` with its relit scene read again from disk."""
     assert look.relit is not None
     relit = reload_relit(look.relit, look.relit.path, look.relit.sensor)
     return replace(look, relit=relit)

@@ -1,4 +1,4 @@
-"""Places of lights: found with a first solve, or before, and hung for the solve that counts."""
+"""Moves lights to where a first solve wants them, before the solve that counts."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ from lightpaint.screen import some_names
 def place_lights(
     job: Job, bases: list[Basis], listen: Listener
 ) -> tuple[Job, list[Basis], Placement | None]:
-    """Return a job whose lights are where its paintings want them, its bases, and the placement.
+    """Move lights to where the paintings want them; return the job, its bases and the placement.
 
     That is None where nothing may move. bases: of the views of `job`, or of these with the lights
     where they were found before; the list is emptied to save memory. Only the planes of lights that
@@ -60,7 +60,7 @@ def place_lights(
 def find_places(jobs: Sequence[Job], bases: Sequence[Basis], listen: Listener) -> Placement:
     """Return the places that all paintings of `jobs` together want, in the views of `bases`.
 
-    The jobs are of one scene and its rigging; each keeps levels of its own.
+    The jobs share one scene and its rigging; each has its own light levels.
     """
     solutions, scenes = [], dict[int, Scene]()
     for job in jobs:
@@ -85,7 +85,7 @@ def find_places(jobs: Sequence[Job], bases: Sequence[Basis], listen: Listener) -
 
 
 def say_changes(placement: Placement | PlacementRecord, listen: Listener) -> None:
-    """Tell the user what was moved and added, and for which looks, if several share it."""
+    """Tell the user which lights were moved and added, and for which looks they hang so."""
     changes = all_changes(placement)
     lead = f"{some_names(placement.looks)}: " if placement.looks else ""
     for change in changes:
@@ -96,7 +96,7 @@ def say_changes(placement: Placement | PlacementRecord, listen: Listener) -> Non
 
 
 def _place_of(scene: Scene, bases: Sequence[Basis]) -> int:
-    """Return which of several bases is of a scene's sensor and film."""
+    """Return the index of the basis with a scene's sensor and film."""
     known = [(basis.origin.sensor, basis.size) for basis in bases]
     return known.index((scene.sensor_names[scene.sensor], scene.size))
 

@@ -1,4 +1,4 @@
-"""Templates: what is rendered, or summed up of a basis, to be painted on."""
+"""Templates: pictures to paint on, rendered or summed up from a basis."""
 
 import math
 from dataclasses import replace

@@ -21,7 +21,7 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.lighting.solution import Solution
 from lightpaint.target.target import Target
 
-#: What becomes of each band of a picture in display values.
+#: Conversion of a band of display values into its final form.
 Finish = Callable[[Floats], npt.NDArray[Any]]
 
 #: False colours of a signed quantity from −1 to +1, in display values. Their lightness
@@ -54,7 +54,7 @@ def report_transform(target: Target, basis: Basis, predicted: Floats) -> ViewTra
 
 
 def brighter_than_white(image: Floats, transform: ViewTransform) -> float:
-    """Return share of the pixels of a linear picture that a display cannot show."""
+    """Return the share of pixels of a linear picture that exceed what a display can show."""
     return float((largest(image) > transform.white).mean())
 
 
@@ -73,7 +73,7 @@ def painted_coverage(target: Target, solution: Solution) -> Floats:
 
 
 def unpainted_look(current: Floats, *, transform: ViewTransform) -> Floats:
-    """Return the current look as the background of what counts: grey, dim, with diagonal lines."""
+    """Return the current look as a background: grey, dim, with diagonal lines."""
     return np.repeat(_dim_look(current, transform)[..., None], 3, axis=-1)
 
 
@@ -100,8 +100,8 @@ def over_unpainted(
 ) -> npt.NDArray[Any]:
     """Return a picture, laid over `unpainted_look` by its share of each pixel, (h, w).
 
-    encode: makes display values of a band of `picture`, (h, w, …). finish: what becomes of each
-    band, such as `to_8_bit`.
+    encode: makes display values of a band of `picture`, (h, w, …). finish: converts each band,
+    for example by `to_8_bit`.
     """
 
     def lay(band: Floats, share: Floats, dim: Floats) -> npt.NDArray[Any]:

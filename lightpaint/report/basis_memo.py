@@ -1,6 +1,6 @@
-"""A memo of what pages show of a basis whatever the answer: made once, also ahead of the answer.
+"""A memo of those parts of pages that depend on the basis alone: made once, or ahead of the answer.
 
-Many looks share a basis, and while one is solved a processor is idle now and then.
+Many looks share a basis, and cores are idle now and then while one of them is solved.
 """
 
 import weakref

@@ -1,4 +1,4 @@
-"""The pictures of a result for people: each denoised once, for all places that show it."""
+"""The pictures of a result, each denoised once for all places that show it."""
 
 from dataclasses import dataclass, field
 

@@ -111,7 +111,7 @@ JOINT_RELEASE_CLAUSES = {
 
 
 def spoken_cause(reason: Reason, *, weaker: str = "a hold of", any_color: str = ANY_COLOR) -> str:
-    """Say what keeps the lights from the paint, and the gain of releasing it; "" for views.
+    """Name what keeps the lights from the paint, and the gain of releasing it; "" for views.
 
     weaker: the words before the strength of a weaker hold. any_color: as in `bound_sentences`.
     """

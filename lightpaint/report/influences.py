@@ -1,4 +1,4 @@
-"""Influences on an answer besides the painting, by option or by default: in words, and as data."""
+"""Options and defaults that influence an answer besides the painting: in words, and as data."""
 
 from typing import Any
 

@@ -16,7 +16,7 @@ LEAST_SHARE = 0.05
 
 
 def energy_shares(basis: Basis, lighting: Lighting) -> Doubles:
-    """Return share of each light in the predicted image's energy, (n,) float64, in basis order.
+    """Return each light's share of the predicted image's energy, (n,) float64, in basis order.
 
     Energy is luminance Y summed over all pixels, painted or not: Σ Y(w_i Φ_i) over
     Σ_j Σ Y(w_j Φ_j). The shares sum to 1; where every light is off they are all 0.
@@ -139,7 +139,7 @@ def most_uncertain(basis: Basis, solution: Solution, uncertainty: Uncertainty) -
 
 
 def halving_spp(basis: Basis, uncertainty: Uncertainty, k: int) -> int:
-    """Return samples per pixel that halve the error of light k.
+    """Return the samples per pixel that halve the error of light k.
 
     Scatter falls with the root of the samples, bias with their number.
     """

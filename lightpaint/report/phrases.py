@@ -94,7 +94,7 @@ def spoken_place(place: Place) -> str:
 def spoken_difference(
     painted: tuple[float, float, float], reached: tuple[float, float, float]
 ) -> str:
-    """Return how a painted colour differs from the one that lights reach: `brighter and bluer`."""
+    """Return how a painted colour differs from the reached one: `brighter and bluer`."""
     a, b = np.array(painted), np.maximum(np.array(reached), 0)
     bright_a, bright_b = float(luminance(a)), float(luminance(b))
     words = []

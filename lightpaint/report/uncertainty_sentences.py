@@ -1,4 +1,4 @@
-"""Sentences on how sure the answer is, and on the samples that would make it surer."""
+"""Sentences on the certainty of the answer, and on the samples that would raise it."""
 
 from lightpaint.basis.basis import Basis
 from lightpaint.lighting.analysis.noise.uncertainty import Uncertainty

@@ -66,7 +66,7 @@ def _share(selected: Bools, painted: Bools) -> str:
 def _known_by_sight_alone(solution: Solution, ignored: Bools) -> list[str]:
     """Return a warning of undetermined lights that are seen where nothing counts.
 
-    As of a bulb in a glass ball: few paths find its light elsewhere, and many samples show it.
+    A bulb in a glass ball, say: many samples see it, and few paths find its light elsewhere.
     """
     # Noise may have solved it far too dim.
     weights = np.maximum(solution.weights, solution.basis.present_weights)

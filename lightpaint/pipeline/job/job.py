@@ -87,11 +87,11 @@ class Job:
         by_sensor: True to write the pictures to a folder for each sensor, as with several views.
         rigging: What may move, and lights to add; needs a scene. It overrides that of the scene's
             lights file.
-        placement: Places that were found before, for several looks; nothing is searched for then.
+        placement: Places found earlier for several looks; nothing is searched for then.
         views: Set on creation: the views, each with what it needs.
-        all_constraints: Set on creation: all constraints, those of the lights file first.
-        all_rigging: Set on creation: all that may move, that of the lights file first.
-        fit: Set on creation: the settings, with those decided that depend on the paintings.
+        all_constraints: Set on creation: all constraints, the lights file's first.
+        all_rigging: Set on creation: all rigging, the lights file's first.
+        fit: Set on creation: the settings, including those that the paintings decide.
         remarks: Set on creation: remarks for the user, in plain text.
         results: Set on creation: the folder, and the files that may be replaced there.
 

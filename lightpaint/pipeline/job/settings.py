@@ -18,7 +18,7 @@ MAX_REFINE = 100
 MAX_SUGGEST = 100
 #: Least error that may be asked for: a smaller one is a typing error.
 MIN_ERROR = 1e-4
-#: Samples per pixel from which it is told where more are needed.
+#: Samples per pixel of the pilot, which tells where more are needed.
 PILOT_SPP = 16
 
 
@@ -58,7 +58,7 @@ class Settings(Fit):
         refine: Rounds of rendering the solved scene, with as many samples as the basis, and
             improving the answer; needs a scene.
         suggest: Most point lights to suggest; needs a scene, and a single view.
-        move_lights: Whether lights that may move do; False leaves all where they are.
+        move_lights: Whether to move the lights that may move.
         cd_per_unit: cd/m² that a radiance of 1 stands for, for luminous quantities in the results.
         verify: Whether to render the relit scene and compare it with the prediction, with at most
             as many samples as the basis, so that it takes no longer.

@@ -12,7 +12,7 @@ LEAST_TURN_ERROR, LEAST_SHARE = 0.05, 0.001
 
 
 def hung_of(placement: Placement | PlacementRecord, lighting: Lighting | None) -> HungLights:
-    """Return what a placement changed, and the lights of an answer; none without one."""
+    """Return the changes of a placement and the lights of an answer; none without a placement."""
     changes = [_change_of(change) for change in all_changes(placement)]
     changes.sort(key=lambda change: -change.numbers["gain_share"])
     missed = placement.missed_before, placement.missed_after
@@ -39,7 +39,7 @@ def _change_of(change: Move | AddedLight) -> LightChange:
 
 
 def spoken_change(change: Move | AddedLight) -> str:
-    """Return what a light did and gained: `spot_knot turned by 12°, slid 0.6: a fifth …`."""
+    """Return a light's change and gain: `spot_knot turned by 12°, slid 0.6: a fifth …`."""
     if isinstance(change, Move):
         done = spoken_move(change)
     else:
@@ -52,7 +52,7 @@ def spoken_change(change: Move | AddedLight) -> str:
 
 
 def spoken_move(move: Move) -> str:
-    """Return what a light did, with the errors of that: `turned by 12° ± 1°, slid 0.6 ± 0.05`."""
+    """Return a light's change with its errors: `turned by 12° ± 1°, slid 0.6 ± 0.05`."""
     done = []
     if move.turn >= 0.5:
         error = f" ± {move.turn_error:.1g}°" if (move.turn_error or 0) >= LEAST_TURN_ERROR else ""

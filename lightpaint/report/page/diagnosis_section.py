@@ -40,7 +40,7 @@ SMALLEST_GAIN = 0.002
 
 
 def sure_section(basis: Basis, solution: Solution, uncertainty: Uncertainty | None) -> str:
-    """Return the section on uncertainty: a sentence, and the lights that it matters for."""
+    """Return the section on uncertainty: a sentence, and the lights with notable errors."""
     if uncertainty is None:
         return ""
     shares = energy_shares(basis, solution.lighting)
@@ -92,7 +92,7 @@ def _steps(solution: Solution) -> str:
     return f"<p>{text[0].upper()}{text[1:]}.</p>" if text else ""
 
 
-#: What can be done about light that no dimmer gives.
+#: Advice for light that no dimmer can give.
 OTHER_PLACES = (
     "What no dimmer reaches, a light that hangs or points elsewhere may. Ask for suggestions: the "
     "best turn of a light and the best new light, with a picture of each and the lines to paste. "
@@ -111,7 +111,7 @@ def missed_section(
 ) -> str:
     """Return the section on the error: sentences, shares, maps and bounds.
 
-    can_place: whether lights of the scene could hang elsewhere, which nobody has asked for yet.
+    can_place: whether lights of the scene could move, and none was allowed to.
     """
     if diagnosis is None:
         return ""

@@ -79,7 +79,7 @@ def verification_table(verification: Verification | None) -> str:
 
 
 def _light_tests(v: Verification) -> list[tuple[str, str]]:
-    """Return rows on the tests of each light: the farthest z, and the chance of detecting an error
+    """Return rows on the tests of each light: its largest z, and the chance of detecting an error
     in each, the smallest first.
     """
     if not v.power:

@@ -87,7 +87,7 @@ def report_page(
     looks = looks or raw
     transform = looks.encoder(report_transform(target, basis, predicted.image))
     current = looks.current
-    # Pictures take the time, and none waits for another.
+    # Most of the time goes into pictures, which are independent of each other.
     making: dict[str, Callable[[], str]] = {
         "mixer": partial(_mixer, basis, target, solution, looks, transform=transform),
         "maps": partial(
@@ -223,7 +223,7 @@ def _absolute_path(path: str) -> str:
 
 
 def _banner(verification: Verification | None) -> str:
-    """Return what readers must know first: a warning if the render contradicts the prediction."""
+    """Return the warning that readers must see first, if the render contradicts the prediction."""
     if verification is None:
         return (
             '<p class="note">Not verified: there is no render of the relit scene to compare with, '
@@ -244,7 +244,7 @@ def _notes(remarks: list[str]) -> str:
 
 
 def _exposure(transform: ViewTransform, predicted: Floats, origin: str) -> str:
-    """Return how linear light became these pictures, and how much of it they cannot show."""
+    """Describe the view transform of the pictures, and how much light exceeds it."""
     exposure_text = (
         f"exposure {transform.stops:+.1f} stops" if transform.stops else "the scene's own exposure"
     )

@@ -15,7 +15,7 @@ from lightpaint.report.rig.rig_drawing import rig_drawing
 def placement_section(
     hung: HungLights | None, picture: npt.NDArray[np.uint8], features: Features | None
 ) -> str:
-    """Return what moved and why, the picture with arrows, and plan and elevation of the room.
+    """Return the moves with reasons, the picture with arrows, and the room's plan and elevation.
 
     None gives no section. picture: the answer, (h, w, 3) in 8 bits.
     """

@@ -49,8 +49,8 @@ def suggestion_section(
 ) -> str:
     """Return each suggested light: the picture without and with it, its place, and its XML.
 
-    None gives no section. turn: of a light that is there, which comes first. is_clean:
-    whether to denoise the pictures.
+    Without any the section is empty. turn: the turn of an existing light, which comes first.
+    is_clean: whether to denoise the pictures.
     """
     if suggestions is None:
         return ""
@@ -78,7 +78,7 @@ def suggestion_section(
 
 
 def spoken_turn(turn: MoveSuggestion) -> str:
-    """Return what turning a light would bring, in one sentence."""
+    """Return the gain of turning a light, in one sentence."""
     gain = spoken_fraction(turn.gain_share)
     return f"Turning {turn.name} by {turn.turn:.0f}° would remove {gain} of the difference."
 

@@ -1,4 +1,4 @@
-"""Lights with their places, and what was changed of them, for pictures and pages."""
+"""Lights with their places and the changes made to them, for pictures and pages."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -38,7 +38,7 @@ class HungLight:
 
 @dataclass(frozen=True)
 class LightChange:
-    """A light that moved or is new. text: what it did and gained. numbers: the same, for files."""
+    """A light that moved or is new. text: its change and gain. numbers: the same, for files."""
 
     name: str
     text: str

@@ -13,10 +13,10 @@ from lightpaint.report.rig.view_geometry import ViewGeometry
 #: The ground.
 GROUND = (24, 24, 26)
 
-#: Drawn this much larger than it is shown, so that lines are smooth.
+#: Supersampling of the drawing, which makes lines smooth.
 FINER = 2
 
-#: The room around what is seen, as a share; lights farther away than this are not drawn.
+#: Margin around the visible points, and the distance up to which lights are drawn, as shares.
 MARGIN, FAR = 0.08, 1.5
 
 #: Most height of both drawings, relative to their width.
@@ -115,7 +115,7 @@ def _ahead(geometry: ViewGeometry, up: Doubles) -> Doubles:
 
 
 def _places_near(geometry: ViewGeometry, lights: Sequence[HungLight]) -> Doubles:
-    """Return the places of lights, old and new, that are near what is seen."""
+    """Return the places of lights, old and new, near the visible points."""
     sites = [light.place.site for light in lights]
     sites += [light.place.moved_from for light in lights if light.place.moved_from is not None]
     places = [site.position for site in sites if site.position is not None]

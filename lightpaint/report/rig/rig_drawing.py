@@ -25,10 +25,10 @@ CHANGED = (255, 176, 66)
 #: Brightness of the room's points, and their largest side in pixels of the large drawing.
 ROOM, LARGEST = 0.45, 40
 
-#: Lengths of beams as a share of the panel, where they meet nothing that is seen.
+#: Length of a beam that meets no visible point, as a share of the panel.
 BEAM = 0.3
 
-#: Names are drawn of so many lights; of more only those that changed have theirs.
+#: Most lights that are all named; of more, only those that changed are.
 MOST_NAMES = 24
 
 
@@ -166,7 +166,7 @@ def _draw_beam(
 
 
 def _draw_light(draw: ImageDraw.ImageDraw, panel: Panel, light: HungLight, text: int) -> None:
-    """Draw where a light hangs and, if it moved, where it hung before."""
+    """Draw a light at its place and, if it moved, its earlier place."""
     assert light.place.position is not None
     centre, radius = panel.at(light.place.position), 0.42 * text
     thin = max(2, text // 9)

@@ -1,4 +1,4 @@
-"""The geometry of a picture: where its camera stands and where points of the scene are in it.
+"""The geometry of a picture: the position of its camera, and the projection of points into it.
 
 A basis knows the position of what each pixel shows, and not its camera. The projection follows from
 these pairs of pixels and points (direct linear transform, Hartley & Zisserman 2004, §7.1).
@@ -25,7 +25,7 @@ PASSES, KEPT = 3, 0.9
 #: Median error in pixels beyond which a camera has no such projection.
 MOST_ERROR = 1.5
 
-#: Degrees from the axis of a light within which a visible point counts as what it points at.
+#: Degrees from a light's axis within which a visible point counts as its target.
 NEAR_AXIS = 2.5
 
 
@@ -45,7 +45,7 @@ class ViewGeometry:
 
     @classmethod
     def of(cls, features: Features | None) -> "ViewGeometry | None":
-        """Return that of a picture with these features; None if they have no positions."""
+        """Return the geometry of a picture with these features; None if they have no positions."""
         if features is None or features.position is None:
             return None
         height, width = features.size
