@@ -1,7 +1,7 @@
 """lightpaint: paint how a scene should look; get the lighting that comes closest.
 
 The method of "Painting with Light" (Schoeneman, Dorsey, Smits, Arvo, Greenberg, SIGGRAPH
-1993) in image space on Mitsuba 3. Data walks through five rooms in one direction:
+1993) in image space on Mitsuba 3. Data passes through five stages in one direction:
 
     call                        in → out                             question
     load_scene                  scene XML → Scene                    which lights are there?

@@ -227,7 +227,7 @@ class Basis(Shown):
         )
 
     def without_cached_values(self) -> "Basis":
-        """Return this basis without what was computed of its planes, which have changed since."""
+        """Return this basis without values computed from its planes, which have changed since."""
         return replace(self)
 
     def with_requests(self, requests: SceneRequests) -> "Basis":
@@ -255,12 +255,12 @@ class Basis(Shown):
 
     @property
     def present_weights(self) -> Doubles:
-        """(n, 3) weights of the scene as it is."""
+        """Weights of the present scene, (n, 3)."""
         return self.lights.present_weights
 
     @cached_property
     def present_look(self) -> npt.NDArray[np.float32]:
-        """The scene as it is, (h, w, 3), or as it was before its lights were moved."""
+        """The present scene, (h, w, 3), or the scene before its lights were moved."""
         if self.former is not None:
             return read_only(self.former.image)
         return read_only(self.mix(self.present_weights))
@@ -281,7 +281,7 @@ class Basis(Shown):
 
     @property
     def is_fixed(self) -> Bools:
-        """(n,), which lights stay as they are, with weight 1."""
+        """Which lights are fixed, with weight 1, (n,)."""
         return self.lights.is_fixed
 
     @cached_property

@@ -17,9 +17,9 @@ from lightpaint.images.estimate import box_mean
 from lightpaint.images.pixel_blocks import block_mean
 from lightpaint.images.stray_pixels import stray_pixels
 
-#: Pixels on either side over which noise and what a denoiser changed are averaged.
+#: Pixels on either side over which noise and the denoiser's changes are averaged.
 RADIUS = 3
-#: The same where noise is told from the picture alone, which takes more pixels.
+#: The same if noise is estimated from the picture alone, which takes more pixels.
 GRAIN_RADIUS = 5
 
 
@@ -44,7 +44,7 @@ def denoise_mix(
 
 
 def denoise_present_look(basis: Basis, *, quality: Quality = "fast") -> Floats:
-    """Return the scene as it is without its grain, (h, w, 3) float32."""
+    """Return the present scene, denoised, (h, w, 3) float32."""
     mixed = basis.present_look
     if basis.former is not None:
         return denoised(mixed, basis.features, quality=quality)
@@ -121,10 +121,11 @@ def share_of_clean(raw: Floats, half_difference: Floats, clean: Floats) -> Float
 def blend_by_grain(raw: Floats, clean: Floats) -> Floats:
     """Return the mean of a picture of unknown noise and its denoised form, (h, w, 3) float32.
 
-    Noise differs from pixel to pixel, while along an edge neighbours lose alike. So of r = clean −
-    raw, in a window of pixels, what is shared with the pixels two away in the direction that shares
-    most is taken for what the denoised form has lost, and the rest for noise: t = V / ⟨r²⟩ as of
-    `share_of_clean`. Two pixels, since renderers that filter share noise between neighbours.
+    Noise differs from pixel to pixel, while along an edge neighbours lose alike. So the part of r =
+    clean − raw that correlates with the pixels two away, in the direction of the largest
+    correlation, counts as detail that the denoised form has lost, and the rest as noise: t = V /
+    ⟨r²⟩ as in `share_of_clean`. The distance is two pixels, since filtering renderers correlate the
+    noise of neighbours.
     """
     changed = (clean - raw).astype(np.float64)
 

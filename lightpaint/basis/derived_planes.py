@@ -1,7 +1,7 @@
-"""Planes that are made of others: some of several, means over blocks, several pictures in one row.
+"""Planes derived from others: sums of several, means over blocks, pictures joined in a row.
 
-What memory has room for is made at once. The rest is made of the rows of the others whenever it is
-asked for, so that it takes no more memory than these rows.
+Planes that fit into memory are computed at once. The rest is computed from rows of the others on
+each request, and takes no more memory than these rows.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from lightpaint.images.pixel_blocks import block_sums
 #: Rows of pixels that are averaged at a time: those of a chunk of a file that is compressed.
 READ_ROWS = 16
 
-#: Blocks of which less than one in so many is asked for are made of their own pixels.
+#: If less than one in so many blocks is requested, only the pixels of those are read.
 SPARSE = 8
 
 #: A plane by its number among others; None for a black one.

@@ -1,8 +1,8 @@
 """Bases kept from earlier runs, so that a second painting of a scene is answered at once.
 
 One file per scene content, sensor, size and seed; more samples are added to it when asked for.
-Beside it lies, under its name with another ending, what was made of it or is known of its scene.
-The folder (`cache_folder.py`) may be deleted at any time.
+Files with its name and another ending hold data derived from it, and facts about its scene. The
+folder (`cache_folder.py`) may be deleted at any time.
 """
 
 import hashlib
@@ -38,7 +38,7 @@ from lightpaint.files import replacing
 
 #: Bytes above which the bases that were not used for longest are deleted.
 MAX_BYTES = 8 * 2**30
-#: What comes of a damaged file of arrays.
+#: Errors of reading a damaged file of arrays.
 _DAMAGES = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 #: Seconds after which an unfinished file belongs to nobody.
 LEFTOVER_S = 3600.0
@@ -115,7 +115,7 @@ def find_most_sampled(
 
 
 def keep(basis: Basis) -> bool:
-    """Keep `basis` in the place of what was kept for its scene, sensor, size and seed.
+    """Keep `basis`, replacing the entry of its scene, sensor, size and seed.
 
     Returns whether that worked: a full disk is no reason to lose a render.
     """
@@ -193,7 +193,7 @@ def is_cached(basis: Basis) -> bool:
 def _prune(path: Path) -> None:
     """Bring the folder back under MAX_BYTES, and keep `path`."""
     for leftover in folder().glob(".*"):
-        # What a killed process was writing.
+        # Delete what a killed process was writing.
         if _is_leftover(leftover) and time.time() - leftover.stat().st_mtime > LEFTOVER_S:
             shutil.rmtree(leftover, ignore_errors=True)
     delete_orphans(UNUSED_S)

@@ -1,8 +1,7 @@
 """The folder that bases are kept in, and which of its files are this program's own.
 
-Only files are listed, read or deleted there that have names of our own kind, the mark of our own
-formats inside, and an owner who may be trusted: somebody who names a folder of work as the cache
-loses nothing in it.
+The cache lists, reads and deletes only files with our own kind of name, the signature of our own
+formats, and a trusted owner. So a user who names a work folder as the cache loses nothing.
 """
 
 import os
@@ -32,18 +31,18 @@ BASIS_NAME = re.compile(r"[0-9a-f]{32}\.basis\.exr")
 COMPANION_NAME = re.compile(
     r"([0-9a-f]{32})(?:\.clean\.npz|\.[0-9a-f]{32}\.known\.json|\.[0-9a-f]{32}\.sums\.npz)"
 )
-#: Of a file that is being written, as `files.replacing` calls its folder.
+#: Folder of a file that is being written, as `files.replacing` names it.
 LEFTOVER_NAME = re.compile(r"\.([0-9a-f]{32}\.(?:[0-9a-f.]+\.)?[a-z]+\.[a-z]+)\.[a-z0-9_]{8}")
 
-#: The file that says what a folder is, by the convention for cache directories, which programs for
-#: backups know: https://bford.info/cachedir
+#: The file that marks a folder as a cache, by a convention that backup programs know:
+#: https://bford.info/cachedir
 TAG = "CACHEDIR.TAG"
 TAG_TEXT = """Signature: 8a477f597d28d172789f06886806bc55
 # This file is a cache directory tag created by lightpaint, which keeps rendered bases here.
 # All of this folder may be deleted at any time.
 """
 
-#: What stands at or near the beginning of each kind of file, and how far in at most, in bytes.
+#: Signature at or near the beginning of each kind of file, and its largest offset in bytes.
 MARKS = {
     SUFFIX: b"lightpaint-basis",
     DENOISED_SUFFIX: b"made_of.npy",
@@ -87,7 +86,7 @@ def is_own(path: Path) -> bool:
     if ending is None:
         return False
     try:
-        # What belongs to somebody else may be a link, or a pipe that never ends.
+        # A file of another user may be a link, or a pipe that never ends.
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as f:
             status = os.fstat(f.fileno())
             return is_trusted_owner(status) and MARKS[ending] in f.read(MARK_WITHIN[ending])
@@ -96,7 +95,7 @@ def is_own(path: Path) -> bool:
 
 
 def is_trusted_owner(status: os.stat_result) -> bool:
-    """Return whether a file or folder belongs to who runs this, or to who runs the machine."""
+    """Return whether this process's user or the administrator owns a file or folder."""
     return not hasattr(os, "geteuid") or status.st_uid in (os.geteuid(), 0)
 
 
@@ -107,7 +106,7 @@ def companions_of(path: Path) -> list[Path]:
 
 
 def delete_orphans(unused_s: float = 0.0) -> int:
-    """Delete what lies beside no kept basis and was not used for that long; how many bytes."""
+    """Delete long-unused files without a kept basis, and return their bytes."""
     freed = 0
     for path, name in _companions():
         with suppress(OSError):

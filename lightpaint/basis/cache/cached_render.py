@@ -1,4 +1,4 @@
-"""The basis to solve with: an earlier one where it fits, with what it lacks rendered."""
+"""The basis to solve with: a cached one if it fits, completed by rendering."""
 
 import time
 from collections.abc import Callable
@@ -57,16 +57,17 @@ def obtain_basis(
 ) -> Basis:
     """Return the basis of `scene`: cached planes, and missing samples rendered.
 
-    A plane serves every scene of which it has the identity (`Scene.light_identities`): of one in
-    which a lamp was moved, that lamp alone is rendered. Its samples follow the camera paths that
-    they would in a render of all lights, but choose among other emitters: the planes have the same
-    means, and other noise, than those of a render from nothing.
+    A plane serves every scene that has its identity (`Scene.light_identities`): after a lamp was
+    moved, only that lamp is rendered. Its samples follow the same camera paths as in a render of
+    all lights, but choose among fewer emitters, so the planes have the same means as a full render,
+    and other noise.
 
-    time_s: instead of spp, seconds of rendering to add to what was kept. Where some lights have
-    fewer samples than others, the time is theirs until they have as many.
+    time_s: instead of spp, seconds of rendering to add to what was kept. Lights with fewer samples
+    than others get the time until they have as many.
     use_cache: False neither looks for one nor keeps it.
-    exact_spp: whether it has just as many samples as are asked for, and the same ones, whatever
-    was kept: then nothing is taken of another state of the scene. One with more samples stays kept.
+    exact_spp: whether the basis has exactly the requested samples, whatever is cached. Then no
+    planes come from another state of the scene. A cached basis with more samples stays in the
+    cache.
     is_final: False for a basis to be gone on from: its exact sums are kept beside it, so that a
     basis with more samples has the bits of one render, as it has after an interrupt.
     render: who renders what is missing.
@@ -128,8 +129,8 @@ def _starting_planes(
 ) -> Basis | None:
     """Return the planes to which a render adds samples; None to begin without any.
 
-    cached: the basis of the scene as it is. goal_spp: None for a time, whose samples add to any.
-    The other arguments are those of `obtain_basis`.
+    cached: the basis of the present scene. goal_spp: None for a time, whose samples add to any. The
+    other arguments are those of `obtain_basis`.
     """
     lacks_samples = goal_spp is None or cached is None or cached.origin.spp < goal_spp
     start = cached
@@ -148,7 +149,7 @@ def _starting_planes(
 def _as_from_cache(scene: Scene, basis: Basis, keep: Callable[[Basis], bool]) -> Basis:
     """Keep a basis in the cache, and return it as it is read from there."""
     if not is_large(len(basis.lights), basis.size):
-        # As from its file, so that the next run finds the same.
+        # Rounded as in its file, so that the next run gets the same.
         basis = replace(as_stored(basis, keep), sums=None)
         file = cache.file_of(basis)
         return basis if file is None else leave_indirect(basis, file)
@@ -225,7 +226,7 @@ def top_up_basis(
 
 
 def check_same_view(scene: Scene, basis: Basis) -> None:
-    """Raise BasisError unless `basis` was made of `scene` as it is, through its sensor."""
+    """Raise BasisError unless `basis` was rendered from the present `scene`, through its sensor."""
     origin, sensor = basis.origin, scene.sensor_names[scene.sensor]
     scene_members = {light.name: light.member_names for light in scene.lights}
     basis_members = {light.name: light.members for light in basis.lights}

@@ -1,9 +1,9 @@
-"""Planes of a basis without their grain, kept from earlier runs.
+"""Denoised planes of a basis, cached between runs.
 
-Light adds, so the sum of clean planes is a clean picture of any lighting, for the price of a sum;
-beside a render of many samples it is a little nearer than the sum denoised is. Only for eyes: what
-is solved is the basis as it was rendered. They are kept where bases are, by the content of what
-they were made of, and may be deleted at any time.
+Light is additive, so a sum of denoised planes is a denoised picture of any lighting. It is slightly
+closer to a render with many samples than the denoised sum is. These planes are for display only:
+solves use the basis as rendered. They are cached with the bases, keyed by the content that they
+were made from, and may be deleted at any time.
 """
 
 import hashlib
@@ -41,13 +41,13 @@ BRIGHTEST_HALF = 1024.0
 #: Pixels on a side over which the share of a light is taken where surfaces are not known.
 ROUGH_BLOCK = 8
 
-#: How many times the light of rough planes in a block that is denoised is shown there at most.
+#: Largest factor of the light of rough planes in a denoised block.
 MAX_BLOCK_GAIN = 4.0
 
 #: Rows of planes that are brought to single precision at a time.
 STRIP_ROWS = 64
 
-#: What comes of reading a file that is cut off, or another one.
+#: Errors of reading a truncated file, or one of another kind.
 _READ_ERRORS = (
     *(OSError, EOFError, LookupError, MemoryError, NotImplementedError, RuntimeError, ValueError),
     zipfile.BadZipFile,
@@ -61,9 +61,9 @@ class DenoisedPlanes:
     """Denoised planes, for display.
 
     halves: (n, h, w, 3) float16, linear, at unit emission over `scales`, or as many means over
-    blocks of pixels. scales: (n,), powers of 2. present: (h, w, 3) float32, the scene as it is:
-    their sum, or the sum denoised where that came first, so that who paints over it goes on from
-    what was there.
+    blocks of pixels. scales: (n,), powers of 2. present: (h, w, 3) float32, the present scene: the
+    sum of the planes, or the denoised sum if that came first, so that painting continues from the
+    picture that was shown.
     """
 
     halves: Halves
@@ -96,16 +96,15 @@ class DenoisedPlanes:
 
 
 class RoughPlanes:
-    """Planes without most of the noise, available at once where denoising takes seconds.
+    """Planes without most of the noise, available at once, while denoising takes seconds.
 
-    It is the clean picture of the scene as it is, times the share that the light has in it, so that
-    they add up to that picture. Shares are those of light that is averaged along surfaces, direct
-    light as far as its noise in that picture asks for it. Where surfaces are not known, or pictures
-    are too large for that to be quick, they are of means over squares of pixels, and shadows are
-    soft.
+    Each is the denoised picture of the present scene times the light's share in it, so that they
+    add up to that picture. The shares come from light averaged along surfaces; direct light is
+    averaged only as far as its noise requires. If surfaces are unknown, or pictures too large, the
+    shares come from means over squares of pixels, and shadows are soft.
 
-    present: (h, w, 3) float32, that picture. small: denoised planes of blocks of pixels, as a page
-    of results keeps them; rough planes then have their light in each block.
+    present: (h, w, 3) float32, that picture. small: denoised planes of pixel blocks, as cached by a
+    page of results; the rough planes then match them in each block.
     """
 
     def __init__(self, basis: Basis, present: Floats, small: DenoisedPlanes | None = None) -> None:
@@ -123,7 +122,7 @@ class RoughPlanes:
             resampled(x, self.basis.size)
             for x in (small, block_mean(rough, -(-self.basis.size[0] // len(small))))
         )
-        # Where a block has hardly any light, its pixels say little of what it lacks.
+        # In a block with little light, the pixels say little about the missing light.
         least = np.float32(1e-4) * there.mean()
         gain = np.clip((wanted + least) / (there + least), 0, MAX_BLOCK_GAIN)
         return np.asarray(rough * gain, np.float32)
@@ -176,9 +175,9 @@ def as_halves(plane: Floats, scale: float = 1.0) -> Halves:
 def obtain_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | None:
     """Return the denoised planes, from the cache or computed and cached now.
 
-    factor: side of the blocks whose means are denoised, for the price of so many pixels; where
-    whole planes are kept, they are returned. None where Open Image Denoise is missing, and for so
-    few pixels that their sums are denoised sooner.
+    factor: side of the blocks whose means are denoised, which costs less; cached whole planes are
+    returned instead. None without Open Image Denoise, and for so few pixels that denoising their
+    sums is quicker.
     """
     pixels = len(basis.lights) * basis.size[0] * basis.size[1]
     if pixels < MIN_PIXELS or not oidn_is_installed():
@@ -228,7 +227,7 @@ def read_denoised_planes(basis: Basis, *, factor: int = 1) -> DenoisedPlanes | N
 
 
 def cache_denoised_planes(basis: Basis, planes: DenoisedPlanes) -> bool:
-    """Keep what was made of `basis`. Returns whether that worked: nothing is lost if not."""
+    """Cache the denoised planes of `basis`. Returns whether that worked; nothing is lost if not."""
     try:
         path = cache.companion_path(basis, DENOISED_SUFFIX)
         with replacing(path) as place, place.open("wb") as file:

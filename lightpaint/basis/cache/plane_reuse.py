@@ -1,8 +1,8 @@
-"""Bases put together of planes that were rendered before, by the identities of these.
+"""Bases assembled from earlier planes, by the planes' identities.
 
-A light that moved has a plane of another identity; the planes of all others are still what a render
-of them would come to, but for noise. So only planes that are lacking are rendered, together, and
-lights may have unequal numbers of samples, which `Origin.each_light` says.
+A moved light has a plane of another identity. The planes of all other lights still equal a new
+render, up to noise. So only missing planes are rendered, together, and lights may have unequal
+numbers of samples (`Origin.each_light`).
 """
 
 from collections.abc import Sequence
@@ -74,14 +74,14 @@ def gather_planes(
     before: Basis | None = None,
     use_cache: bool = True,
 ) -> Basis | None:
-    """Return a basis of `scene` of the planes that the cache has of it, whatever scene they are of.
+    """Return a basis of `scene` from cached planes, whatever scene they were rendered from.
 
-    Lights of which it has none are black, without a sample. None where it has none at all.
+    Lights without a cached plane are black and have no samples. None if no plane is cached.
 
-    cached: the basis of the scene as it is, which is returned itself where no other adds to it.
-    spp: samples per pixel beyond which more are no reason to look for others; None for as many as
-    there are. before: a basis of the same seed and film, of the scene in another state, whose
-    planes are taken as well. use_cache: False to take of no other.
+    cached: the basis of the present scene, returned itself if no other adds to it. spp: samples per
+    pixel that suffice; None for as many as possible. before: a basis of the same seed and film, of
+    the scene in another state, whose planes are taken as well. use_cache: False to take of no
+    other.
     """
     identities = scene.light_identities
     planes: list[KeptPlane | None] = [None] * len(identities)
@@ -187,7 +187,7 @@ def _better_sampled(plane: KeptPlane | None, other: Basis, identity: str) -> Kep
     for i, light in enumerate(other.lights):
         if light.identity == identity != "":
             candidate = KeptPlane(other, i)
-            # Of one half alone the noise is unknown.
+            # The noise of a single half is unknown.
             if min(candidate.counts[:2]) and sum(candidate.counts[:2]) > has:
                 return candidate
     return plane
@@ -248,9 +248,9 @@ def _count_fields(each_light: Sequence[Counts], *, is_one_pass: bool) -> dict[st
 
 
 def _emitters_seen_in(scene: Scene, sources: Sequence[Basis]) -> Bools:
-    """Return where an emitter is seen in `scene`, of bases of it with other lights.
+    """Return where an emitter is visible in `scene`, from bases of it with other lights.
 
-    Shapes that shine are the same in all of them, and what surrounds them may not be.
+    They share the emitting shapes, but maybe not the environment.
     """
     is_surrounded = any(emitter.plugin in ENVIRONMENTS for emitter in scene.emitters)
     alike = [

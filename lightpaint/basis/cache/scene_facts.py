@@ -1,12 +1,12 @@
 """Facts about a scene from an earlier run, valid while everything they depend on is unchanged.
 
-Loading a scene takes seconds, of which a basis that is kept needs nothing but to be found: the
-scene's identity. So that is kept beside the basis, with what else a painter has to know, under all
-that it may depend on: how the scene was asked for, the code that read it, and every file that it
-consists of, as well as those that are not there and would be read if they were.
+Loading a scene takes seconds, but finding its cached basis needs only the scene's identity. So that
+is kept beside the basis, with all else that a painter has to know.
 
-Whoever is in doubt knows nothing, and the scene is loaded: over a file that was written while it
-was read, or of which only Mitsuba's parser knows.
+Its key covers everything that it depends on: the arguments of loading, the code that read the
+scene, and every file of the scene, including missing files that would be read if they existed. In
+doubt the facts do not count and the scene is loaded: if a file was written while it was read, or if
+only Mitsuba's parser knows of it.
 """
 
 import hashlib
@@ -39,7 +39,7 @@ FORMAT = "lightpaint-known 2"
 #: disks are as coarse as that.
 COARSE_S = 2.0
 
-#: What in a process changes how Mitsuba reads a scene.
+#: Environment variables that change how Mitsuba reads a scene.
 ENVIRONMENT_PREFIXES = ("MI_", "MITSUBA")
 
 #: Code that reads scenes and makes identities of them: our rooms, and libraries of others.
@@ -51,9 +51,9 @@ LIBRARIES = ("mitsuba", "drjit")
 class SceneFacts:
     """Facts about a scene that are known without loading it.
 
-    identity, sensor, size: by which its basis is kept. spp: samples that it asks for. path: as
-    `Scene.path`. lights: as its basis has them. remarks: what was
-    worth saying of it when it was loaded.
+    identity, sensor, size: the key of its basis. spp: samples that the scene asks for. path: as
+    `Scene.path`. lights: those of its basis. remarks: messages for the user from when it was
+    loaded.
     """
 
     identity: str
@@ -68,7 +68,7 @@ class SceneFacts:
 def facts_key(asking: Mapping[str, Any]) -> str:
     """Return a key for everything that is neither in a scene nor in its files.
 
-    asking: all that decides how it is loaded and on which film, as plain values.
+    asking: all arguments of loading and of the film, as plain values.
     """
     environment = {x: y for x, y in os.environ.items() if x.startswith(ENVIRONMENT_PREFIXES)}
     key = [FORMAT, dict(asking), os.getcwd(), environment, _code_version()]
@@ -103,9 +103,9 @@ def remember_facts(
     remarks: Iterable[str],
     began_s: float,
 ) -> bool:
-    """Keep what is known of `scene` beside its kept `basis`. Returns whether that could be done.
+    """Store the facts of `scene` beside its cached `basis`. Returns whether that worked.
 
-    began_s: when the scene's files were begun to be read, by the clock of the system.
+    began_s: system time at which reading of the scene's files began.
     """
     if bases.file_of(basis) is None:
         return False
@@ -174,7 +174,7 @@ def _digest(path: Path) -> str:
 def _reads_more(path: Path) -> bool:
     """Return True if the XML at `path` makes its parser read more files or folders.
 
-    Raises ValueError for what is not read here, as in UTF-16.
+    Raises ValueError for XML that is not read here, such as UTF-16.
     """
     for element in markup(path.read_bytes()):
         tag = element["tag"]

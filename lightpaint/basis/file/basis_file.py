@@ -1,4 +1,4 @@
-"""The file of a basis, and writing it: a multi-part OpenEXR that other programs open as it is.
+"""Writing a basis as a multi-part OpenEXR, which other programs can open.
 
 Part k is named after light k and holds its image as R, G, B; docs/formats.md has the details.
 """
@@ -30,16 +30,16 @@ from lightpaint.images.formats.exr_streams import PartHead, room_for, write_stre
 from lightpaint.keywords import keywords
 from lightpaint.storage.json_records import fields_of
 
-#: What is written, and what else is read: in which all planes are float32.
+#: Format that is written, and an older one that is read, too: all its planes are float32.
 FORMAT, OLD_FORMAT = "lightpaint-basis 2", "lightpaint-basis 1"
 FORMAT_KEY = "lightpaint.format"
 ORIGIN_KEY = "lightpaint.origin"
 
-#: Bytes of the images of all lights in float32 up to which memory holds them so: up to here the
-#: time to decode half floats counts, beyond it memory.
+#: Largest size of all images in float32, in bytes, at which memory holds them as float32. Smaller
+#: bases save the time to decode half floats; larger ones save memory.
 SINGLES_MAX_BYTES = 2**27
 
-#: Bytes of planes in float32 up to which they are brought into memory.
+#: Largest size of planes in float32, in bytes, that are read into memory.
 IN_MEMORY_MAX_BYTES = 2**31
 
 
@@ -48,15 +48,15 @@ def write_basis(path: str | Path, basis: Basis) -> None:
     """Write `basis` as a multi-part EXR, whole or not at all.
 
     Args:
-        path: Of the file; `.basis.exr` by custom.
-        basis: To keep.
+        path: The file to write, by convention `*.basis.exr`.
+        basis: The basis to write.
 
     Examples:
         >>> lp.write_basis("again.basis.exr", basis)
         >>> lp.read_basis("again.basis.exr").names
         ('panel', 'bulb')
     """
-    # Without what says no more than by default, as in files from before there was any.
+    # Fields with default values are left out, as in files from before these fields existed.
     later = ("each_light", "integrator", "is_composed", "extra_spp")
     of_origin = json.dumps(fields_of(basis.origin, *later), ensure_ascii=False)
     others, sums = list(other_parts(basis)), dict[str, str]()
@@ -82,7 +82,7 @@ def write_basis(path: str | Path, basis: Basis) -> None:
 
 
 def _room(basis: Basis, others: Sequence[ExrPart], of_origin: str) -> int:
-    """Return how many bytes stand before the pixels of a basis at most."""
+    """Return the largest number of bytes before the pixels of a basis."""
     scaled = [PlaneEncoding(scale=LARGEST_SCALE)] * len(PLANE_CHANNELS)
     lights = [(light.name, light_texts(light, scaled), basis.size[0]) for light in basis.lights]
     parts = [(part.name, part.attributes, part.size[0]) for part in others]
@@ -92,13 +92,12 @@ def _room(basis: Basis, others: Sequence[ExrPart], of_origin: str) -> int:
 
 
 def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None) -> Basis:
-    """Return `basis` with the planes that come back of what `write_basis` writes of it.
+    """Return `basis` with its planes rounded as `write_basis` rounds them.
 
-    So that who solves what was just rendered finds what who reads it from its file finds. Many
-    planes are copied in half floats. Few are rounded in the memory of those that are given, which
-    must be in memory.
+    So a solve gives the same answer with a fresh basis as with its file. A large basis is copied in
+    half floats. A small one is rounded in place; its planes must be in memory.
 
-    keep: called with all planes encoded, which to write takes no rounding again.
+    keep: called with all planes encoded, which can be written without rounding again.
     """
     stored = _encoded(basis)
     keep(stored)
@@ -112,12 +111,12 @@ def as_stored(basis: Basis, keep: Callable[[Basis], object] = lambda basis: None
 
 
 def is_encoded(lights: int, size: tuple[int, int]) -> bool:
-    """Return whether memory holds planes of so many lights as their file does."""
+    """Return whether planes of so many lights stay encoded in memory, as in their file."""
     return 12 * lights * size[0] * size[1] > SINGLES_MAX_BYTES
 
 
 def _encoded(basis: Basis) -> Basis:
-    """Return `basis` with planes that memory holds as their file does."""
+    """Return `basis` with planes encoded in memory as in their file."""
     of_lights = [encoded_planes_of(basis, k) for k in range(len(basis.lights))]
     images, noise, *indirect = map(EncodedPlanes, zip(*of_lights, strict=True))
     parts = IndirectLight(*indirect) if indirect else None
@@ -130,5 +129,5 @@ def is_large(lights: int, size: tuple[int, int]) -> bool:
 
 
 def is_basis_file(path: Path) -> bool:
-    """Return True if the name is that of a basis: a basis is an EXR, a scene is XML."""
+    """Return whether a path names a basis, which is an EXR, rather than a scene, which is XML."""
     return path.suffix.lower() == ".exr"

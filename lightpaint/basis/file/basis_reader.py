@@ -49,13 +49,13 @@ from lightpaint.storage.json_records import read_record, strict_json
 #: Longest basis file that is read, in bytes.
 MAX_BYTES = 2**36
 
-#: What comes of a header that says something else than it should.
+#: Errors of a header with invalid content.
 _HEADER_ERRORS = (AttributeError, LookupError, OverflowError, TypeError, ValueError)
 
 
 @keywords()
 def read_basis(path: str | Path) -> Basis:
-    """Read what `write_basis` wrote, also where another program has put its parts in another order.
+    """Read a basis file, even if another program has reordered its parts.
 
     Args:
         path: What `write_basis` or the command line wrote.
@@ -87,8 +87,8 @@ def read_basis(path: str | Path) -> Basis:
 def leave_indirect(basis: Basis, path: Path) -> Basis:
     """Return `basis` with indirect planes whose rows are read on demand, if it has many lights.
 
-    Only pictures need them, and memory holds no more of a light then than if it had none. path: of
-    a file that holds just this basis; if it does not, or is of another kind, nothing changes.
+    Only pictures need them, so they then take no memory. path: a file of exactly this basis; with
+    any other file nothing changes.
     """
     if basis.indirect is None or not is_encoded(len(basis.lights), basis.size):
         return basis
@@ -197,8 +197,8 @@ def _checked_basis(
 ) -> Basis:
     """Return the basis of a file, checked.
 
-    texts, stored: of the part of each light its attributes, and what reads its channels. planes:
-    makes planes of the parts in an order, those of a number among `PLANE_CHANNELS`. has_indirect:
+    texts, stored: for the part of each light, its attributes and the reader of its channels.
+    planes: makes planes of the parts in an order, for an index into `PLANE_CHANNELS`. has_indirect:
     whether the parts have planes of indirect light.
     """
     seen = [p.in_display_window().channels["Y"] for p in others if "Y" in p.channels]

@@ -1,9 +1,9 @@
-"""Checksums in a basis file, by which it shows that another program has changed it.
+"""Checksums in a basis file, which reveal changes by other programs.
 
-OpenEXR's own compression tells damage, but not a part that was painted over, converted to half,
-cropped or exchanged and written again. The header of the first part has, as the text attribute
-`lightpaint.checksums`, CRC-32s of every light (what its header says and its pixels, together),
-of the origin and of the mask of seen emitters. A file without the attribute is read unchecked.
+OpenEXR's own compression detects damage, but not a part that was painted over, converted to half,
+cropped or replaced and written again. The header of the first part has, as the text attribute
+`lightpaint.checksums`, CRC-32s of every light (what its header says and its pixels, together), of
+the origin and of the mask of seen emitters. A file without the attribute is read unchecked.
 """
 
 import json
@@ -26,7 +26,7 @@ Channels = Mapping[str, npt.NDArray[Any]]
 
 @dataclass(frozen=True)
 class Checksums:
-    """Checksums of what was written. lights: by name, in the order of the lights."""
+    """The checksums of a basis file. lights: by name, in order. learned: of the guide table."""
 
     lights: Mapping[str, str]
     origin: str
@@ -61,7 +61,7 @@ class Checksums:
 
 
 def checksum(text: str, channels: Channels) -> str:
-    """Return eight hexadecimal digits for a text and pixels, their sizes, types and names."""
+    """Return eight hexadecimal digits for a text and pixels, with their sizes, types and names."""
     crc = zlib.crc32(text.encode())
     for name in sorted(channels):
         pixels = np.ascontiguousarray(channels[name])
@@ -71,7 +71,7 @@ def checksum(text: str, channels: Channels) -> str:
 
 
 def check(expected: str, part: str, text: str, channels: Channels) -> None:
-    """Raise BasisError unless text and pixels are those that were written."""
+    """Raise BasisError unless text and pixels have the expected checksum."""
     if checksum(text, channels) == expected:
         return
     raise BasisError(

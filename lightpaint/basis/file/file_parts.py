@@ -50,7 +50,7 @@ PLANE_CHANNELS = (IMAGE_CHANNELS, NOISE_CHANNELS, INDIRECT_IMAGE_CHANNELS, INDIR
 #: Most extra samples of a pixel, which float32 tells apart.
 MAX_EXTRA = 2**24
 
-#: What a plane may be multiplied by.
+#: Smallest and largest scale of a plane.
 LEAST_SCALE, LARGEST_SCALE = 2.0**-126, 2.0**126
 
 
@@ -63,7 +63,7 @@ def plane_sets(basis: Basis) -> list[Planes]:
 
 
 def encoded_planes_of(basis: Basis, k: int) -> list[EncodedPlane]:
-    """Return the planes of light k as they are best stored, in the order of `PLANE_CHANNELS`."""
+    """Return the planes of light k, encoded for storage, in the order of `PLANE_CHANNELS`."""
     sets = plane_sets(basis)
     if all(isinstance(planes, EncodedPlanes) for planes in sets):
         return [planes.encoded(k) for planes in sets if isinstance(planes, EncodedPlanes)]
@@ -93,7 +93,7 @@ def light_channels(planes: Sequence[EncodedPlane]) -> Channels:
 
 
 def checked_text(texts: Mapping[str, str]) -> str:
-    """Return what the checksum of a light is of, beside its pixels."""
+    """Return the text that the checksum of a light covers besides its pixels."""
     return texts[LIGHT_KEY] + texts.get(SCALE_KEY, "")
 
 

@@ -24,9 +24,9 @@ PICKED_MAX_BYTES = 2**27
 
 
 class RowPlanes(PlanesBase):
-    """Planes that are read by their rows, by whoever says how (`rows`).
+    """Planes that a function (`rows`) reads by rows on demand.
 
-    Walks over pixels come by the same rows again and again, so that a few strips of rows are kept.
+    Passes over the pixels request the same rows repeatedly, so a few strips of rows are cached.
     """
 
     def rows(self, top: int, bottom: int) -> Floats:
@@ -112,7 +112,7 @@ class _Strips:
         self._lock = Lock()
 
     def __getitem__(self, k: int) -> Floats:
-        """Return the k-th strip; who asks while another thread reads it waits for that."""
+        """Return the k-th strip; wait if another thread is reading it."""
         with self._lock:
             strip = self._strips.get(k)
             is_mine = strip is None
@@ -135,7 +135,7 @@ class FilePlanes(RowPlanes):
     """Planes in parts of an OpenEXR file.
 
     parts: one for each light, all of one size. names: the channels of red, green and blue. scales:
-    what the numbers of each part are to be multiplied by.
+    factors of the numbers of each part.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
-"""Half floats for planes: which are stored in them, so that nobody ever sees their rounding.
+"""Half floats for planes whose rounding stays invisible.
 
-Rounding to half is 2⁻¹¹ of a value at most. An image is stored so where that is far below its own
-noise in every tile of it, and in float32 where it is so clean that rounding would show. What is too
-bright for half floats, or so dim that they lose digits, is multiplied by a power of two first.
+Rounding to half changes a value by 2⁻¹¹ at most. An image is stored in half floats if that is far
+below its own noise in every tile, and in float32 if it is cleaner. Images too bright for half
+floats, or so dim that they would lose digits, are multiplied by a power of two first.
 """
 
 from collections.abc import Sequence

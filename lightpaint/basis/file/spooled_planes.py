@@ -11,9 +11,9 @@ from lightpaint.basis.planes import Planes
 
 
 def spooled(planes: Planes) -> Planes:
-    """Return planes as they are in memory, or from a temporary file if they are made on request.
+    """Return planes in memory unchanged, and copy planes computed on request to a temporary file.
 
-    Where that file has no room, they are made again on each request.
+    Without room for that file, they are computed again on each request.
     """
     if isinstance(planes, RowPlanes):
         with suppress(OSError):

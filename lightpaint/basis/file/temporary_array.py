@@ -1,4 +1,4 @@
-"""An array in a file without a name, of which memory holds only what is read or written."""
+"""An array in an unnamed file; memory holds only the parts being read or written."""
 
 import mmap
 import os
@@ -20,6 +20,6 @@ class TemporaryArray:
             self.array = np.memmap(file, np.float32, "r+", shape=shape)  # keeps it open
 
     def release(self) -> None:
-        """Release the memory of what was read or written, which stays in the file."""
+        """Release the memory of the parts read or written; the file keeps them."""
         if hasattr(mmap, "MADV_DONTNEED"):
             self.array._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]

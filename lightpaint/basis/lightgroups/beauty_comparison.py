@@ -36,8 +36,8 @@ def describe_sum(
 ) -> tuple[str, bool]:
     """Return a sentence on the sum of the groups, and whether more than rounding is missing.
 
-    name: of the light that is what they lack. All of it is in the primaries of the file: in
-    others, light of a wide gamut is negative.
+    name: of the light that represents the missing part. All numbers are in the primaries of the
+    file, since light of a wide gamut is negative in others.
     """
     beyond = np.sign(rest) * np.maximum(np.abs(rest) - rounding(layers), 0)
     truly_missing, truly_exceeding = missing_and_exceeding(beyond, whole)
@@ -86,10 +86,10 @@ def _rounded(image: Floats, *, is_half: bool) -> Floats:
 
 @dataclass(frozen=True)
 class LayerSum:
-    """Layers added up once, to be held against one picture after the other.
+    """The sum of layers, to compare with several pictures.
 
-    total: (h, w, 3) float64, not finite where one of them is not. bound: what rounding may have
-    done to it.
+    total: (h, w, 3) float64, not finite where one of them is not. bound: largest effect of rounding
+    on it.
     """
 
     total: Floats
@@ -120,9 +120,9 @@ class LayerSum:
         return float(_deviation(beauty.image, self.total).sum())
 
     def is_of(self, beauty: RenderLayer, *, less_itself: bool = False) -> bool:
-        """Return True if the sum is just that picture, and the picture is not black.
+        """Return whether the sum equals a picture that is not black.
 
-        less_itself: whether the picture is among what was added up, and is to be taken out again.
+        less_itself: whether the picture is one of the summed layers and has to be subtracted.
         """
         size = np.nan_to_num(np.abs(beauty.image), posinf=0, neginf=0).sum(dtype=np.float64)
         most = NEGLIGIBLE_SHARE * size

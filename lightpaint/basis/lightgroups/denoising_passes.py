@@ -54,7 +54,7 @@ class DenoisingPasses:
     indirect: Mapping[str, Floats]
 
     def features(self, view: str) -> Features | None:
-        """Return what the surfaces of a view layer tell; None without albedo or normals."""
+        """Return the denoising features of a view layer; None without albedo or normals."""
         albedo, normal, position = (
             self._surface(names, view) for names in (ALBEDO_NAMES, NORMAL_NAMES, POSITION_NAMES)
         )
@@ -111,7 +111,7 @@ def _plain_name(layer: RenderLayer) -> str:
 
 
 def _owner(match: re.Match[str], layers: Mapping[str, RenderLayer]) -> RenderLayer | None:
-    """Return the light's layer that a part is named after; None where none or several may be it."""
+    """Return the light's layer that a part is named after; None if none or several match."""
     if match["owner"]:
         return layers.get(match["owner"])
     name = match["name"]

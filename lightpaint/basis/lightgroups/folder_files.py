@@ -1,8 +1,8 @@
 """The files of a folder that may hold light groups: not hidden ones, paintings or results.
 
-A painting and what lightpaint has made often lie beside a render. Either would be one more light,
-and one that meets the painting best. A file is left out only for what is certain, and never
-without a word.
+Paintings and results of lightpaint often lie beside a render. Each would count as one more light,
+and match the painting best. A file is left out only if it certainly is no light, and a remark
+always names it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -32,10 +32,7 @@ def is_light_groups(path: Path) -> bool:
 
 
 def is_exr(path: Path) -> bool:
-    """Return True if `path` begins like OpenEXR, whatever its name. May raise ImageError.
-
-    What is no file is none.
-    """
+    """Return whether `path` is a file that begins like OpenEXR. May raise ImageError."""
     return path.is_file() and kind_of(head_of(path, 16)) == "exr"
 
 
@@ -100,7 +97,7 @@ def _reason_against(file: Path, others: Sequence[Path]) -> str:
         headers, _ = read_headers(file)
         channels = read_channels(file)
     except ImageError:
-        return ""  # It is refused when it is read, with what is wrong.
+        return ""  # Reading it will report what is wrong.
     if any(key.startswith(OWN) for header in headers for key in header):
         return "made by lightpaint"
     if any(name.startswith(f"{HALF_DIFFERENCE}.") for name in channels):

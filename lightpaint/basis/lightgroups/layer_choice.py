@@ -19,7 +19,7 @@ from lightpaint.basis.lightgroups.naming_conventions import (
 from lightpaint.errors import BasisError
 from lightpaint.screen import some_names
 
-#: Who has named files that no convention knows.
+#: Name of the renderer of files that follow no known convention.
 ONE_FILE_PER_LIGHT = "one file per light"
 
 
@@ -27,9 +27,10 @@ ONE_FILE_PER_LIGHT = "one file per light"
 class LayerChoice:
     """The roles of layers.
 
-    lights: name of the light → name of its layer. optional: the same, of layers that may or may
-    not be part of the sum. whole: the same, of the group whose name says that it is all of them,
-    which the sum shows. beauty: name of its layer; None if none is known by its name.
+    lights: name of the light → name of its layer. optional: the same, for layers that may or may
+    not be part of the sum. whole: the same, for a group whose name suggests that it is the sum of
+    all, which the sum will confirm or not. beauty: name of its layer; None if none is known by its
+    name.
     """
 
     renderer: str
@@ -120,7 +121,7 @@ def _by_convention(
     matches = [m for m in matches if (m.groupdict().get("view") or "") == view]
     _check_not_stereo([m[0] for m in matches], file_name)
     lights = _unique_lights(_light_names(convention, matches), file_name)
-    # By its name alone: no other group can be left out of a single one.
+    # By its name alone, since a single group leaves nothing to compare with.
     whole = {n: x for n, x in lights.items() if n == convention.whole and len(lights) > 1}
     lights = {name: layer for name, layer in lights.items() if name not in whole}
     rest = [name for name in layers if name not in [*lights.values(), *whole.values()]]
@@ -138,7 +139,7 @@ def _by_convention(
 
 
 def _light_names(convention: Convention, matches: list[re.Match[str]]) -> list[tuple[str, str]]:
-    """Name of the light and of its layer; with what stands before them where that differs."""
+    """Return the names of lights and of their layers, with their prefix if prefixes differ."""
     prefixes = [m.groupdict().get("prefix") or "" for m in matches]
     several = len(set(prefixes)) > 1
     return [

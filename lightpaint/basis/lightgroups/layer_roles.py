@@ -69,10 +69,10 @@ def roles_of(path: Path, read: Sequence[RenderLayer], pattern: str | None) -> Ro
 def _remove_non_lights(
     lights: dict[str, RenderLayer], beauty: RenderLayer | None
 ) -> tuple[RenderLayer | None, list[str]]:
-    """Remove from `lights` what is not one; return the picture, and sentences on this.
+    """Remove layers from `lights` that are none; return the beauty, and sentences on this.
 
-    One may be the picture under a name of its own; and one that the others have no need of to add
-    up to it is no light, whatever it shows.
+    One may be the beauty under another name; and a layer is no light if the others add up to the
+    beauty without it.
     """
     if beauty is None and len(lights) > 2:
         beauty = find_beauty(list(lights.values()))

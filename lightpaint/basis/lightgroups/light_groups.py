@@ -1,7 +1,7 @@
 """A basis from another renderer's light groups: layers of an EXR file that add up to the picture.
 
-A weight multiplies what was rendered, so that 1, 1, 1 is the light as it is. What the groups
-lack of the beauty becomes one more light, `rest`, that stays as it is.
+A weight multiplies the rendered light, so 1, 1, 1 is the light as rendered. The part of the beauty
+that is in no group becomes one more light, `rest`, which is fixed.
 """
 
 import hashlib
@@ -32,13 +32,14 @@ from lightpaint.errors import BasisError
 from lightpaint.keywords import keywords
 from lightpaint.screen import short_repr, some_names
 
-#: What one unit of weight is.
+#: Meaning of one unit of weight.
 AS_RENDERED = "× as rendered"
 
 #: Share of its light that a group may take away in places: filters with negative lobes do.
 MAX_NEGATIVE_SHARE = 0.25
 
-#: Name of what the groups lack of the beauty, with underscores added should a light have it.
+#: Name of the part of the beauty that is in no group, with underscores added if a light has that
+#: name.
 REST_NAME = "rest"
 
 
@@ -50,16 +51,16 @@ class LightGroups:
     Attributes:
         basis: A light for each group, and `rest` last if something is missing.
         path: The file or folder.
-        renderer: Whose names its layers have.
-        layers: Those of the groups, in the order of the lights, without `rest` and without their
-            pixels, which the basis has.
+        renderer: The renderer whose naming the layers follow.
+        layers: Layers of the groups, in the order of the lights, without `rest` and without pixels,
+            which the basis has.
         beauty: None if the file has none.
-        missing: Luminance that the groups lack of the beauty, as a share of it, pixel by pixel;
-            None without a beauty.
-        exceeding: Luminance that they have too much, likewise.
+        missing: Luminance that the groups lack compared with the beauty, as a share of it, summed
+            over pixels; None without a beauty.
+        exceeding: Luminance by which they exceed it, likewise.
         holes: (h, w) bool, pixels where a layer is not finite. They are 0 in all images of the
-            basis, so that they count nothing in any sum.
-        remarks: What is worth knowing, one sentence each.
+            basis, so they do not affect any sum.
+        remarks: Messages for the user, one sentence each.
 
     Examples:
         >>> groups = lp.read_light_groups("groups.exr")
@@ -81,7 +82,7 @@ class LightGroups:
 
     @property
     def has_rest(self) -> bool:
-        """True if the last light of the basis is what the groups lack."""
+        """True if the last light of the basis is the part of the beauty in no group."""
         return len(self.basis.lights) > len(self.layers)
 
     @property
@@ -103,15 +104,15 @@ def read_light_groups(
     """Read the light groups of an EXR file, or of a folder with a file for each.
 
     Args:
-        path: EXR file, or folder, of which hidden files, what lightpaint has made and paintings
-            that can be told are passed by; `remarks` names them.
+        path: EXR file, or a folder. Hidden files, results of lightpaint and recognisable paintings
+            in it are skipped; `remarks` names them.
         pattern: `Light_{name}`, which layers, parts or files are lights; by default the names that
-            known renderers give them (naming.py).
+            known renderers give them (naming_conventions.py).
         leave_out: Files of the folder that are no lights, like the painting.
 
     Raises:
         ImageError: For a file that cannot be read or is not linear Rec.709.
-        BasisError: Where the lights cannot be told from other layers, or differ in size.
+        BasisError: If the lights cannot be told from other layers, or differ in size.
 
     Examples:
         >>> groups = lp.read_light_groups("groups.exr")
@@ -192,8 +193,8 @@ def _light_groups(
 class _Missing:
     """The difference between the groups and the beauty.
 
-    rest: (h, w, 3), None if it is no more than rounding. share, exceeding: of the beauty, None
-    without one. remark: that in words.
+    rest: (h, w, 3), None if only rounding. share, exceeding: of the beauty, None without one.
+    remark: a sentence on these.
     """
 
     rest: Floats | None
@@ -232,7 +233,7 @@ def _remarks_on_black(lights: Mapping[str, RenderLayer], missing: float | None) 
 
 
 def _remarks_on_passes(basis: Basis) -> list[str]:
-    """Return a sentence on what pictures are denoised by, if the file has anything for it."""
+    """Return a sentence on the passes that guide denoising, if the file has any."""
     known = ["albedo and normals"] if basis.features is not None else []
     known += ["direct and indirect light"] if basis.indirect is not None else []
     return [f"pictures are denoised by {' and by '.join(known)} of the file"] if known else []

@@ -4,19 +4,19 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-#: What stands for the name of the light in a pattern.
+#: Placeholder of the light's name in a pattern.
 NAME_FIELD = "{name}"
 
 #: The whole picture, in the words of most renderers; names compare without regard to case.
 BEAUTY_NAMES = ("", "rgba", "rgb", "beauty", "combined", "main", "color", "rgb_color", "ci", "c")
 
-#: What stands before a marker that no other word looks like: files are often named after a shot.
+#: Prefix of an unmistakable marker: files are often named after a shot.
 PREFIX_PATTERN = r"(?:(?P<prefix>.+?)[ ._-])??"
 
 #: Versions of a layer beside it, which would count a light twice. A pattern may still name them.
 OTHER_VERSION = re.compile(r".*[ _.](denoised?|denoising|variance|mse|noisy|albedo|normal)", re.I)
 
-#: What joins a name to what stands around it.
+#: Characters that join a name to its surroundings.
 SEPARATORS = " ._-"
 
 
@@ -27,9 +27,8 @@ class Convention:
     layer: fits the whole name of a layer; its group `name` is the light, `view` the view layer,
     `prefix` what tells apart lights of one name.
     beauty: name of the picture that they add up to, before BEAUTIES are tried.
-    whole: name of the group that is all of them, where a renderer calls one so.
-    optional: layers that add to it too, in some versions and settings (in lower case).
-    light: what the light is called.
+    whole: name of the group of all lights, if the renderer has one. optional: layers that are part
+    of the sum in some versions and settings (in lower case). light: name of the light.
     """
 
     renderer: str

@@ -1,4 +1,4 @@
-"""The RGB layers of an EXR file, or of a folder of them, whoever has written it.
+"""The RGB layers of an EXR file, or of a folder of them, from any renderer.
 
 A layer is three channels that share all but the last part of their names, `key.R`, `key.G` and
 `key.B`; in a part of its own it may have plain `R`, `G`, `B` and the part its name.
@@ -31,8 +31,8 @@ from lightpaint.screen import some_names
 class RenderLayer:
     """Three channels of a file, as a renderer has written them.
 
-    name: what it is chosen by. part, channels: where it stands; part is "" where a file has one.
-    others: other names that a pattern may meet it by.
+    name: the name to choose it by. part, channels: its place; part is "" in a file with one part.
+    others: other names that a pattern may match.
     image: (h, w, 3) in the display window, as stored: linear light, float16 or float32.
     alpha: (h, w), or None.
     is_vector: whether its channels are X, Y and Z: it is no light then.
@@ -71,11 +71,11 @@ def read_layers(
 ) -> tuple[list[RenderLayer], list[str]]:
     """Return the layers of the file, or of the folder's files, at `path`, in their order.
 
-    They are of red, green and blue; or vectors, of the size of the others.
-    In a folder a file of plain R, G, B is a layer of the file's name, without what all of these
-    names share; `leave_out` and what else cannot be a light (folder.py) is passed by, which the
-    sentences that come along say. Raises ImageError for files that cannot be read, BasisError if
-    there are none, if they differ in size or if names repeat.
+    They hold red, green and blue, or vectors, all of one size. In a folder a file of plain R, G, B
+    is a layer named after the file, without the text that all these names share. `leave_out` and
+    other files that cannot be lights (folder_files.py) are skipped; the returned sentences name
+    them. Raises ImageError for files that cannot be read, BasisError if there are none, if they
+    differ in size or if names repeat.
     """
     path = Path(path)
     remarks: list[str] = []
@@ -120,7 +120,7 @@ def _of_files(files: Sequence[Path]) -> list[RenderLayer]:
     for file, layers in read.items():
         for x in layers:
             name = x.name or file.stem
-            # What a renderer calls a file is a better name than what is left of it.
+            # The renderer's name for a file is better than the remainder of its file name.
             if not x.name and not is_known(name):
                 name = short.get(name, name)
             layers_of_folder.append(replace(x, name=name, others=(file.stem, file.name, *x.others)))

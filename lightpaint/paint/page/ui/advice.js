@@ -40,8 +40,7 @@ const OF_ALL = {
 const BUTTON_CHARACTERS = 14;
 
 /** Return the button text with the names of its lights. @param {Cause} cause
- * @param {number} [most] characters of a light's name
- * */
+ * @param {number} [most] characters of a light's name */
 function nameOf({ kind, names }, most = Infinity) {
   if (kind in OF_ALL) return OF_ALL[kind];
   const lights = names.length === 1 ? shortened(names[0], most) : `${names.length} lights`;
@@ -106,8 +105,7 @@ export function MoveButton({ ui, app }) {
 }
 
 /** The answer before and after a change, for the user to apply or cancel.
- * @param {{ui: Ui, app: App}} props
- * */
+ * @param {{ui: Ui, app: App}} props */
 export function PreviewDialog({ ui, app }) {
   const { preview } = ui;
   if (!preview) return null;

@@ -123,8 +123,7 @@ function worksOf(ui, { session }) {
 const REST_MS = 500;
 
 /** The tip of all elements with `data-tip`, with their keys.
- * @param {{root: () => HTMLElement | null}} props
- * */
+ * @param {{root: () => HTMLElement | null}} props */
 export function Tips({ root }) {
   const [tip, setTip] = useState(/** @type {any} */ (null));
   const ref = useRef(/** @type {HTMLElement | null} */ (null));
