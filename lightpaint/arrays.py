@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 _Kind = TypeVar("_Kind", bound=np.generic)
 
-#: Pixels and what is computed from them, in any precision.
+#: Pixels and values computed from them, in any precision.
 Floats = npt.NDArray[np.floating[Any]]
 
 #: Inner products, weights and everything that is solved for.

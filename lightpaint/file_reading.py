@@ -87,7 +87,7 @@ def _is_sparse(path: Path, size: int) -> bool:
         while 1000 * written < size:
             try:
                 start = os.lseek(file.fileno(), position, os.SEEK_DATA)
-            except OSError:  # there is no more
+            except OSError:  # end of the file
                 return True
             position = os.lseek(file.fileno(), start, os.SEEK_HOLE)
             written += position - start
@@ -105,10 +105,10 @@ def _read_first_chunk(path: Path) -> tuple[BinaryIO, bytes]:
 
 
 def call_with_timeout(work: Callable[[], _Result], timeout_s: float, reason: str = "") -> _Result:
-    """Return what `work` returns or raise what it raises; raise TimeoutError if it takes too long.
+    """Return the result of `work` or raise its error; raise TimeoutError if it takes too long.
 
-    timeout_s: seconds to wait. reason: what the message of a TimeoutError adds. The work goes on in
-    a daemon thread, for which the process does not wait at its end.
+    timeout_s: seconds to wait. reason: text to add to the message of a TimeoutError. The work goes
+    on in a daemon thread, for which the process does not wait at its end.
     """
     answers: SimpleQueue[tuple[_Result | None, BaseException | None]] = SimpleQueue()
 

@@ -1,5 +1,4 @@
-"""The lights of a basis without a pixel: what they are, what they emit, what their lights file asks
-for."""
+"""The lights of a basis without pixels: their kinds, emission and constraints."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,17 +16,16 @@ from lightpaint.validation import BRIGHTEST, MAX_NAME, is_amount
 
 @dataclass(frozen=True)
 class BasisLight:
-    """A light as a basis knows it.
+    """A light of a basis.
 
-    parameter, unit: what one unit of weight is (`radiance`, `W/(m² sr)`).
-    emission: its present RGB emission in the scene, in that unit.
-    form: its place and size, for people.
-    is_scalar: whether it can only be scaled as a whole, and has one weight for all channels.
-    is_fixed: whether it is what stays as it is: its weight is 1, whatever is painted.
+    parameter, unit: meaning of one unit of weight (`radiance`, `W/(m² sr)`). emission: its present
+    RGB emission in the scene, in that unit. form: its place and size, as text. is_scalar: whether
+    it can only be scaled as a whole, with one weight for all channels. is_fixed: whether it is not
+    adjusted: its weight is 1.
     members: names of the emitters it consists of; itself if none are given.
     unit_flux: watts it radiates per channel at an emission of 1; None where that is not known.
-    identity: of its plane, which another light of the same identity has as well, but for noise
-    (see `Light.identity`); "" where that is not known.
+    identity: of its plane; lights of the same identity have the same plane, up to noise (see
+    `Light.identity`); "" if unknown.
     """
 
     name: str
@@ -119,13 +117,13 @@ class Lights(Sequence[BasisLight]):
 
     @cached_property
     def present_weights(self) -> Doubles:
-        """(n, 3) weights of the scene as it is."""
+        """Weights of the present scene, (n, 3)."""
         emission = [light.emission for light in self.records]
         return read_only(np.array(emission, dtype=np.float64).reshape(-1, 3))
 
     @cached_property
     def is_fixed(self) -> Bools:
-        """(n,), which lights stay as they are, with weight 1."""
+        """Which lights are fixed, with weight 1, (n,)."""
         return read_only(np.array([light.is_fixed for light in self.records], dtype=bool))
 
     @cached_property

@@ -8,7 +8,7 @@ from lightpaint.version import __version__
 #: Most samples of a pixel, which is beyond any render.
 MAX_SAMPLES = 2**40
 
-#: How the method of light groups begins; the renderer follows.
+#: Prefix of the method of light groups; the renderer follows.
 LIGHT_GROUPS = "light groups of "
 
 
@@ -16,14 +16,14 @@ LIGHT_GROUPS = "light groups of "
 class Origin:
     """The origin of a basis, which decides whether bases are comparable and samples can be added.
 
-    halves: samples per pixel of each of the two halves; passes: how many passes made them.
+    halves: samples per pixel of each of the two halves; passes: the number of passes of each.
     each_light: where lights have unequal numbers of samples, because an interrupt ended separate
     renders or because they come from several runs, samples of half A and B and passes of A and B of
     each; `halves` and `passes` are then what all have at least.
-    integrator: what was put in the place of the scene's own; "" where it rendered with that.
-    is_composed: whether planes come from several renders, of which some were of another state of
-    the scene, so that no other render comes to just the same.
-    extra_spp: samples per pixel beyond those, in the mean, where a painting needed them (see
+    integrator: replacement of the scene's own; "" if there was none.
+    is_composed: whether planes come from several renders, some of them of another state of the
+    scene, so that no single render reproduces it.
+    extra_spp: further samples per pixel, on average, taken where a painting needed them (see
     `Basis.extra`).
     """
 

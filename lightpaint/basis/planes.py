@@ -1,7 +1,7 @@
-"""Planes: one picture for each light, as numbers over pixels, wherever they are kept.
+"""Planes: one picture per light, in memory or in a file.
 
 A basis has two sets of them, the images and half the differences of two halves of the samples.
-Nobody outside this room indexes an array of planes: what is asked of them stands here.
+Code outside this room does not index arrays of planes; it calls the methods here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from lightpaint.arrays import Bools, Doubles, Floats, Indices
 from lightpaint.threads import one_thread
 
-#: Pixels multiplied at a time: the float64 copies of so many stay in the processor's cache.
+#: Pixels multiplied at a time, whose float64 copies fit into the processor's cache.
 BLOCK_PIXELS = 2**13
 
 #: Lights up to which the product of a block is too small for BLAS to share it out to threads.
@@ -23,9 +23,9 @@ FEW_LIGHTS = 256
 
 
 class Planes(Protocol):
-    """The planes of n lights, (h, w, 3) each, float32 whatever is stored.
+    """The planes of n lights, (h, w, 3) each, float32 however they are stored.
 
-    What is returned is to look at only: it may be the very memory that the planes are kept in.
+    Returned arrays are read-only: they may be views of the stored planes.
     """
 
     @property
@@ -68,7 +68,7 @@ class Planes(Protocol):
         """Return these planes with others, (h, w, 3), for some of the lights."""
 
     def array(self) -> Floats:
-        """Return all planes, (n, h, w, 3): for people in Python, and for what is small."""
+        """Return all planes, (n, h, w, 3): for Python users, and for small bases."""
 
 
 class PlanesBase:

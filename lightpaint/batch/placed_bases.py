@@ -24,16 +24,16 @@ from lightpaint.report.rig.rig_drawing import rig_drawing
 from lightpaint.scene.scene import Scene
 from lightpaint.screen import some_names
 
-#: Rough seconds of a search on one thread, by which workers that hang are told.
+#: Rough seconds of a search on one thread, to detect hung workers.
 SEARCH_S = 300.0
 
 
 def obtain_placed_bases(
     task: Task, group: PlaceGroup, engine: Engine, cache: WorkerCache, listen: Listener
 ) -> list[Basis]:
-    """Return the bases of a task with its lights where its group wants them.
+    """Return the bases of a task with the lights at the places of its group.
 
-    What is not found or rendered yet is, once for all looks of the group.
+    Places and planes that are missing are computed, once for all looks of the group.
     """
     record = group.found()
     views = {} if record is not None else _views(group, cache)

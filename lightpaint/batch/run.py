@@ -227,7 +227,7 @@ class _Run:
             yield attempt(task, partial(final_render, task, self._cache, self._listen, by_all))
 
     def _can_begin(self, step: PlanStep) -> bool:
-        """Return whether neither the look nor any look that it combines has failed."""
+        """Return False if the look, or a look that it combines, has failed."""
         look = self._looks[step.task.look]
         failed = [name for name in look.entry.of if name in self.outcome.failed]
         if failed:

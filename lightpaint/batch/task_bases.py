@@ -83,7 +83,7 @@ def obtain_moved_basis(
     engine: Engine,
     listen: Listener,
 ) -> Basis:
-    """Return the basis of a scene with its lights elsewhere; an engine renders what has moved.
+    """Return the basis of a scene with moved lights; an engine renders their planes.
 
     before: the basis without the moves. places: the file of `record`, for workers.
     """

@@ -1,5 +1,5 @@
 # PYTHON_ARGCOMPLETE_OK
-"""The command line: it parses, calls the library and prints; no more.
+"""The command line: parsing, calls of the library, and printing.
 
 Results go to stdout, progress and remarks to stderr. Exit code 0: done; 1: done, but not as asked
 (`verify` found a disagreement, an answer is not close enough); 2: an error that the user can fix,

@@ -90,13 +90,13 @@ def _without_garbage() -> Iterator[None]:
 
 
 def _command(name: str) -> Callable[..., CommandOutcome]:
-    """Return the function of a command, importing only what that one needs."""
+    """Return the function of a command, importing only its own modules."""
     module = import_module(f"lightpaint.cli.commands.{_MODULES.get(name, 'render_commands')}")
     return getattr(module, name)  # type: ignore[no-any-return]
 
 
 def _report(command: str, error: Exception, words: Sequence[str]) -> int:
-    """Print what went wrong, and return the exit code."""
+    """Print the error, and return the exit code."""
     if isinstance(error, LightpaintError):
         for line in error.mistakes if isinstance(error, BatchError) else (str(error),):
             lines.err(f"lightpaint {command}: {spoken(line)}")

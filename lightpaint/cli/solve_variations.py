@@ -122,9 +122,9 @@ def _check_apart(folders: Sequence[Path], words: Sequence[str]) -> None:
 
 
 def _gallery_folder(output: Path | None, folders: Sequence[Path], *, force: bool) -> Path | None:
-    """Return the folder for the gallery of all looks: that of their folders.
+    """Return the folder for the gallery of all looks, which contains theirs.
 
-    None if no folder was given and a page of somebody else, or a look, is there.
+    None if no folder was given and it holds a foreign page, or a look.
     """
     place = folders[0].parent if folders else output or Path()
     try:

@@ -16,7 +16,7 @@ class Tolerances:
     min_fit: float | None = None
 
     def shortfalls(self, appearance: Appearance) -> list[str]:
-        """Return what an answer lacks, in words that follow its name."""
+        """Return the unmet tolerances of an answer, as text that follows its name."""
         shortfalls = []
         if self.max_miss is not None and appearance.delta_e > self.max_miss:
             shortfalls.append(

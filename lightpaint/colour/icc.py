@@ -30,7 +30,7 @@ SRGB_TOLERANCE = 2e-3
 class Profile:
     """The meaning of a picture's numbers.
 
-    name: what the profile calls itself. curves: for each of R, G, B, from values in [0, 1] to
+    name: the profile's own description. curves: for each of R, G, B, from values in [0, 1] to
     light. matrix: (3, 3), from that light to linear Rec.709.
     """
 

@@ -1,4 +1,4 @@
-"""A light as an eye sees it: colour, colour temperature, luminous quantities and flux.
+"""Photometry of lights: colour, colour temperature, luminous quantities and flux.
 
 A scene in RGB has no absolute scale: only its author knows what radiance 1 stands for. One number,
 in cd/m², gives the scale of everything: if radiance 1 W/(m² sr) stands for u cd/m², an emission

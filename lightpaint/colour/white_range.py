@@ -62,7 +62,7 @@ class WhiteRange:
     def places(self, rgb: Floats) -> Doubles:
         """Return places of the nearest whites in CIE 1960 (u, v), (n,): k + t between k and k + 1.
 
-        rgb: (n, 3), linear, >= 0. What is black is nearest to the middle.
+        rgb: (n, 3), linear, >= 0. Black maps to the middle.
         """
         rgb = np.asarray(rgb, np.float64)
         lit = rgb.max(axis=1) > 0

@@ -1,4 +1,4 @@
-"""Whole pictures computed by bands of rows, so that what is made on the way is of one band."""
+"""Whole pictures computed in bands of rows, so that intermediate arrays have one band only."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar

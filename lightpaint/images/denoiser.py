@@ -1,7 +1,7 @@
 """Denoising of pictures that people look at or paint on.
 
 Images that are solved for, stored or written as EXR are never denoised: a denoiser has no error
-bars, and what it takes for noise may be light.
+bars, and may remove light as noise.
 """
 
 from dataclasses import dataclass

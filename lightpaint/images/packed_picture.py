@@ -1,10 +1,10 @@
 """Pictures of light packed for a page: small, and unpacked by a few lines of JavaScript.
 
 Light is divided by a power of two and rounded to half floats whose lowest bits are dropped; the
-rounding error is relative, as with a logarithm. Of these integers green is stored as it is, red and
-blue as differences from green. Each channel is predicted from its neighbours above and to the left,
-and only the residuals are written: their lower bytes, then their upper ones, deflated. `unpack.js`
-reads them in the page.
+rounding error is relative, as with a logarithm. Of these integers, green is stored directly, red
+and blue as differences from green. Each channel is predicted from its neighbours above and to the
+left, and only the residuals are written: their lower bytes, then their upper ones, deflated.
+`unpack.js` reads them in the page.
 """
 
 import zlib

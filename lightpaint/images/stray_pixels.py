@@ -12,12 +12,12 @@ import numpy.typing as npt
 from lightpaint.arrays import Floats
 from lightpaint.images.estimate import shifted
 
-#: A stray pixel is so many times as bright as its surroundings.
+#: Smallest ratio of a stray pixel to its surroundings.
 OUTSTANDING = 1.25
-#: It stands out by at most so many times the difference between the halves of a pixel nearby.
+#: Largest ratio of its excess to the difference between the halves of a pixel nearby.
 LARGEST_CHANCE = 1.5
-#: Four windows are searched for such pixels: the side of each over two, and how far its center is
-#: from the pixel in x and in y. They leave out what is next to it, which a highlight may cover.
+#: Four windows are searched for such pixels: half the side of each, and the distance of its center
+#: from the pixel in x and in y. They leave out direct neighbours, which a highlight may cover.
 WINDOW_RADIUS, WINDOW_DISTANCE = 3, 5
 
 _NEIGHBORS = [offset for offset in product((-1, 0, 1), repeat=2) if offset != (0, 0)]
@@ -26,10 +26,10 @@ _NEIGHBORS = [offset for offset in product((-1, 0, 1), repeat=2) if offset != (0
 def stray_pixels(raw: Floats, half_difference: Floats, clean: Floats) -> npt.NDArray[np.bool_]:
     """Return where a picture is bright by chance, (h, w).
 
-    raw: (h, w, 3) linear, the mean of two halves. half_difference: half of what they differ by.
-    clean: the picture, denoised. A stray pixel is brighter than its denoised form and than all of
-    its neighbours but one, so lines are none. And in two of the four windows around it the halves
-    of a pixel differ by about as much as it stands out, so single samples do bring such values.
+    raw: (h, w, 3) linear, the mean of two halves. half_difference: half of their difference. clean:
+    the picture, denoised. A stray pixel is brighter than its denoised form and than all of its
+    neighbours but one, which excludes lines. And in two of the four windows around it the halves of
+    a pixel differ by about its excess, so single samples do have such values.
     """
     brightness, expected = raw.max(axis=-1), clean.max(axis=-1)
     neighbors = np.stack([shifted(brightness, *offset) for offset in _NEIGHBORS])

@@ -1,10 +1,10 @@
 """A linear filter of smooth light, whose weights follow from surfaces and never from light.
 
-Neighbours count by how near they are in the picture, how alike their normals are, and how close
-each lies to the other's tangent plane; what is averaged is light, the picture divided by albedo. As
-no weight depends on the light, one filter serves all lights and both halves of their samples, sums
-of filtered pictures are filtered sums, and filtered half differences are the noise of what was
-filtered.
+Weights fall with distance in the picture, with the angle between normals, and with the distance
+from each other's tangent plane; the filter averages light, the picture divided by albedo. As no
+weight depends on the light, one filter serves all lights and both halves of their samples. Sums of
+filtered pictures are filtered sums, and filtered half differences are the noise of filtered
+pictures.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ RADIUS = 4
 #: grows for each pixel in between: surfaces bend.
 NEAR_PLANE, BEND = 3.0, 0.25
 
-#: How often the cosine between two normals is squared.
+#: Number of times that the cosine between two normals is squared.
 SQUARINGS = 5
 
 #: Rows of a band, whose weights and pictures a processor's cache holds.

@@ -144,9 +144,9 @@ class BandedFilm(FilmSums):
 
 
 class FileSums:
-    """An array of zeros, (2, planes, h, w, 3) float32, in a file that goes when it does.
+    """An array of zeros, (2, planes, h, w, 3) float32, in a temporary file.
 
-    Memory lets go of what is read and written at once. Raises SceneError if the disk has no room.
+    Memory releases the parts read and written at once. Raises SceneError if the disk has no room.
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:
@@ -184,11 +184,12 @@ class FileSums:
 
 
 class SumSets:
-    """The sets of planes that sums in a file amount to: images and half differences of all light
-    and, where it is apart, of indirect light.
+    """The sets of planes computed from sums in a file.
 
-    Whoever asks for a plane of one asks for that of the others next, so that those of the last
-    light are kept. lights: how many. spp: samples per pixel of each half.
+    They are images and half differences of all light and, if separate, of indirect light.
+
+    Callers request the planes of a light from one set after the other, so those of the last light
+    are cached. lights: their number. spp: samples per pixel of each half.
     """
 
     def __init__(self, sums: FileSums, lights: int, spp: int) -> None:

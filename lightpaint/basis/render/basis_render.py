@@ -151,7 +151,7 @@ def _render_together(
     guide_table = None if start is None else start.guide_table
     tracer = Tracer(scene, view_seed(seed, scene.sensor), guide_table)
     before = None if start is None else start.sums
-    rest = start if before is None else None  # what the sums do not begin with
+    rest = start if before is None else None  # samples that the sums do not include yet
     film: WholeFilm | BandedFilm
     film = (BandedFilm if renders_in_bands(scene, start) else WholeFilm)(tracer, done, before)
 

@@ -1,7 +1,7 @@
-"""Training of the emitter guide before a basis is rendered: which emitter matters where.
+"""Training of the emitter guide, which learns which emitter matters where, before a render.
 
-It is the same for all numbers of samples, budgets and machines, since it depends on the scene and
-the seed alone. So samples choose emitters alike whoever renders them, and none waits for another.
+It depends on the scene and the seed alone, not on the number of samples, the budget or the machine.
+So all machines choose emitters alike, and none waits for another.
 """
 
 import gc
@@ -16,7 +16,7 @@ from lightpaint.scene.scene_render import view_seed
 if TYPE_CHECKING:
     from lightpaint.basis.render.tracer.one_pass import Tracer
 
-#: Camera samples of the training passes. Each samples by what those before have learned.
+#: Camera samples of the training passes. Each pass uses what the earlier ones have learned.
 TRAINING_SAMPLES = (2**16, 2**17, 2**17)
 
 

@@ -61,9 +61,9 @@ def depth_limit(integrator: Integrator) -> int:
 
 
 def has_indirect_planes(scene: Scene) -> bool:
-    """Return whether the one pass keeps indirect light apart from direct light.
+    """Return whether the one pass stores indirect light separately.
 
-    It takes as much memory again, which small pictures have, and they are what people look at.
+    That doubles the memory, which is affordable for small pictures, the ones that people look at.
     """
     height, width = scene.size
     is_small = 12 * len(scene.lights) * height * width <= SPLIT_MAX_BYTES
@@ -76,10 +76,10 @@ def plane_count(scene: Scene) -> int:
 
 
 def needs_a_bounce(scene: Scene) -> bool:
-    """Return True if a path is black that met only surfaces which let it pass.
+    """Return whether a path is black if all surfaces let it pass.
 
-    `path` counts it as one that met nothing, and what it has gathered on masks as nothing,
-    wherever no environment is to be seen behind.
+    `path` treats it as one that met nothing and discards the light gathered on masks, unless an
+    environment is visible behind.
     """
     sees_backdrop = any(x.plugin in ENVIRONMENTS for x in scene.emitters)
     is_hidden = scene.integrator.hide_emitters or not sees_backdrop

@@ -30,12 +30,12 @@ def basis_of_sums(
     start: Basis | None,
     is_finished: bool = True,
 ) -> Basis:
-    """Return the one-pass basis of what was rendered, and of `start`.
+    """Return the one-pass basis of the rendered sums and of `start`.
 
     halves: undivided sums of two halves of the samples, (n or 2n, h, w, 3), as `LightPlanes.sums`
     returns them; they are overwritten. seen: (h, w). half_spp: samples per pixel of each half in
-    all. start: what these sums do not include. is_finished: whether there are as many as were asked
-    for; if not, the basis has a copy of its sums.
+    all. start: earlier basis that these sums do not include. is_finished: whether all requested
+    samples are there; if not, the basis has a copy of its sums.
     """
     n, spp = len(scene.lights), half_counts(half_spp, start)
     keeps_sums = not is_finished and start is None

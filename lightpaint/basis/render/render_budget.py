@@ -21,11 +21,13 @@ PASS_DIVISOR = 4
 
 @dataclass(frozen=True)
 class Budget:
-    """The budget of a basis: `spp` samples per pixel in all, or `time_s` seconds from now, in which
-    one pass renders no more than `until_spp`.
+    """The budget of a basis: samples per pixel or seconds.
 
-    A time is wall time from the first pass on. Compiling kernels counts, keeping what is done,
-    and loading the scene where that is done for every light.
+    It is `spp` samples per pixel in all, or `time_s` seconds from now, in which one pass renders at
+    most `until_spp`.
+
+    A time is wall time from the first pass on. It includes compiling kernels, saving intermediate
+    results, and loading the scene if that happens for every light.
     """
 
     spp: int
@@ -117,7 +119,7 @@ class Keeper:
             return
         self.keep(make())
         self.kept_s = _now_s()
-        # Where writing takes long, it must not become the work itself.
+        # Slow writing must not take up most of the time.
         self.every_s = max(KEEP_EVERY_S, 10 * _passed(now_s, self.kept_s)[0])
 
 

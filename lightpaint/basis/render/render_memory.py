@@ -10,9 +10,9 @@ from lightpaint.scene.scene_render import SAMPLES_PER_PASS
 
 
 def renders_in_bands(scene: Scene, start: Basis | None = None) -> bool:
-    """Return whether `render_basis` keeps the sums of a film in a file, of which memory has a band.
+    """Return whether `render_basis` keeps the sums of a film in a file, with one band in memory.
 
-    start: what it goes on from. Without its exact sums that takes whole planes.
+    start: basis to continue from. Without its exact sums that takes whole planes.
     """
     can_be_read = start is None or start.sums is not None
     return can_be_read and method_of(scene) == ONE_PASS and is_banded(scene)

@@ -22,7 +22,7 @@ FINISHED, UNFINISHED = (1, 1), (0, 0)
 
 
 def is_of(scene: Scene, basis: Basis, seed: int) -> bool:
-    """Return True if `basis` was made of `scene` as it is, with its sensor, film and `seed`."""
+    """Return whether `basis` was rendered from this `scene`, with its sensor, film and `seed`."""
     of = basis.origin
     current = replace(
         origin_of(scene, seed, of.method, of.halves, of.passes),
@@ -90,7 +90,7 @@ def origin_of(
 
 
 def basis_lights(scene: Scene) -> Lights:
-    """Return what a basis says of the lights of `scene`, and what its lights file asks of them."""
+    """Return the lights of `scene` for a basis, with the constraints of its lights file."""
     lights = tuple(
         BasisLight(
             x.name,

@@ -1,9 +1,9 @@
-"""A basis in parts that do not wait for each other, so that many processes may render it.
+"""A basis in independent parts, so that many processes can render it.
 
-A part is some rows of the picture or, where each light takes renders of its own, a pass of one
-light. Which parts there are follows from scene and samples alone, and the samples of a pixel are
-added in their order: the basis is to the last bit that of `render_basis`, whoever renders what, and
-when, and how often somebody failed.
+A part is some rows of the picture or, if each light is rendered separately, a pass of one light.
+The parts follow from scene and samples alone, and the samples of a pixel are added in their order.
+So the basis equals that of `render_basis` to the last bit, in whatever order and by whichever
+process parts are rendered, failures included.
 """
 
 import gc
@@ -33,7 +33,7 @@ from lightpaint.scene.runtime.render_lock import MITSUBA, tracing
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import SAMPLES_PER_PASS, largest_pass, view_seed
 
-#: Camera samples of a part: some seconds of one processor, which is what an accident costs.
+#: Camera samples of a part: some seconds of one processor, the loss if a process dies.
 PART_SAMPLES = SAMPLES_PER_PASS // 2
 
 #: Bytes of a part's images, at most.
@@ -61,7 +61,7 @@ class Part:
 
     @property
     def place(self) -> tuple[int, int]:
-        """Light and half of a pass: what those that are added to each other have in common."""
+        """Light and half of a pass; passes with the same place are summed."""
         assert self.light is not None
         assert self.half is not None
         return self.light, self.half
@@ -70,7 +70,7 @@ class Part:
 def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Part]:
     """Return the parts that bring a basis of `scene` to `spp` samples per pixel, in order.
 
-    start: what is there already, whose samples count.
+    start: earlier basis, whose samples count.
     """
     height, width = scene.size
     if method_of(scene) != ONE_PASS:
@@ -79,7 +79,7 @@ def plan_parts(scene: Scene, spp: int, *, start: Basis | None = None) -> list[Pa
     left = half_of(spp) - done
     if left <= 0:
         return []
-    # So few rows that they are some seconds of work, for all of the samples.
+    # Few enough rows for some seconds of work with all samples.
     by_work = PART_SAMPLES // (2 * width * left)
     by_memory = PART_MAX_BYTES // (2 * plane_count(scene) * width * 12)
     count = -(-height // max(1, min(by_work, by_memory)))
@@ -158,7 +158,7 @@ class PartRenderer:
         return image[None, None], np.zeros((1, *self._scene.size), np.float32)
 
     def close(self) -> None:
-        """Release what is loaded."""
+        """Release the loaded scene."""
         if self._tracer is not None:
             self._tracer.close()
         self._tracer = self._loaded = self._light = None
@@ -166,9 +166,9 @@ class PartRenderer:
 
 
 class PartSums:
-    """The sums of parts, in whatever order they come.
+    """The sums of parts, which may arrive in any order.
 
-    start: what they are added to.
+    start: basis that they are added to.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""A basis by one ordinary render per light: right for any integrator, n times the work.
+"""A basis by one ordinary render per light: correct for any integrator, n times the work.
 
 The seed of a pass follows from the light, the half and its number alone. So it does not matter
 in which order passes are rendered, nor in how many runs.
@@ -24,15 +24,15 @@ from lightpaint.scene.scene_render import Stream, as_float32, pass_seed, plan_pa
 WHITE: RGB = (1.0, 1.0, 1.0)
 BLACK: RGB = (0.0, 0.0, 0.0)
 
-#: Samples of a pixel that look for emitters.
+#: Samples per pixel in the search for visible emitters.
 SEEN_SAMPLES = 16
 
-#: (half 0 or 1, samples per pixel) of passes in a row.
+#: Half (0 or 1) and samples per pixel of consecutive passes.
 Plan = list[tuple[int, int]]
 
 
 class LightSums:
-    """The undivided sums of the two halves of each light's samples.
+    """The sums, not divided by their counts, of the two halves of each light's samples.
 
     planes: (2, n, h, w, 3) float32. spp, passes: (n, 2), per light and half, so far.
     """
@@ -82,7 +82,7 @@ class LightSums:
 
     def counts(self) -> dict[str, Any]:
         """Return the fields of an Origin that count samples."""
-        # Of one half alone the noise is unknown: what counts is what both have.
+        # The noise of a single half is unknown, so only samples that both halves have count.
         spp, passes = int(self.spp.min()), int(self.passes.min())
         each_light: tuple[tuple[int, ...], ...] = ()
         if (self.spp != spp).any() or (self.passes != passes).any():
@@ -100,9 +100,9 @@ def render_separately(
     keeper: Keeper,
     progress: Progress,
 ) -> None:
-    """Add to `sums` what `budget` allows.
+    """Add the samples that `budget` allows to `sums`.
 
-    basis: makes one of the sums so far, to be kept. Raises Interrupted for Ctrl-C.
+    basis: makes a basis from the sums so far, to save it. Raises Interrupted for Ctrl-C.
     """
     try:
         with tracing() as let_others_through:
@@ -129,7 +129,7 @@ def render_separately(
 def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> Plan:
     """Return the passes that bring one light from `done` samples per half to `spp` in all.
 
-    On a film of blocks those are a little more: each pixel of a block takes one sample at least.
+    On a film of blocks there are a few more: each pixel of a block takes at least one sample.
     """
     height, width = scene.size
     step = scene.film.block_pixels
@@ -139,7 +139,7 @@ def plan_of_light(scene: Scene, spp: int, *, done: tuple[int, int] = (0, 0)) -> 
 def _turns(
     scene: Scene, budget: Budget, sums: LightSums, progress: Progress
 ) -> Iterator[tuple[int, Plan, Callable[[], None]]]:
-    """Yield (light, its passes, what to call after each) in turn, until `budget` is spent."""
+    """Yield (light, its passes, function to call after each) in turn, until `budget` is spent."""
     height, width = scene.size
     pixels, lights = height * width, len(scene.lights)
     if budget.time_s is None:
@@ -154,8 +154,8 @@ def _turns(
                 )
         return
 
-    # Rounds in which every light comes to the same number: one pair of passes to see what
-    # that takes, and then what the rest of the time allows, which is seldom more than twice.
+    # Each round brings all lights to the same number of samples. The first takes one pair of passes
+    # to measure the time; the next use the time that is left. More than two more are rare.
     clock, pairs = Clock(budget.time_s, progress), 1
     while pairs > 0:
         fullest = int(sums.spp.max())
@@ -200,7 +200,7 @@ def light_pass(
     loaded: Any, scene: Scene, light: int, half: int, number: int, spp: int, seed: int
 ) -> Floats:
     """Return the undivided sum of a pass, (h, w, 3). number: its index for that light and half."""
-    # Each light has samples of its own.
+    # Each light uses its own random samples.
     of_light = pass_seed(seed, Stream.BASIS, light)
     seed_of_pass = pass_seed(of_light, Stream.BASIS, 2 * number + half)
     return spp * as_float32(render_pass(loaded, scene, seed=seed_of_pass, spp=spp))
@@ -208,7 +208,7 @@ def light_pass(
 
 @MITSUBA.acquired()
 def emitters_seen(scene: Scene) -> Bools:
-    """Return (h, w), pixels that show the camera an emitter, directly or through clear glass."""
+    """Return the pixels, (h, w), that show an emitter, directly or through clear glass."""
     import mitsuba as mi
 
     if scene.integrator.hide_emitters:
@@ -228,7 +228,7 @@ def emitters_seen(scene: Scene) -> Bools:
 
 
 def _seen_through_glass(scene: Scene, loaded: Any) -> Bools:
-    """Return (h, w), pixels in which some ray meets an emitter behind clear surfaces alone."""
+    """Return the pixels, (h, w), in which some ray meets an emitter through clear surfaces only."""
     from lightpaint.basis.render.tracer.one_pass import view_of
     from lightpaint.basis.render.tracer.seen_emitters import (
         emitters_seen_through,

@@ -101,10 +101,10 @@ def top_up(
 ) -> Basis:
     """Return `basis` with further samples of its pixels.
 
-    scene: of which `basis` was rendered, in one pass. counts: (h, w), samples to add to each half;
-    they must not depend on the light of their own pixel. is_enough: asked between passes, whether
-    to leave the rest. keep: called with what there is when Ctrl-C ends the work early; returns
-    whether it could be kept. tracers: of a block in which the scene stays loaded.
+    scene: the one that `basis` was rendered from, in one pass. counts: (h, w), samples to add to
+    each half; they must not depend on the light of their own pixel. is_enough: called between
+    passes; True stops early. keep: called with the basis so far when Ctrl-C ends the work early;
+    returns whether it was saved. tracers: of a block in which the scene stays loaded.
 
     Raises BasisError for a basis of something else, and Interrupted for Ctrl-C.
     """
@@ -148,8 +148,8 @@ def top_up(
 def pixel_batches(counts: Indices, planes: int) -> Iterator[Indices]:
     """Yield the pixels with samples to take, (p,) at a time, fewest samples first.
 
-    Neighbours in a batch have about as many, since they are traced side by side. Each batch is a
-    short pass, and its planes, so many for each pixel, take little memory.
+    Pixels of a batch have similar counts, since they are traced together. Each batch is a short
+    pass whose planes take little memory.
     """
     flat = counts.ravel()
     pixels = np.flatnonzero(flat)

@@ -1,8 +1,7 @@
-"""An engine whose workers belong to a Dask cluster: dask-jobqueue's, dask-kubernetes', one's own.
+"""An engine whose workers belong to a Dask cluster, such as dask-jobqueue's or dask-kubernetes'.
 
-Dask carries work items to workers and back, and knows which workers live. This module decides which
-worker does what, so that every item has a known worker: one that dies, or takes too long over it,
-loses it to another.
+Dask transports work items to workers and back, and knows which workers are alive. This module
+assigns items to workers. If a worker dies or takes too long over an item, another one gets it.
 """
 
 import os
@@ -38,7 +37,7 @@ LIMIT_FACTOR, MIN_LIMIT_S = 20.0, 300.0
 
 @dataclass
 class _Assignment:
-    """A work item that a worker has. since_s: when it became that worker's first."""
+    """A work item assigned to a worker. since_s: when it became that worker's first."""
 
     item: WorkItem
     parcel: Parcel
@@ -50,8 +49,8 @@ class _Assignment:
 class Cluster:
     """An engine of the workers at `address`.
 
-    is_shared: whether they see the local files under the same paths. limit_s: seconds that an item
-    may take; by default many times its expected time.
+    is_shared: whether workers see the local files under the same paths. limit_s: seconds that an
+    item may take; by default many times its expected time.
     """
 
     is_apart = True
@@ -253,13 +252,13 @@ class Cluster:
         self._start_clocks()
 
     def _give_up(self, waiting: deque[WorkItem], tries: Counter[str]) -> Iterator[ItemResult]:
-        """Yield failures for items that workers were lost over too often."""
+        """Yield failures for items that have lost too many workers."""
         for item in [x for x in waiting if tries[x.name] >= MAX_TRIES]:
             waiting.remove(item)
             yield ItemResult(item.name, item.kind, LOST_TEXT, is_lost=True)
 
     def _end_hung_workers(self, waiting: deque[WorkItem], tries: Counter[str]) -> None:
-        """End workers that take too long over something."""
+        """End workers that take too long over an item."""
         for assignment in list(self._assignments):
             limit_s = self._limit_s or max(MIN_LIMIT_S, LIMIT_FACTOR * assignment.item.expected_s)
             if assignment.since_s is None or time.monotonic() - assignment.since_s < limit_s:

@@ -1,8 +1,8 @@
-"""Work items for other machines: their files travel by content, and the results come back.
+"""Work items for other machines: packing their files and unpacking their results.
 
 On a shared disk only the content is checked. Otherwise each worker has a store of files by their
-SHA-256, so that none is sent to it twice, and an item finds them under a root of its own, at their
-local paths: relative paths in what is written come out the same.
+SHA-256, so that none is sent twice. An item finds them at their local paths under its own root, so
+that relative paths in results stay the same.
 """
 
 import hashlib

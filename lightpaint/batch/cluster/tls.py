@@ -1,7 +1,8 @@
-"""Trust between this machine and a scheduler at a `tls://` address, checked before Dask connects.
+"""A check that this machine and a scheduler at a `tls://` address trust each other.
 
-Dask finds certificates by its own configuration (`distributed.comm.tls`), as its schedulers and
-workers do. A Dask client that is refused reports it late, or waits for half a minute.
+It runs before Dask connects, since a refused Dask client reports that late, or waits for half a
+minute. Dask finds certificates by its own configuration (`distributed.comm.tls`), as its schedulers
+and workers do.
 """
 
 import socket

@@ -26,8 +26,8 @@ MALLOPT_VALUES = {-1: 2**26, -3: 2**25}  # M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
 def _keep_memory() -> None:
     """Keep the memory of arrays of a few hundred kilobytes for the next ones.
 
-    Dask's workers return it to the system at once (MALLOC_TRIM_THRESHOLD_). The system then clears
-    it anew for each block of pixels, which takes longer than the arithmetic.
+    Dask's workers return it to the system at once (MALLOC_TRIM_THRESHOLD_). The system then has to
+    clear it for each block of pixels, which takes longer than the arithmetic.
     """
     with suppress(AttributeError, OSError):
         mallopt = ctypes.CDLL(None).mallopt
@@ -53,7 +53,7 @@ _STATE = _WorkerState()
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of packages that decide the last bit of a result."""
+    """Return the versions of packages that affect the last bit of a result."""
     from importlib.metadata import version
 
     packages = {name: version(name) for name in ("mitsuba", "drjit", "numpy")}
@@ -61,12 +61,12 @@ def versions() -> dict[str, str]:
 
 
 def put(digest: str, data: bytes, is_first: bool, is_last: bool, dask_worker: Any = None) -> None:
-    """Take a piece of a file into this worker's store."""
+    """Add a piece of a file to this worker's store."""
     _STATE.store(dask_worker).put(digest, data, is_first=is_first, is_last=is_last)
 
 
 def do_parcel(parcel: Parcel) -> ItemResult | list[str]:
-    """Return the result of an item, or the SHA-256 of files that have to be sent first."""
+    """Run an item and return its result, or the SHA-256 of files that are missing."""
     from distributed import get_worker
 
     return _STATE.thread.submit(_do, parcel, get_worker()).result()

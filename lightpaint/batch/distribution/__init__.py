@@ -1,1 +1,1 @@
-"""Engines that run work items, and what is parted among them: bases, sums, renders."""
+"""Engines that run work items, and the division of bases, sums and renders into items."""

@@ -10,7 +10,7 @@ from lightpaint.batch.work.work_items import ItemResult, WorkItem
 from lightpaint.batch.work.worker_cache import WorkerCache
 from lightpaint.progress import Listener
 
-#: How often an item is tried if workers die over it.
+#: Number of tries of an item if workers die over it.
 MAX_TRIES = 3
 
 #: Failure of an item over which every worker has died.
@@ -26,7 +26,7 @@ class Engine(Protocol):
 
     @property
     def is_gone(self) -> bool:
-        """True once no worker can be reached any more, which is no look's failure."""
+        """True once no worker can be reached, which counts as no look's failure."""
 
     @property
     def workers(self) -> int:

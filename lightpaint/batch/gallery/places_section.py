@@ -10,9 +10,9 @@ from lightpaint.placement.placement_record import PlacementRecord
 
 
 def places_section(plan: Plan) -> str:
-    """Return, for each group of looks, what moved, and plan and elevation of the room.
+    """Return the section on moved lights: for each group of looks a table, a plan and an elevation.
 
-    Looks that are placed alone have no part in it: their reports say it.
+    Looks that are placed alone are in their own reports instead.
     """
     found = [(group, group.found()) for group in plan.groups if len(group.tasks) > 1]
     parts = "".join(_group_html(group, record) for group, record in found if record is not None)

@@ -119,7 +119,7 @@ def rows_of(plan: Plan, lines: Mapping[tuple[str, Kind], JournalLine]) -> list[S
 
 
 def state_of(look: PlannedLook, lines: Mapping[tuple[str, Kind], JournalLine]) -> tuple[State, str]:
-    """Return whether all steps are done as they are requested now, and why one failed."""
+    """Return whether all steps are done as now requested, and why one failed."""
     state: State = "done"
     for step in look.steps:
         line = lines.get((step.task.look, step.task.kind))

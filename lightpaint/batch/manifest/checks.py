@@ -27,7 +27,7 @@ SOLVE_STEPS, GIVEN_LIGHTING_STEPS = ("solve", "predict", "verify", "report"), ("
 #: Keys that stand for a scene that is already rendered.
 BASES = ("basis", "light_groups")
 
-#: Keys of `Constraints.of`, as they stand in a lights file.
+#: Keys of `Constraints.of`, as in a lights file.
 CONSTRAINT_KEYS = ("light", "tie", "prefer_current", "sparse")
 
 
@@ -69,7 +69,7 @@ def check_combination(mistakes: Mistakes, table: Table) -> None:
 
 
 def _check_share(mistakes: Mistakes, table: Table, *, is_given: bool) -> None:
-    """Add what contradicts `share = "places"` to the mistakes."""
+    """Add keys that contradict `share = "places"` to the mistakes."""
     look = table.values
     if is_given:
         mistakes.add(table.where, "share is of places that are searched for: its lighting is given")
@@ -84,7 +84,7 @@ def _check_share(mistakes: Mistakes, table: Table, *, is_given: bool) -> None:
 
 
 def check_by_sums(mistakes: Mistakes, table: Table) -> None:
-    """Add what contradicts a request for the lighting alone to the mistakes."""
+    """Add keys that contradict a request for the lighting alone to the mistakes."""
     label, look = table.where, table.values
     if len(look["want"]) > 1:
         mistakes.add(label, "want has 'lights', which is the lighting alone: leave the rest out")

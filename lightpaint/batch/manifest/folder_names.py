@@ -39,7 +39,7 @@ def is_reserved(name: str) -> bool:
 
 
 def name_clashes(names: Iterable[str]) -> list[list[str]]:
-    """Return groups of names that some disks take for the same, each name once.
+    """Return groups of names that are the same on some disks, each name once.
 
     A name that occurs twice clashes with itself, and is a group of one.
     """

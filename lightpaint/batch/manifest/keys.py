@@ -21,7 +21,7 @@ Step = Literal["solve", "predict", "verify", "report", "render", "export", "ligh
 #: Steps of a given lighting.
 LIGHTING_STEPS: tuple[Step, ...] = ("predict", "render", "export")
 
-#: What looks may share.
+#: Values of `share`.
 Share = Literal["places"]
 
 #: Scale in which a sequence has even steps: stops of brightness, or perceived colour.
@@ -62,7 +62,7 @@ TEXT: Check = (lambda value: isinstance(value, str) and value != "", "a text")
 TEXTS: Check = (_texts, f'a list of texts, ["a", "b"], {MAX_LISTED} at most')
 TABLE: Check = a(dict, "a table")
 
-#: Keys for loading a scene, or what replaces it.
+#: Keys for loading a scene or its replacement.
 SOURCE_KEYS: dict[str, Check] = {
     "scene": TEXT,
     "basis": TEXT,

@@ -15,7 +15,7 @@ from lightpaint.errors import LightingError
 from lightpaint.lighting.answer.lighting import Lighting
 from lightpaint.screen import some_names
 
-#: A light that is off begins or ends so many stops below the brighter end, in `log`.
+#: Stops below the brighter end at which a light that is off begins or ends, in `log`.
 OFF_STOPS = 10.0
 
 #: Linear Rec.709 to cone responses, and their cube roots to Oklab (Ottosson 2020).

@@ -19,7 +19,7 @@ from lightpaint.pipeline.job.settings import Settings
 #: Variations that are solved.
 SOLVED_WORDS = ("fewer lights", "white only", "held harder")
 
-#: Variations that shift an answer, by so many mireds; more is warmer.
+#: Variations that shift an answer, and their mireds; positive is warmer.
 SHIFTED_WORDS = {"warmer": 60.0, "cooler": -60.0}
 
 VARIATIONS = (*SHIFTED_WORDS, *SOLVED_WORDS)
@@ -63,7 +63,7 @@ def vary(
 def shift(lighting: Lighting, mireds: float, dimmer_lights: Collection[str] = ()) -> Lighting:
     """Return a lighting with every light warmer by `mireds`, at its luminance.
 
-    dimmer_lights: names of lights that have a dimmer and no colour; they stay as they are.
+    dimmer_lights: names of lights with a dimmer but no colour; they do not change.
     """
     lights = tuple(
         light if light.name in dimmer_lights else _shift_light(light, mireds)

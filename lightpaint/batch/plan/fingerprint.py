@@ -56,8 +56,7 @@ class Fingerprints:
         return _sha256(json.dumps([__version__, made_of], default=str))
 
     def _request(self, entry: LookEntry) -> Any:
-        """Return what a look asks for, as plain values; its steps have fingerprints of their
-        own."""
+        """Return the request of a look as plain values; its steps have separate fingerprints."""
         plain = replace(entry, where="", want=(), final=Final(), handover=Handover(), places="")
         return _relative(asdict(plain), self._base)
 

@@ -1,4 +1,4 @@
-"""A batch as a farm job: an Open Job Description template, which `openjd run` accepts as it is.
+"""A batch as a farm job: an Open Job Description template for `openjd run`.
 
 Its tasks are lightpaint commands that share the folder of the batch and the cache. The first look
 of each basis renders it, and the others find it in the cache.
@@ -89,7 +89,7 @@ def _steps(plan: Plan, command: Sequence[str]) -> list[dict[str, Any]]:
             look = {"name": "Look", "type": "STRING", "range": range_}
             space = {"taskParameterDefinitions": [look]}
             steps.append(_step(name + part, command, steps, parameterSpace=space))
-    # The last step does what lost tasks have left, and writes the gallery.
+    # The last step redoes lost tasks, and writes the gallery.
     steps.append(_step("Gallery", (), steps))
     return steps
 

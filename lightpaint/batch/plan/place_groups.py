@@ -1,7 +1,6 @@
-"""Groups of looks that share places of lights: a look and its variations, or looks that ask for it.
+"""Groups of looks that share places of lights: a look with its variations, or looks with `share`.
 
-One search places the lights for all of a group; it has its record in a file, which says what went
-into it.
+One search places the lights for a whole group; a file records its result and its inputs.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,7 +37,7 @@ class PlaceGroup:
         return self.file.with_suffix(".png")
 
     def found(self) -> PlacementRecord | None:
-        """Return the record, if it is of these paintings as they are now."""
+        """Return the record, if it belongs to these paintings and they are unchanged."""
         if not self.file.is_file():
             return None
         try:

@@ -154,13 +154,13 @@ def answer_task(
 
 
 def render_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
-    """Return the task of a look's final render. answer: that of its answer, in `folder`."""
+    """Return the task of a look's final render. answer: the task of its answer, in `folder`."""
     lighting = str(folder / "lighting.json")
     return Task(entry.name, "render", answer.job, (lighting,), answer.reads, final=entry.final)
 
 
 def export_task(answer: Task, entry: LookEntry, folder: Path) -> Task:
-    """Return the task of a look's exports. answer: that of its answer, in `folder`."""
+    """Return the task of a look's exports. answer: the task of its answer, in `folder`."""
     lighting = str(folder / "lighting.json")
     # An export to light groups needs their names.
     bases = answer.bases if isinstance(entry.basis, GroupsFile) else ()
@@ -183,7 +183,7 @@ def key_of_basis(basis: BasisFile | GroupsFile) -> str:
 def key_of_scene(scene: SceneFile, settings: Settings, places: str = "") -> str:
     """Return the key of a rendered basis: the scene with its sensor, and the render settings.
 
-    places: file of the places of lights that may move; "" for the basis of the scene as it is.
+    places: file of the places of lights that may move; "" for the basis of the unchanged scene.
     """
     key = {"scene": asdict(scene), **render_settings(settings)}
     return json.dumps(key | ({"places": places} if places else {}))

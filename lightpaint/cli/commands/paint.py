@@ -101,9 +101,9 @@ def paint(
 
 
 def _announce(server: "Server", name: str, folder: Path, *, is_reachable: bool) -> None:
-    """Tell where the painter is, and with --host who reaches it.
+    """Print the painter's address, and with --host who can reach it.
 
-    name: of what is painted. is_reachable: whether an address to listen at was given.
+    name: of the scene or basis. is_reachable: whether the user gave an address to listen at.
     """
     if is_reachable:
         reach_text = REACH[server.address.reach].format(name=server.address.name, folder=folder)

@@ -128,7 +128,7 @@ def _template_of_basis(
 def _show_template(
     output: Path, files: Sequence[Path], *, is_denoised: bool = True
 ) -> CommandOutcome:
-    """Print what the files of a template are for."""
+    """Print the purpose of each file of a template."""
     is_tree = is_folder(output)
     picture = output / SHOWN if is_tree else output.with_suffix(".png")
     linear = output / LIGHT if is_tree else output

@@ -1,1 +1,1 @@
-"""Options of the command line: what each command takes, and the jobs made of it."""
+"""Options of the command line, and the jobs made from them."""

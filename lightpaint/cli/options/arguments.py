@@ -179,7 +179,7 @@ def share(text: str) -> float:
 class number:  # noqa: N801 (used as a function)
     """A type for numbers > 0, or >= 0, up to `most`.
 
-    about: what it is a number of, with a space before.
+    about: the quantity, with a space before.
     """
 
     def __init__(

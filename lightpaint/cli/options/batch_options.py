@@ -1,4 +1,4 @@
-"""Options of `batch`: the looks, what a failure stops, and who does the work."""
+"""Options of `batch`: looks, handling of failures, and workers."""
 
 import argparse
 
@@ -28,7 +28,7 @@ def add_batch(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_looks(parser: argparse.ArgumentParser) -> None:
-    """Add what is to be done, and where."""
+    """Add options for the looks and their folder."""
     parser.add_argument(
         "paths",
         metavar="looks.toml",
@@ -53,7 +53,7 @@ def _add_looks(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_failures(parser: argparse.ArgumentParser) -> None:
-    """Add what a failed step stops, and how often it is tried."""
+    """Add options for the handling of failed steps."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument(
         "--keep-going",
@@ -78,7 +78,7 @@ def _add_failures(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add who does the work: processes here, or a cluster."""
+    """Add options for workers: local processes, or a cluster."""
     parser.add_argument(
         "--workers",
         type=arguments.at_least(1, most=1024),

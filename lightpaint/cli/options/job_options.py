@@ -127,7 +127,7 @@ def constraints_of(options: Namespace) -> Constraints:
 
 
 def rigging_of(options: Namespace) -> Rigging:
-    """Return what may move by the options."""
+    """Return the rigging that the options ask for."""
     lights: dict[str, dict[str, Any]] = {}
     for key in MOVES:
         for name, value in getattr(options, key):

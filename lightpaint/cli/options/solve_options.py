@@ -237,7 +237,7 @@ def _repeated(
 ) -> Callable[[str, str, Callable[[str], Any], str], None]:
     """Return a function that adds an option which may be repeated: its flag, metavar, type, help.
 
-    dests: attributes of the options whose attribute is not named as they are.
+    dests: attributes of options that are not named after their flag.
     """
 
     def add(option: str, metavar: str, kind: Callable[[str], Any], about: str) -> None:
@@ -319,7 +319,7 @@ def add_constraints(parser: argparse.ArgumentParser) -> None:
 
 
 def add_rigging(parser: argparse.ArgumentParser) -> None:
-    """Add what may move, beside what the lights file lets move."""
+    """Add options for lights that may move, in addition to the lights file."""
     group = parser.add_argument_group(
         "places",
         "NAME is a light or a pattern; all options may be repeated. Lights that may move go where "

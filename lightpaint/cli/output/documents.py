@@ -109,7 +109,7 @@ def verified_document(folder: Path, result: Verification) -> dict[str, Any]:
 
 
 def kept_document(entry: cache.Entry) -> dict[str, Any]:
-    """Return the document of one basis in the cache, without what cannot be read."""
+    """Return the document of one basis in the cache, without unreadable fields."""
     document: dict[str, Any] = {"file": str(entry.path), "bytes": entry.size}
     if (origin := entry.origin) is not None and entry.image_size is not None:
         height, width = entry.image_size

@@ -63,8 +63,8 @@ SPELLINGS = {
 BY_OPTION = "on the command line"
 OPTIONS_OF_KEYS = {"limits": "limit", "duv": "kelvin"}
 
-#: How an error of a light's constraint or place by option begins, one of a light that is not there,
-#: and one of a new light.
+#: Beginnings of errors: in a light's constraint or place by option, for an unknown light, and for a
+#: new light.
 _LIGHT = re.compile(
     BY_OPTION + r": light\.(.+?)\.(lock|off|limits|color|kelvin|duv|primaries|move|aim|cone)"
     r"(?:\.\w+)?(?=:? )"
@@ -107,8 +107,7 @@ def _spoken(match: re.Match[str]) -> str:
 def from_any_folder(words: Sequence[str] | str) -> str:
     """Return a command, as words or as a shell line, that does the same from any folder.
 
-    Its paths stay as they were given; a subshell first changes to the folder that they are relative
-    to.
+    Its paths stay as given; a subshell first changes to the folder that they are relative to.
     """
     command = words if isinstance(words, str) else shlex.join(words)
     try:

@@ -161,7 +161,7 @@ class TransformChoice:
     @staticmethod
     @keywords()
     def of(transform: "ViewTransform | TransformChoice | None") -> "TransformChoice":
-        """Return a whole transform as a choice, a choice as it is, or the open choice for None."""
+        """Return a transform as a choice, a choice unchanged, or the open choice for None."""
         if isinstance(transform, ViewTransform):
             return TransformChoice(transform.name, transform.stops)
         return transform or TransformChoice()

@@ -32,8 +32,8 @@ VERSION_KEY = f"{OWN}version"
 MAX_BYTES = 2**29
 MAX_COMPRESSION = 64
 
-#: Compression is tried on every 16th line if these have at least so many bytes, and used if they
-#: shrink below this share.
+#: Compression is tried on every 16th line if these have at least this number of bytes, and used if
+#: they shrink below this share.
 SAMPLE_STEP, MIN_SAMPLE_BYTES, MAX_PACKED_SHARE = 16, 2**16, 0.6
 
 #: Pixels (height, width) by channel name.

@@ -144,7 +144,7 @@ class RowFile:
         return max(1, READ_BYTES // (part.line_bytes * part.lines))
 
     def channels(self, part: PartLayout) -> dict[str, npt.NDArray[Any]]:
-        """Read all channels of a part as they are stored, (h, w) each."""
+        """Read all channels of a part in their stored types, (h, w) each."""
         starts = dict(zip(part.channels, _starts(part), strict=True))
         channels = {name: np.empty(part.size, kind) for name, kind in part.channels.items()}
         step = self._chunks_at_a_time(part)
@@ -270,7 +270,7 @@ def zip_filtered(data: bytes) -> bytes:
 
 
 def _unpacked(compressed: bytes, size: int) -> bytes:
-    """Return ZIP-compressed bytes as they were before `zip_filtered`."""
+    """Return ZIP-compressed bytes decoded: the inverse of `zip_filtered`."""
     try:
         packed = np.frombuffer(zlib.decompress(compressed, bufsize=size), np.uint8)
     except zlib.error:

@@ -132,12 +132,12 @@ def write_streamed(
 ) -> None:
     """Write a multi-part EXR, all of it or nothing.
 
-    Pixels are written as they come, behind the room for what stands before them in the file.
+    Pixels are written as they arrive, after space reserved for the headers.
 
     parts: the header of each and its channels, of the types and size in it; all have the same
-    display window. room: bytes that all headers have at most, as `room_for` says of each. texts:
-    returns attributes of the first header, in which the version of lightpaint is recorded too; it
-    is called after all parts. Raises OutputError for every refusal of the system.
+    display window. room: largest size of all headers in bytes, the sum of `room_for`. texts:
+    returns attributes of the first header, which also records the version of lightpaint; called
+    after all parts. Raises OutputError for every refusal of the system.
     """
     with replacing(path) as temporary, temporary.open("wb") as file:
         file.seek(room)

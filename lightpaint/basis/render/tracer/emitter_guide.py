@@ -10,7 +10,7 @@ every image does not depend on what has been learned.
 
 Light is counted in integers, whose sums are the same in whatever order threads add.
 
-Import it once a variant is set and not a scalar one: its arrays do not exist before.
+Import this module only after a JIT variant is set: its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
@@ -27,8 +27,8 @@ from lightpaint.basis.render.tracer.sobol import hashed
 
 #: Share of the samples that is spread evenly over the emitters of a cell.
 EVEN_SHARE = 0.1
-#: Units in which the light of an emitter is counted: so many make up its average contribution, and
-#: one sample counts at most so many.
+#: Integer units of an emitter's light: the number in its average contribution, and the largest
+#: number from one sample.
 MEAN_UNITS, MAX_UNITS = 2.0**12, 2.0**31
 #: Units of radiance 1, before anything is known of an emitter.
 FIRST_UNITS = 2.0**20
@@ -82,14 +82,14 @@ class EmitterGuide:
         return np.stack([self._received_light, self._sample_counts]).astype(np.float32)
 
     def update(self) -> None:
-        """Update the probabilities by what a pass has recorded."""
+        """Update the probabilities from the records of a pass."""
         shape = self.cells, self.count
         new_light = np.array(self._new_light).reshape(shape).astype(float)
         new_counts = np.array(self._new_counts).reshape(shape)
         self._received_light += new_light / self._units
         self._sample_counts += new_counts
         mean = new_light.sum(axis=0) / np.maximum(new_counts.sum(axis=0), 1)
-        # Powers of two, by which no digit of what is counted changes.
+        # Powers of two, which leave all digits of the counts unchanged.
         units = self._units * 2.0 ** np.round(
             np.log2(MEAN_UNITS / np.maximum(mean, 1 / MEAN_UNITS))
         )
@@ -183,7 +183,7 @@ class EmitterGuide:
         _count(self._new_light, units, entry, lit & dr.isfinite(gray))
 
     def evaluate(self) -> None:
-        """Run what was traced, and wait for it."""
+        """Run the traced kernel, and wait for it."""
         dr.eval(self._new_light, self._new_counts)
         dr.sync_thread()
 

@@ -1,6 +1,6 @@
 """Planes that paths add their light to, one for each light, on the device that renders.
 
-Import it once a variant is set and not a scalar one: its arrays do not exist before.
+Import this module only after a JIT variant is set: its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
@@ -18,14 +18,14 @@ from lightpaint.arrays import Floats
 class LightPlanes:
     """Sums of the samples of some pixels, undivided, light by light.
 
-    light_of: as `lights_by_instance` returns it. lights: how many there are. size: rows and columns
-    of the pixels, which `add` counts row by row. is_shared: whether several paths may add to one
-    pixel at a time, whose order then decides the last bits; else each pixel has one path, which
-    adds in order. is_split: whether direct and indirect light have planes of their own. start: what
-    they begin with, as `sums` returns it; zeros if None.
+    light_of: as `lights_by_instance` returns it. lights: their number. size: rows and columns of
+    the pixels, which `add` counts row by row. is_shared: whether several paths may add to one pixel
+    at a time, in an order that decides the last bits; else each pixel has one path, which adds in
+    order. is_split: whether direct and indirect light have separate planes. start: initial sums, as
+    `sums` returns them; zeros if None.
 
-    An object, and not arrays of the loop that traces: Dr.Jit refuses such an array once it finds
-    that nothing can ever be added to it, as to `seen` where all lights are points.
+    This is an object rather than arrays of the tracing loop, since Dr.Jit refuses an array that is
+    never modified, such as `seen` when all lights are points.
     """
 
     def __init__(
@@ -53,9 +53,9 @@ class LightPlanes:
 
     @classmethod
     def nowhere(cls, light_of: Any, lights: int, *, is_split: bool) -> "LightPlanes":
-        """Return planes that keep nothing: for paths of which only what they learn counts.
+        """Return planes that store nothing, for training paths.
 
-        lights, is_split: as of the planes of other paths, which then run by the same kernel.
+        lights, is_split: as for the planes of other paths, so that both share a kernel.
         """
         nothing = cls(light_of, lights, (1, 1), is_split=is_split)
         nothing._keeps = dr.opaque(mi.Bool, False)
@@ -64,9 +64,9 @@ class LightPlanes:
     def add(self, pixel, emitter, value, bounces, active):
         """Add RGB values to the plane of the light that `emitter` belongs to.
 
-        bounces: how many surfaces have scattered them; of more than one the light is indirect.
-        What is no number, as one path in a hundred million carries, is left out: a pixel of it
-        would make all sums over the picture none.
+        bounces: the number of surfaces that have scattered them; beyond one the light is indirect.
+        NaNs, which one path in a hundred million carries, are dropped: one such pixel would make
+        all sums over the picture NaN.
         """
         active = active & dr.all(dr.isfinite(value))
         instance = dr.reinterpret_array(mi.UInt32, emitter)
@@ -86,7 +86,7 @@ class LightPlanes:
         dr.scatter_reduce(add, array, value, place, active, mode=self._mode)
 
     def evaluate(self) -> None:
-        """Run what was traced, and wait for it: a running kernel cannot be interrupted."""
+        """Run the traced kernel, and wait for it: a running kernel cannot be interrupted."""
         dr.eval(self._sums, self._seen)
         dr.sync_thread()
 
@@ -105,8 +105,8 @@ class LightPlanes:
 def lights_by_instance(scene: Any, plane_of: Mapping[str, int]) -> Any:
     """Return a UInt32 array from the Dr.Jit instance id of an emitter to its light's plane.
 
-    plane_of: index of the plane by the emitter's name. What belongs to no light is black, and does
-    no harm in the first plane.
+    plane_of: index of the plane by the emitter's name. Emitters of no light are black and do no
+    harm in the first plane.
     """
     instances = np.array(dr.reinterpret_array(mi.UInt32, scene.emitters_dr())).tolist()
     table = np.zeros(max(instances) + 1, dtype=np.uint32)

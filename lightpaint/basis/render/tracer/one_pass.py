@@ -1,16 +1,16 @@
-"""The one-pass basis: a path tracer that keeps apart what each light contributes.
+"""The one-pass basis: a path tracer that separates the contributions of lights.
 
 Radiance is a sum over the emitters that a path reaches, by chance (a ray that hits one) or
-by choice (next-event estimation). This integrator traces the very paths of Mitsuba's own
-`path`, and adds each such contribution to the image of its emitter instead of to one image.
-It draws random numbers in the same order too, so that with equal seeds the sum over the
-lights equals `mi.render` up to round-off, and one pass serves all lights.
+by choice (next-event estimation). This integrator traces the same paths as Mitsuba's own `path`,
+and adds each contribution to the image of its emitter instead of to one image. It draws random
+numbers in the same order too, so that with equal seeds the sum over the lights equals `mi.render`
+up to round-off, and one pass serves all lights.
 
-That is its plain mode, `trace_plainly`, which tests hold against Mitsuba's. For a basis two things
-are done better, at the same cost: numbers come from an evenly spread sequence instead of from
-chance (see sobol.py), and emitters are chosen by a guide that was trained (guide_training.py).
+That is its plain mode, `trace_plainly`, which tests compare with Mitsuba's. For a basis it improves
+two things at the same cost: it takes numbers from a low-discrepancy sequence instead of a random
+one (see sobol.py), and chooses emitters by a trained guide (guide_training.py).
 
-Import it once a variant is set and not a scalar one: its arrays do not exist before.
+Import this module only after a JIT variant is set: its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-call"
@@ -36,8 +36,8 @@ from lightpaint.scene.runtime.kernel_threads import kernels
 from lightpaint.scene.scene import Scene
 from lightpaint.scene.scene_render import Stream, pass_seed
 
-#: How many emitters are sampled at the first vertex, and at later ones where there are fewer
-#: emitters than that.
+#: Number of emitters sampled at the first vertex, and at later ones if there are fewer emitters
+#: than that.
 FIRST_EMITTER_SAMPLES = 8
 LATER_EMITTER_SAMPLES = {32: 2, 128: 4, 2**32: 8}
 
@@ -46,15 +46,15 @@ TRAINING_STREAM, FIRST_TOP_UP_STREAM = 2, 3
 
 
 class Tracer:
-    """A loaded scene, all lights at unit emission, whose samples are traced for `LightPlanes`.
+    """A tracer of a loaded scene, with all lights at unit emission, into `LightPlanes`.
 
-    Close it before another scene is loaded. seed: of all random numbers. guide_table: of a
-    trained guide; without one, the guide is to be trained first. emitter_samples: of the first
-    vertex and of later ones, if other than usual. loaded: what the tracer of another of its views
-    has loaded. views: the scene through other sensors, whose tracers will use what is loaded here.
+    Close it before another scene is loaded. seed: of all random numbers. guide_table: of a trained
+    guide; without one, the guide has to be trained first. emitter_samples: at the first vertex and
+    at later ones, if not the default. loaded: scene loaded by the tracer of another view. views:
+    the scene through other sensors, whose tracers will share the scene loaded here.
 
-    The samples of a pixel are terms of one sequence for each half, whatever is traced of them at a
-    time. So their sum does not depend on that, nor on the number of threads.
+    The samples of a pixel are terms of one sequence for each half, however they are divided into
+    calls. So their sum depends neither on that nor on the number of threads.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class Tracer:
         return LightPlanes(self.light_of, lights, size, is_split=is_split, start=start)
 
     def pixel_planes(self, pixels: int) -> LightPlanes:
-        """Return planes of so many single pixels, to which nothing is added yet."""
+        """Return empty planes of a number of single pixels."""
         is_split = has_indirect_planes(self.scene)
         return LightPlanes(self.light_of, len(self.scene.lights), (1, pixels), is_split=is_split)
 
@@ -154,7 +154,7 @@ class Tracer:
     ) -> None:
         view = view_of(self.scene, self.loaded)
         place = dr.arange(mi.UInt32, pixels.size)
-        # What differs between calls is no constant of the kernel, which is compiled once.
+        # Values that differ between calls are no constants of the kernel, which is compiled once.
         pixel, begin, end = (mi.UInt32(aligned(x, np.uint32)) for x in (pixels, first, first + spp))
         numbers = SobolPairs(pixel, dr.opaque(mi.UInt32, self._streams[stream]))
         first_emitters, later = self._emitter_samples
@@ -166,19 +166,19 @@ class Tracer:
 
 
 def later_emitter_samples(emitters: int) -> int:
-    """Return how many of so many emitters are sampled at vertices but the first."""
+    """Return how many of a number of emitters are sampled at vertices after the first."""
     return next(samples for fewer, samples in LATER_EMITTER_SAMPLES.items() if emitters < fewer)
 
 
 def view_of(scene: Scene, loaded: Any) -> View:
-    """Return what the camera of `scene`, which is loaded, sees."""
+    """Return the view of the loaded `scene` through its camera."""
     camera = scene.camera(loaded)
     width, height = (int(v) // scene.film.block for v in camera.film().crop_size())
     return View(loaded, camera, width, height)
 
 
 def rules_of(scene: Scene) -> Rules:
-    """Return what paths the integrator of `scene` follows."""
+    """Return the rules by which the integrator of `scene` follows paths."""
     integrator = scene.integrator
     return Rules(
         hide_emitters=integrator.hide_emitters,

@@ -1,11 +1,11 @@
 """The paths of the one-pass basis: a path tracer that adds each emitter's light to its own plane.
 
-It follows Mitsuba's path.cpp step for step. Two things may be put in the place of chance:
-`numbers`, evenly spread ones instead of the sampler's, and `guide`, which chooses emitters by
-what training has learned. Either both are given or none. With them one thread of the loop follows
-all paths of a pixel, one after the other, so that their light is added in the order of the samples.
+It follows Mitsuba's path.cpp step for step. Two things can replace random choices: `numbers`, a
+low-discrepancy sequence instead of the sampler's, and `guide`, which chooses emitters by its
+training. Either both are given or none. With them one thread of the loop follows all paths of a
+pixel, one after the other, so that their light is added in the order of the samples.
 
-Import it once a variant is set and not a scalar one: its arrays do not exist before.
+Import this module only after a JIT variant is set: its array types do not exist before.
 """
 
 # Dr.Jit rewrites `trace` from its source and traces it with arrays of any width, which a static
@@ -40,9 +40,9 @@ class Rules(NamedTuple):
     later_emitter_samples: Any = 1
 
     def emitter_samples_at(self, depth):
-        """Return how many emitters are sampled at the vertex with so many before it.
+        """Return the number of emitters sampled at a vertex.
 
-        depth: UInt32; what is before the camera counts as its first, where none is sampled.
+        depth: UInt32, number of surfaces before it; the camera (−1) counts like the first surface.
         """
         return dr.select(
             mi.Int32(depth) <= 0,
@@ -83,7 +83,7 @@ def camera_rays(view, sampler, numbers, pixel, term):
 
 
 def _first_hit(scene, ray, rules):
-    """Return what the camera sees along `ray`, through area lights where these are hidden."""
+    """Return the first intersection of a camera ray, which passes through hidden area lights."""
     pi = scene.ray_intersect_preliminary(ray, True)
     if not rules.hide_emitters:
         return pi
@@ -109,7 +109,7 @@ def trace_samples(view, numbers, guide, planes, rules, pixel, place, term, end):
 
 @dr.syntax
 def trace_paths(view, sampler, numbers, guide, planes, rules, pixel, place, term):
-    """Follow one path of each pixel from the camera on, and leave what it carries in `planes`.
+    """Follow one path per pixel from the camera, and add its light to `planes`.
 
     term: number of its sample. Other parameters are those of `trace_samples`.
     """
@@ -199,10 +199,10 @@ def passes_clearly(sample):
 
 @dr.syntax
 def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
-    """Return which of the paths about to be followed meet more than what lets them pass.
+    """Return which paths will meet a surface that does not let them pass.
 
-    Whether a path counts is known only after it has gathered light, from lights of any number, so
-    it is looked ahead with the same numbers, as far as the first surface that does not let it pass.
+    A path gathers light, from any number of lights, before it is known to count. So this follows it
+    ahead with the same numbers, up to the first surface that does not let it pass.
     """
     # fmt: off
     sampler = None if sampler is None else sampler.clone()
@@ -219,7 +219,7 @@ def _will_bounce(scene, sampler, numbers, term, ray, pi, active, rules):
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All, active)
         bsdf = si.bsdf(ray)
         if dr.hint(sampler is not None, mode="scalar"):
-            sampler.next_2d()  # what chooses an emitter
+            sampler.next_2d()  # chooses an emitter
         lobe, direction, fate = _numbers_of_surface(sampler, numbers, term, depth)
         sample, weight = bsdf.sample(mi.BSDFContext(), si, lobe, direction, active)
         passes = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Null)
@@ -259,7 +259,7 @@ def _sample_emitters(
         bsdf_value, bsdf_pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
         mis = dr.select(ds.delta, 1, _mis(ds.pdf * expected, bsdf_pdf))
         contribution = carried * bsdf_value * radiance * mis
-        # Where a spot does not point no shadow ray is needed, nor below a surface.
+        # No shadow ray is needed outside a spot's cone or below the surface.
         lit &= dr.any(contribution != 0)
         lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
         guide.learn(cell, chosen, contribution, is_sampled=active, lit=lit)
@@ -269,7 +269,7 @@ def _sample_emitters(
 
 
 def _numbers_of_surface(sampler, numbers, term, depth):
-    """Return what chooses a lobe of the surface, a direction, and whether the path survives."""
+    """Return the numbers that choose a lobe, a direction and the survival of the path."""
     if numbers is None:
         return sampler.next_1d(), sampler.next_2d(), sampler.next_1d()
     lobe_and_fate = numbers.at_vertex(term, depth, 1)

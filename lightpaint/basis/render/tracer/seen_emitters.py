@@ -1,6 +1,6 @@
-"""Pixels in which the camera sees an emitter through clear surfaces, without any light.
+"""Pixels in which the camera sees an emitter through clear surfaces.
 
-Import it once a variant is set and not a scalar one: its arrays do not exist before.
+Import this module only after a JIT variant is set: its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
@@ -16,7 +16,7 @@ from lightpaint.basis.render.tracer.path_tracer import View, camera_rays, passes
 
 
 def has_clear_surfaces(loaded: Any) -> bool:
-    """Return whether a loaded scene has glass, or anything else that a ray may pass as such."""
+    """Return whether a loaded scene has glass or other surfaces that a ray can pass unscattered."""
     surfaces = [shape.bsdf().flags() for shape in loaded.shapes() if shape.bsdf() is not None]
     clear = mi.BSDFFlags.DeltaTransmission, mi.BSDFFlags.Null
     return any(mi.has_flag(flags, kind) for flags in surfaces for kind in clear)

@@ -1,12 +1,11 @@
-"""Evenly spread numbers in the place of random ones: scrambled Sobol' points, in pairs.
+"""Low-discrepancy numbers instead of random ones: scrambled Sobol' points, in pairs.
 
-The samples of a pixel are terms of one sequence. Any stretch of it that begins at a multiple
-of a power of two and is as long covers the unit square evenly (a (0, 2)-sequence), and passes
-go on where the one before stopped. Pixels, halves and dimensions are shuffled and scrambled
-apart (Burley, "Practical Hash-based Owen Scrambling", JCGT 2020); every number alone is
-uniform, so estimates stay unbiased.
+The samples of a pixel are terms of one sequence. It is a (0, 2)-sequence: 2ᵏ terms that start at a
+multiple of 2ᵏ cover the unit square evenly. Each pass continues where the one before stopped.
+Pixels, halves and dimensions are shuffled and scrambled independently (Burley, "Practical
+Hash-based Owen Scrambling", JCGT 2020); each number is uniform, so estimates stay unbiased.
 
-Import it once a variant is set and not a scalar one: its arrays do not exist before.
+Import this module only after a JIT variant is set: its array types do not exist before.
 """
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
@@ -20,7 +19,7 @@ PAIRS_PER_VERTEX = 3
 
 
 class SobolPairs:
-    """The numbers of many pixels: each of their samples is one term of a sequence.
+    """The numbers of many pixels, whose samples are terms of sequences.
 
     pixel: UInt32 array. stream: other streams share nothing with this one. Terms are UInt32 arrays.
     """
@@ -29,22 +28,23 @@ class SobolPairs:
         self._key, _ = mi.sample_tea_32(pixel, stream)
 
     def pair(self, term, dimension):
-        """Two numbers in [0, 1) per pixel, evenly spread together over the terms."""
+        """Return two numbers in [0, 1) per pixel, whose pairs are evenly spread over the terms."""
         seed = hashed(self._key + dimension * mi.UInt32(0x9E3779B9))
-        # The terms are shuffled so that pairs of unlike dimensions do not go together. A
-        # shuffled term, its bits reversed, is the first Sobol' dimension as it stands.
+        # The terms are shuffled to decorrelate pairs of different dimensions. The reversed bits of
+        # a shuffled term are the first Sobol' dimension.
         x = _scrambled(dr.brev(term), seed)
         # The second is its polynomial over GF(2) taken at 1 + x, block by block.
         y = mi.UInt32(x)
         for shift, low_halves in _BLOCKS:
             y ^= (y & mi.UInt32(low_halves)) << shift
-        # Two words unrelated to the seed of the scrambling, whose lower bits they would undo.
+        # These words must be unrelated to the scrambling's seed, since they would undo its lower
+        # bits.
         shift_x = hashed(seed ^ 0x68BC21EB)
         shift_y = hashed(shift_x ^ 0x02E5BE93)
         return mi.Point2f(_unit(x ^ shift_x), _unit(y ^ shift_y))
 
     def at_vertex(self, term, depth, which):
-        """Pair `which` (below PAIRS_PER_VERTEX) of the path vertex at `depth`."""
+        """Return pair `which` (below PAIRS_PER_VERTEX) of the path vertex at `depth`."""
         return self.pair(term, FIRST_VERTEX + which + depth * PAIRS_PER_VERTEX)
 
 
